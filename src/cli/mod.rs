@@ -1,0 +1,88 @@
+//! The command line: what can be asked for, and where each answer is made.
+
+pub mod emulate;
+pub mod error;
+pub mod image;
+pub mod output;
+pub mod ports;
+pub mod terminal;
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use error::CliError;
+use output::Output;
+
+/// Console and emulator for Axiomatic CANopen signal scanners.
+///
+/// Without a command: the console on the screen.
+#[derive(Debug, Parser)]
+#[command(name = "axcon", version, propagate_version = true, max_term_width = 100)]
+struct Cli {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+/// What every command understands.
+#[derive(Debug, Clone, Args)]
+pub struct Global {
+    /// Where the unit is: a serial port (/dev/ttyUSB0, COM3) or an emulated unit (emu:axtc4co).
+    #[arg(long, value_name = "LINK", env = "AXCON_PORT", global = true)]
+    pub port: Option<String>,
+    /// Line rate in baud; the units have 115200.
+    #[arg(long, value_name = "RATE", default_value_t = 115_200, global = true, value_parser = clap::value_parser!(u32).range(50..=12_000_000))]
+    pub baud: u32,
+    /// Data and errors as JSON.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Answer yes to every question.
+    #[arg(long, short = 'y', global = true)]
+    pub yes: bool,
+    /// Record to this file instead of the state directory.
+    #[arg(long, value_name = "FILE", global = true, conflicts_with = "no_record")]
+    pub record: Option<PathBuf>,
+    /// Record nothing.
+    #[arg(long, global = true)]
+    pub no_record: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// List the serial ports, and who holds them.
+    Ports(ports::Args),
+    /// A plain terminal: keys out, bytes in.
+    Terminal(terminal::Args),
+    /// Host emulated units on pseudo-terminals.
+    Emulate(emulate::Args),
+    /// Work on S-record images without a unit.
+    Image(image::Args),
+}
+
+/// Runs the program and gives its exit code.
+pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => {
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(2);
+        }
+    };
+    let mut output = Output::standard(cli.global.json);
+    let result = dispatch(cli, &mut output);
+    output::conclude(&mut output, result)
+}
+
+fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
+    let global = &cli.global;
+    match cli.command {
+        None => Ok(()),
+        Some(Command::Ports(args)) => ports::run(args, global, output),
+        Some(Command::Terminal(args)) => terminal::run(args, global, output),
+        Some(Command::Emulate(args)) => emulate::run(args, global, output),
+        Some(Command::Image(args)) => image::run(args, global, output),
+    }
+}

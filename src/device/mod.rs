@@ -1,0 +1,160 @@
+//! What is known about the products: one data file for each, taken from its manual.
+//!
+//! Shared by both ends of the cable, so it holds only what a manual (or a public fact) says, never what one side does
+//! about it. What is not known is left out here and treated as unknown there.
+
+mod loader;
+
+pub use loader::LoaderKind;
+
+use std::sync::OnceLock;
+
+use serde::Deserialize;
+
+use crate::image::FlashMap;
+use crate::version::Version;
+use crate::wire::stream;
+
+/// One product, as its file describes it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Product {
+    /// Part number, e.g. `AXTC4CO`; what banners and identity blocks print.
+    pub name: String,
+    /// What it is, in words.
+    pub title: String,
+    /// Number of the manual.
+    pub manual: String,
+    /// Identity and factory settings on the CAN side.
+    pub can: Can,
+    /// How the serial cable is wired.
+    pub cable: Cable,
+    /// Texts the manual quotes.
+    pub console: Console,
+    /// Rows of the data stream.
+    pub stream: stream::Layout,
+    /// Program flash.
+    pub flash: FlashMap,
+    /// The bootloader.
+    pub loader: Loader,
+}
+
+/// Identity and factory settings on the CAN side.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Can {
+    /// Vendor, object 1018h sub-index 1.
+    pub vendor_id: u32,
+    /// Product code, object 1018h sub-index 2.
+    pub product_code: u32,
+    /// Factory node-ID.
+    pub node_id: u8,
+    /// Factory bit rate in kbit/s.
+    pub kbps: u16,
+}
+
+/// How the serial cable is wired.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cable {
+    /// Which of the unit's connectors.
+    pub connector: String,
+    /// The unit transmits.
+    pub transmit: Pin,
+    /// The unit receives.
+    pub receive: Pin,
+    /// Ground.
+    pub ground: Pin,
+}
+
+/// One wire: a pin of the unit's connector and one of the DB-9.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pin {
+    /// Pin of the unit's connector.
+    pub unit: u8,
+    /// Pin of the DB-9 plug.
+    pub db9: u8,
+}
+
+/// Texts the manual quotes. A unit's other words are unknown.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Console {
+    /// What confirms restoring the defaults.
+    pub defaults_answer: String,
+    /// What the bootloader prints when it wants a file.
+    pub loader_prompt: String,
+    /// What the new software prints when it runs for the first time.
+    pub first_start: String,
+}
+
+/// The bootloader.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Loader {
+    /// The kind that is believed to be in the unit.
+    pub kind: LoaderKind,
+    /// How upload files are named, `{version}` standing for the version.
+    pub file_name: String,
+}
+
+impl Product {
+    /// All products, in a fixed order.
+    ///
+    /// # Panics
+    /// If a file built into the program is wrong, which a test excludes.
+    pub fn all() -> &'static [Product] {
+        static ALL: OnceLock<Vec<Product>> = OnceLock::new();
+        ALL.get_or_init(|| {
+            FILES
+                .iter()
+                .map(|(name, text)| toml::from_str(text).unwrap_or_else(|error| panic!("{name}: {error}")))
+                .collect()
+        })
+    }
+
+    /// The product of this name, in any case.
+    pub fn named(name: &str) -> Option<&'static Product> {
+        Product::all().iter().find(|product| product.name.eq_ignore_ascii_case(name))
+    }
+
+    /// What the upload file of a version is called.
+    pub fn file_name(&self, version: Version) -> String {
+        self.loader.file_name.replace("{version}", &version.to_string())
+    }
+}
+
+const FILES: [(&str, &str); 1] = [("axtc4co.toml", include_str!("axtc4co.toml"))];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_product_file_is_sound() {
+        for (file, text) in FILES {
+            let product: Product = toml::from_str(text).unwrap_or_else(|error| panic!("{file}: {error}"));
+            assert_eq!(file, format!("{}.toml", product.name.to_lowercase()));
+            assert!(product.name.len() <= 12, "{file}: the name has to fit the identity block");
+            assert!(
+                product.flash.program_words.is_multiple_of(product.flash.page_words),
+                "{file}: flash ends within a page"
+            );
+            assert!((1..=127).contains(&product.can.node_id), "{file}: node-ID");
+            assert!(product.loader.file_name.contains("{version}"), "{file}: file name without a version");
+            for format in [&product.stream.field_value, &product.stream.process_value] {
+                let width = *format.widths.first().unwrap_or_else(|| panic!("{file}: a field without a width"));
+                for word in [Some(&format.disabled), Some(&format.open), format.short.as_ref()].into_iter().flatten() {
+                    assert!(word.len() <= width, "{file}: '{word}' does not fit its field");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_found_in_any_case() {
+        assert_eq!(Product::named("axtc4co").map(|product| product.can.product_code), Some(0x0001_0114));
+        assert_eq!(Product::named("AXTC4"), None);
+    }
+}

@@ -1,0 +1,133 @@
+//! The recording on disk: asciicast v2, `"o"` from the unit and `"i"` to it.
+//!
+//! The format is lines of JSON, so a recording is readable up to its last complete line whatever killed the writer,
+//! and common players show it. An event holds text, the line holds bytes: every byte becomes the character of the
+//! same number (Latin-1), which loses nothing. The header says so in `axcon.encoding`.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use super::{Direction, REDACTED};
+use crate::endpoint::Secrecy;
+use crate::time::Instant;
+
+/// What stands at the head of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// When the recording began, in seconds since 1970.
+    pub unix_seconds: i64,
+    /// The port, as the user named it.
+    pub port: String,
+    /// Line settings, e.g. `115200 8N1`.
+    pub settings: String,
+    /// Driver or kind of the port, where known.
+    pub driver: Option<String>,
+}
+
+/// A recording being written. Each event is one `write`: a killed process loses nothing it had recorded.
+#[derive(Debug)]
+pub struct Cast<W> {
+    to: W,
+    begun: Option<Instant>,
+    written: u64,
+}
+
+#[derive(Serialize)]
+struct HeaderLine<'a> {
+    version: u8,
+    width: u8,
+    height: u8,
+    timestamp: i64,
+    title: String,
+    axcon: Details<'a>,
+}
+
+#[derive(Serialize)]
+struct Details<'a> {
+    schema: &'static str,
+    encoding: &'static str,
+    program: &'static str,
+    port: &'a str,
+    settings: &'a str,
+    driver: Option<&'a str>,
+}
+
+impl<W: Write> Cast<W> {
+    /// Writes the header.
+    ///
+    /// # Errors
+    /// If writing fails.
+    pub fn begin(to: W, header: &Header) -> io::Result<Self> {
+        let mut cast = Cast { to, begun: None, written: 0 };
+        cast.line(&HeaderLine {
+            version: 2,
+            width: 80,
+            height: 24,
+            timestamp: header.unix_seconds,
+            title: format!("axcon {}", header.port),
+            axcon: Details {
+                schema: "axcon.recording/1",
+                encoding: "latin-1",
+                program: concat!("axcon ", env!("CARGO_PKG_VERSION")),
+                port: &header.port,
+                settings: &header.settings,
+                driver: header.driver.as_deref(),
+            },
+        })?;
+        Ok(cast)
+    }
+
+    /// Appends bytes. The content of secret bytes is replaced, their number stays.
+    ///
+    /// # Errors
+    /// If writing fails; the caller says so and goes on without a recording.
+    pub fn push(&mut self, at: Instant, direction: Direction, secrecy: Secrecy, bytes: &[u8]) -> io::Result<()> {
+        let begun = *self.begun.get_or_insert(at);
+        let code = match direction {
+            Direction::FromUnit => "o",
+            Direction::ToUnit => "i",
+        };
+        let text: String = match secrecy {
+            Secrecy::Open => bytes.iter().map(|&byte| char::from(byte)).collect(),
+            Secrecy::Secret => bytes.iter().map(|_| char::from(REDACTED)).collect(),
+        };
+        self.line(&(at.since(begun).as_secs_f64(), code, text))
+    }
+
+    /// Bytes written so far, for the size limit.
+    pub fn written(&self) -> u64 {
+        self.written
+    }
+
+    fn line(&mut self, value: &impl Serialize) -> io::Result<()> {
+        let mut line = serde_json::to_vec(value)?;
+        line.push(b'\n');
+        self.written += line.len() as u64;
+        self.to.write_all(&line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_survives_and_the_password_does_not() {
+        let header = Header { unix_seconds: 0, port: "u0".into(), settings: "115200 8N1".into(), driver: None };
+        let mut cast = Cast::begin(Vec::new(), &header).expect("a vector takes everything");
+        let all: Vec<u8> = (0..=255).collect();
+        cast.push(Instant::from_millis(5), Direction::FromUnit, Secrecy::Open, &all).expect("written");
+        cast.push(Instant::from_millis(1505), Direction::ToUnit, Secrecy::Secret, b"AXIO-2010").expect("written");
+        let text = String::from_utf8(cast.to.clone()).expect("JSON is UTF-8");
+        assert_eq!(cast.written(), text.len() as u64);
+        let lines: Vec<serde_json::Value> =
+            text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect();
+        assert_eq!(lines[0]["version"], 2);
+        let back: Vec<u8> =
+            lines[1][2].as_str().expect("text").chars().map(|c| u8::try_from(c).expect("Latin-1")).collect();
+        assert_eq!(back, all);
+        assert_eq!(lines[2], serde_json::json!([1.5, "i", "*********"]));
+        assert!(!text.contains("AXIO"));
+    }
+}

@@ -1,0 +1,198 @@
+//! Every byte, both directions, in order, with its time.
+//!
+//! Structure is an overlay: events point into this record by [`Span`], and what no recogniser understood lies here all
+//! the same. The record in memory keeps the newest part only; the file on disk keeps the rest.
+
+mod file;
+
+pub use file::{Cast, Header};
+
+use std::collections::VecDeque;
+
+use crate::endpoint::Secrecy;
+use crate::time::Instant;
+
+/// Who sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// The unit sent, we received.
+    FromUnit,
+    /// We sent to the unit.
+    ToUnit,
+}
+
+/// A stretch of bytes from the unit: offsets into everything it has sent since the record began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Span {
+    /// Offset of the first byte.
+    pub start: u64,
+    /// Offset behind the last byte.
+    pub end: u64,
+}
+
+impl Span {
+    /// Number of bytes.
+    pub fn len(self) -> u64 {
+        self.end - self.start
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(self) -> bool {
+        self.start == self.end
+    }
+
+    /// The smallest span that holds both.
+    pub fn join(self, other: Span) -> Span {
+        Span { start: self.start.min(other.start), end: self.end.max(other.end) }
+    }
+}
+
+/// Bytes that came or went together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// When.
+    pub at: Instant,
+    /// Who sent.
+    pub direction: Direction,
+    /// Offset of the first byte among those of its direction.
+    pub start: u64,
+    /// What; secret bytes are already replaced by [`REDACTED`].
+    pub bytes: Vec<u8>,
+}
+
+/// What stands in the record for a secret byte.
+pub const REDACTED: u8 = b'*';
+
+/// Bytes kept in memory at most, both directions together: hours of ordinary talk, seconds of a flood.
+pub const KEPT_BYTES: usize = 8 << 20;
+
+/// Bytes of one entry at most, so that the oldest can be let go in small steps.
+const ENTRY_BYTES: usize = 4096;
+
+/// The newest bytes, both directions, in order.
+#[derive(Debug, Default)]
+pub struct Record {
+    entries: VecDeque<Entry>,
+    kept: usize,
+    from_unit: u64,
+    to_unit: u64,
+    limit: Option<usize>,
+}
+
+impl Record {
+    /// An empty record.
+    pub fn new() -> Self {
+        Record::default()
+    }
+
+    /// An empty record that keeps `limit` bytes instead of [`KEPT_BYTES`].
+    pub fn with_limit(limit: usize) -> Self {
+        Record { limit: Some(limit), ..Record::default() }
+    }
+
+    /// Appends bytes and says where they lie among those of their direction.
+    pub fn push(&mut self, at: Instant, direction: Direction, secrecy: Secrecy, bytes: &[u8]) -> Span {
+        let counter = match direction {
+            Direction::FromUnit => &mut self.from_unit,
+            Direction::ToUnit => &mut self.to_unit,
+        };
+        let span = Span { start: *counter, end: *counter + bytes.len() as u64 };
+        *counter = span.end;
+        let mut start = span.start;
+        for chunk in bytes.chunks(ENTRY_BYTES) {
+            let kept = match secrecy {
+                Secrecy::Open => chunk.to_vec(),
+                Secrecy::Secret => vec![REDACTED; chunk.len()],
+            };
+            self.kept += kept.len();
+            match self.entries.back_mut() {
+                Some(last)
+                    if last.at == at && last.direction == direction && last.bytes.len() + kept.len() <= ENTRY_BYTES =>
+                {
+                    last.bytes.extend_from_slice(&kept);
+                }
+                _ => self.entries.push_back(Entry { at, direction, start, bytes: kept }),
+            }
+            start += chunk.len() as u64;
+        }
+        let limit = self.limit.unwrap_or(KEPT_BYTES);
+        while self.kept > limit && self.entries.len() > 1 {
+            if let Some(oldest) = self.entries.pop_front() {
+                self.kept -= oldest.bytes.len();
+            }
+        }
+        span
+    }
+
+    /// What is still in memory, oldest first.
+    pub fn entries(&self) -> impl DoubleEndedIterator<Item = &Entry> {
+        self.entries.iter()
+    }
+
+    /// The bytes of a span from the unit, as far as they are still in memory.
+    pub fn bytes(&self, span: Span) -> Vec<u8> {
+        let mut found = Vec::new();
+        // Newest first: spans that are asked for lie near the end.
+        for entry in self.entries.iter().rev().filter(|entry| entry.direction == Direction::FromUnit) {
+            let end = entry.start + entry.bytes.len() as u64;
+            if end <= span.start {
+                break;
+            }
+            if entry.start < span.end {
+                let from = span.start.saturating_sub(entry.start) as usize;
+                let to = (span.end.min(end) - entry.start) as usize;
+                found.splice(0..0, entry.bytes[from..to].iter().copied());
+            }
+        }
+        found
+    }
+
+    /// Bytes ever received from the unit.
+    pub fn received(&self) -> u64 {
+        self.from_unit
+    }
+
+    /// Bytes ever sent to the unit.
+    pub fn sent(&self) -> u64 {
+        self.to_unit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const T0: Instant = Instant::ZERO;
+
+    #[test]
+    fn a_span_finds_its_bytes_across_entries_and_between_ours() {
+        let mut record = Record::new();
+        record.push(T0, Direction::FromUnit, Secrecy::Open, b"axc");
+        record.push(T0, Direction::ToUnit, Secrecy::Open, b"m");
+        let span = record.push(Instant::from_millis(1), Direction::FromUnit, Secrecy::Open, b"on\r\n");
+        assert_eq!(span, Span { start: 3, end: 7 });
+        assert_eq!(record.bytes(Span { start: 1, end: 5 }), b"xcon");
+        assert_eq!(record.bytes(Span { start: 7, end: 9 }), b"");
+    }
+
+    #[test]
+    fn the_oldest_bytes_go_first_and_offsets_stay() {
+        let mut record = Record::with_limit(ENTRY_BYTES);
+        for round in 0..10 {
+            record.push(Instant::from_millis(round), Direction::FromUnit, Secrecy::Open, &[round as u8; 1000]);
+        }
+        assert_eq!(record.received(), 10_000);
+        assert_eq!(record.bytes(Span { start: 8_999, end: 9_001 }), [8, 9]);
+        assert_eq!(record.bytes(Span { start: 0, end: 10 }), b"");
+        assert!(record.entries().map(|entry| entry.bytes.len()).sum::<usize>() <= ENTRY_BYTES);
+    }
+
+    #[test]
+    fn secret_bytes_keep_their_place_and_lose_their_content() {
+        let mut record = Record::new();
+        record.push(T0, Direction::ToUnit, Secrecy::Secret, b"AXIO-2010");
+        let entry = record.entries().next().expect("one entry");
+        assert_eq!(entry.bytes, b"*********");
+        assert_eq!(record.sent(), 9);
+    }
+}

@@ -1,0 +1,292 @@
+//! What a session can be asked, and what it has to say.
+//!
+//! Events carry spans into the record: a fact always points at the bytes it was read from.
+
+use crate::image::CheckedImage;
+use crate::record::Span;
+use crate::secret::Secret;
+use crate::time::{Duration, Instant};
+use crate::version::Version;
+use crate::wire::stream::{Row, Source};
+
+/// What the user wants of the unit. One job runs at a time; [`Command::Keys`] and [`Command::Cancel`] need no job.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Keys for the unit as they are, from the raw terminal or the menu. Refused while a job runs.
+    Keys(Vec<u8>),
+    /// Find out what is at the other end.
+    Identify,
+    /// Switch the data stream on, or change what it sends.
+    StreamOn {
+        /// Field values or process values.
+        source: Source,
+        /// Repetition time, 1 ms to 60 s (errata E-105).
+        period: Duration,
+    },
+    /// Switch the data stream off.
+    StreamOff,
+    /// Restore the default object dictionary; the unit resets itself (AXTC4CO manual, section 4.1.2).
+    RestoreDefaults,
+    /// Upload new software.
+    Load(Box<LoadOrder>),
+    /// End the running job as soon as that is safe, and say what the unit is now.
+    Cancel,
+}
+
+/// Everything an upload needs.
+#[derive(Clone, Debug)]
+pub struct LoadOrder {
+    /// What to send.
+    pub image: CheckedImage,
+    /// The password of the menu's L.
+    pub password: Secret,
+    /// The product, where the user says it or a journal knows it; otherwise the unit is asked.
+    pub product: Option<String>,
+}
+
+/// Which job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Job {
+    /// [`Command::Identify`].
+    Identify,
+    /// [`Command::StreamOn`].
+    StreamOn,
+    /// [`Command::StreamOff`].
+    StreamOff,
+    /// [`Command::RestoreDefaults`].
+    RestoreDefaults,
+    /// [`Command::Load`].
+    Load,
+}
+
+/// Why a command was not taken. Nothing has been sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// Another job runs.
+    #[error("busy with another job ({0:?})")]
+    Busy(Job),
+    /// The period is outside what the unit takes.
+    #[error("a repetition time of {0:?} is outside 1 ms to 60 s")]
+    Period(Duration),
+    /// The password is empty or holds a control character, which would end it early.
+    #[error("the password is empty or holds a control character")]
+    Password,
+}
+
+/// News.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// The unit has printed a line (or a page, or a prompt); what it means is in the message, if anything.
+    Heard {
+        /// When its last byte came.
+        at: Instant,
+        /// Where it lies in the record.
+        span: Span,
+        /// What it means.
+        message: crate::wire::Message,
+    },
+    /// A row of the stream.
+    Row {
+        /// When its last byte came.
+        at: Instant,
+        /// Where it lies in the record.
+        span: Span,
+        /// What it says.
+        row: Row,
+    },
+    /// What is known of the unit has changed: see `Session::facts`.
+    FactsChanged,
+    /// The unit has stopped us (XOFF) or lets us go on (XON).
+    Held(bool),
+    /// The upload has moved on.
+    Progress(Progress),
+    /// A job has ended.
+    Finished(Outcome),
+}
+
+/// How a job ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// What is at the other end is known now, or that nothing is: see `Session::facts`.
+    Identified,
+    /// The job has done what it should.
+    Done(Job),
+    /// The unit did not answer in time, or not in a way we understand.
+    NoAnswer {
+        /// Which job.
+        job: Job,
+        /// What was awaited.
+        awaited: &'static str,
+        /// Where the last text heard lies.
+        heard: Option<Span>,
+    },
+    /// The unit understood and said no.
+    Refused {
+        /// Which job.
+        job: Job,
+        /// Its reason, as far as it gave one.
+        reason: String,
+        /// Where it said so.
+        heard: Option<Span>,
+    },
+    /// The job was cancelled and has left the unit in peace.
+    Cancelled(Job),
+    /// An upload has ended, well or not.
+    Loaded(Box<LoadReport>),
+}
+
+/// What is known of the unit, and from where.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Facts {
+    /// Who is talking.
+    pub state: UnitState,
+    /// Product name.
+    pub product: Option<Known<String>>,
+    /// Software version.
+    pub version: Option<Known<Version>>,
+    /// CANopen node-ID.
+    pub node_id: Option<Known<u8>>,
+    /// CAN bit rate in kbit/s.
+    pub can_kbps: Option<Known<u16>>,
+    /// CANopen state, in lower case: `pre-operational`, `operational`, `stopped`.
+    pub nmt_state: Option<Known<String>>,
+    /// Whether the stream runs, and with what.
+    pub stream: Option<Source>,
+    /// Whether the diagnostics page is being repeated.
+    pub diagnostics: bool,
+    /// Lines that no recogniser understood.
+    pub unrecognised_lines: u64,
+}
+
+/// A fact and where it comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known<T> {
+    /// The fact.
+    pub value: T,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// Where in the record it was read.
+    pub span: Span,
+}
+
+/// Where a fact comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// The power-up banner.
+    Banner,
+    /// The main menu, printed on request.
+    Menu,
+    /// Some other text of the unit.
+    Text,
+}
+
+/// Who is talking at the other end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UnitState {
+    /// Nothing has been heard yet.
+    #[default]
+    Silent,
+    /// Something talks, but nothing we recognise.
+    Unknown,
+    /// The application runs.
+    Application,
+    /// The bootloader waits for a file.
+    Loader,
+}
+
+/// Where an upload stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// What is being done.
+    pub phase: Phase,
+    /// Records the unit must have taken, header and terminator included.
+    pub records: usize,
+    /// Records in all.
+    pub records_total: usize,
+    /// Characters the unit must have taken.
+    pub bytes: usize,
+    /// Characters in all.
+    pub bytes_total: usize,
+    /// Program address of the record last sent, in the image's unit.
+    pub address: u32,
+    /// Time since the first record left.
+    pub elapsed: Duration,
+    /// How long the unit has held us by XOFF, if it does.
+    pub held: Option<Duration>,
+}
+
+/// Steps of an upload, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Phase {
+    /// Finding out who is there and whether the image is for it.
+    Check,
+    /// Asking for the loader: L, password, reset.
+    EnterLoader,
+    /// The loader erases; only loaders that do so at once.
+    Erase,
+    /// Records are on their way.
+    Transfer,
+    /// The terminator is out, the loader has to say how it went.
+    Finish,
+    /// The unit restarts; its banner has to name the image's product and version.
+    Verify,
+}
+
+/// How an upload ended, what is true of the unit now, and on what evidence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadReport {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// How far it came.
+    pub phase: Phase,
+    /// What is at the other end now.
+    pub unit: UnitNow,
+    /// Product, as far as known.
+    pub product: Option<String>,
+    /// Version before, if the unit said it.
+    pub version_before: Option<Version>,
+    /// Version after, from the new banner only.
+    pub version_after: Option<Version>,
+    /// Records sent, header and terminator included.
+    pub records: usize,
+    /// Records in all.
+    pub records_total: usize,
+    /// Address of the data record last sent, in the image's unit.
+    pub address: Option<u32>,
+    /// From the first record to the end.
+    pub duration: Duration,
+    /// What happened, in one sentence.
+    pub what: String,
+    /// The text the verdict rests on, as printed (control characters made visible), shortened.
+    pub heard: String,
+}
+
+/// Verdict on an upload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The unit runs the image: its new banner says so.
+    Done,
+    /// Refused before anything was changed: wrong product, or product unknown.
+    Refused,
+    /// The unit refused: wrong password, or it did not leave the menu.
+    UnitRefused,
+    /// Nobody answered; nothing was sent but the question.
+    NoAnswer,
+    /// The upload failed.
+    Failed,
+    /// The unit runs, but its banner names another product or version than the image.
+    WrongApplication,
+    /// Cancelled.
+    Interrupted,
+}
+
+/// What a unit is after an upload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnitNow {
+    /// The application runs.
+    Application,
+    /// It waits in its loader for a file.
+    Loader,
+    /// Nobody can say.
+    Unknown,
+}
