@@ -1,13 +1,83 @@
 //! The text of the service port.
 //!
 //! What a unit prints, as messages where we understand it and as plain text where we do not. Nothing here fails:
-//! unknown is text.
+//! unknown is text. The manuals quote a few strings and fix the keys and the stream; the rest of a real unit's wording
+//! is unknown, so recognition goes by words and numbers, never by position or layout.
 
+mod boot;
+mod framer;
+mod menu;
+mod prompt;
 pub mod stream;
+mod words;
 
-/// What a line, prompt or page means.
+pub use boot::LoaderText;
+pub use framer::{Framer, Item, LONGEST_LINE, Text, XOFF, XON};
+pub use menu::{MenuKey, Network, NmtState, SoftwareName};
+pub use prompt::{Prompt, SourceKeys};
+
+use stream::{Layout, Row};
+
+/// What a line means.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
     /// Nothing we know: it stays what it is.
     Text,
+    /// A row of the data stream.
+    Row(Row),
+    /// A text of the bootloader.
+    Loader(LoaderText),
+    /// The new software runs for the first time (AXTC4CO manual, section 4.1.5).
+    FirstStart,
+    /// An entry of the main menu.
+    MenuKey(MenuKey),
+    /// Product, software version, or both.
+    Software(SoftwareName),
+    /// One or more of the CANopen network variables.
+    Network(Network),
+    /// The unit refuses what was typed: wrong password, invalid entry, not in this state.
+    Refusal,
+}
+
+/// What recognition needs to know of the products.
+#[derive(Clone, Debug)]
+pub struct Vocabulary<'a> {
+    /// Product names, as banners print them.
+    pub products: Vec<&'a str>,
+    /// Stream layouts.
+    pub layouts: Vec<&'a Layout>,
+}
+
+impl Vocabulary<'_> {
+    /// What a complete line means.
+    pub fn line(&self, line: &str) -> Message {
+        if let Some(row) = self.layouts.iter().find_map(|layout| layout.parse(line)) {
+            return Message::Row(row);
+        }
+        let words = words::Words::of(line);
+        if let Some(text) = boot::recognise(line, &words) {
+            return Message::Loader(text);
+        }
+        if words.has_all(&["first", "start"]) && words.has_any(&["performing", "initialization", "initialisation"]) {
+            return Message::FirstStart;
+        }
+        if let Some(key) = menu::key(line, &words) {
+            return Message::MenuKey(key);
+        }
+        if let Some(name) = menu::software(&words, &self.products) {
+            return Message::Software(name);
+        }
+        if let Some(network) = menu::network(line, &words) {
+            return Message::Network(network);
+        }
+        if menu::is_refusal(&words) {
+            return Message::Refusal;
+        }
+        Message::Text
+    }
+
+    /// What a text without a line end asks for, once the unit has fallen silent behind it.
+    pub fn prompt(&self, text: &str) -> Option<Prompt> {
+        prompt::recognise(text, &words::Words::of(text))
+    }
 }

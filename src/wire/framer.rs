@@ -1,0 +1,244 @@
+//! Chunks of bytes to lines.
+//!
+//! A chunk may end anywhere. Lines end with CR, LF, CR LF or LF CR, or where the cursor is moved; Xon and Xoff are
+//! lifted out, since they are about the line and not in it; colours and other escape sequences are left out of the
+//! text. Every byte belongs to the span of what it is part of: the framer copies, it never takes away.
+//!
+//! What has no line end yet is the [`Framer::pending`] text. Whether that is a prompt is a question of time, and the
+//! session's.
+
+use crate::record::Span;
+
+/// Xon, "go on" (AXTC4CO manual, appendix A: flow control Xon/Xoff).
+pub const XON: u8 = 0x11;
+/// Xoff, "stop".
+pub const XOFF: u8 = 0x13;
+
+/// Characters of a line at most. Longer ones are cut into pieces, so that a device without line ends cannot make us
+/// keep everything; twice the longest row of any product would be 200.
+pub const LONGEST_LINE: usize = 1024;
+
+/// Bytes of an escape sequence at most; what goes on longer is taken as text.
+const LONGEST_ESCAPE: usize = 64;
+
+/// What a chunk held.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Item {
+    /// A line that is not blank, without its end.
+    Line(Text),
+    /// The unit stops us (`true`) or lets us go on.
+    Hold(bool),
+}
+
+/// Text and where it lies.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Text {
+    /// Where, line end excluded.
+    pub span: Span,
+    /// Printable characters; whatever is not UTF-8 shows as U+FFFD.
+    pub text: String,
+}
+
+/// Makes lines of chunks.
+#[derive(Debug, Default)]
+pub struct Framer {
+    /// Bytes of the current line that are text.
+    line: Vec<u8>,
+    /// Where the current line began.
+    start: u64,
+    /// Bytes seen so far.
+    offset: u64,
+    escape: Escape,
+}
+
+/// Where in an escape sequence the stream is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Escape {
+    #[default]
+    None,
+    /// After ESC.
+    Begun,
+    /// Within `ESC [ ...`, this many bytes long.
+    Control(usize),
+    /// Within `ESC ] ...` and the like, which end with BEL or ESC \.
+    String(usize),
+    /// After an ESC within such a string.
+    StringEnd,
+}
+
+impl Framer {
+    /// Takes the next bytes and hands out what they complete.
+    pub fn push(&mut self, bytes: &[u8], mut out: impl FnMut(Item)) {
+        for &byte in bytes {
+            let at = self.offset;
+            self.offset += 1;
+            if byte == XON || byte == XOFF {
+                out(Item::Hold(byte == XOFF));
+            } else if self.in_escape(byte) {
+                if moves_cursor(self.escape, byte) {
+                    self.end_line(at, &mut out);
+                }
+                self.escape = self.escape.after(byte);
+            } else {
+                self.text_byte(at, byte, &mut out);
+            }
+        }
+    }
+
+    /// Text since the last line end, if it is not blank.
+    pub fn pending(&self) -> Option<Text> {
+        let text = clean(&self.line);
+        (!text.trim().is_empty()).then_some(Text { span: Span { start: self.start, end: self.offset }, text })
+    }
+
+    fn in_escape(&self, byte: u8) -> bool {
+        const ESC: u8 = 0x1B;
+        self.escape != Escape::None || byte == ESC
+    }
+
+    fn text_byte(&mut self, at: u64, byte: u8, out: &mut impl FnMut(Item)) {
+        match byte {
+            b'\r' | b'\n' => self.end_line(at, out),
+            // Erases what was typed before it, in the text as on the screen.
+            0x08 | 0x7F => {
+                self.line.pop();
+            }
+            _ => {
+                if self.line.is_empty() {
+                    self.start = at;
+                }
+                self.line.push(byte);
+                if self.line.len() >= LONGEST_LINE {
+                    self.end_line(at + 1, out);
+                }
+            }
+        }
+    }
+
+    fn end_line(&mut self, end: u64, out: &mut impl FnMut(Item)) {
+        let text = clean(&self.line);
+        if !text.trim().is_empty() {
+            out(Item::Line(Text { span: Span { start: self.start, end }, text }));
+        }
+        self.line.clear();
+        self.start = self.offset;
+    }
+}
+
+impl Escape {
+    /// The state after one more byte.
+    fn after(self, byte: u8) -> Escape {
+        match (self, byte) {
+            (Escape::None, _) => Escape::Begun,
+            (Escape::Begun, b'[') => Escape::Control(0),
+            (Escape::Begun, b']' | b'P' | b'X' | b'^' | b'_') => Escape::String(0),
+            (Escape::Begun, 0x20..=0x2F) => Escape::Begun,
+            (Escape::Begun, _) => Escape::None,
+            (Escape::Control(length), 0x20..=0x3F) if length < LONGEST_ESCAPE => Escape::Control(length + 1),
+            (Escape::Control(_), _) => Escape::None,
+            (Escape::String(_), 0x07) => Escape::None,
+            (Escape::String(_), 0x1B) => Escape::StringEnd,
+            (Escape::String(length), _) if length < LONGEST_ESCAPE => Escape::String(length + 1),
+            (Escape::String(_) | Escape::StringEnd, _) => Escape::None,
+        }
+    }
+}
+
+/// Whether this byte completes a sequence that puts the cursor elsewhere, so that what follows is another line.
+fn moves_cursor(escape: Escape, byte: u8) -> bool {
+    matches!(
+        (escape, byte),
+        (Escape::Control(_), b'A'..=b'H' | b'f' | b'J' | b'd') | (Escape::Begun, b'c' | b'D' | b'E')
+    )
+}
+
+/// Bytes as text: no control characters, tabs as blanks.
+fn clean(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    text.chars().filter_map(|c| if c == '\t' { Some(' ') } else { (!c.is_control()).then_some(c) }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn frame(chunks: &[&[u8]]) -> (Vec<Item>, Option<Text>) {
+        let mut framer = Framer::default();
+        let mut items = Vec::new();
+        for chunk in chunks {
+            framer.push(chunk, |item| items.push(item));
+        }
+        (items, framer.pending())
+    }
+
+    fn lines(bytes: &[u8]) -> Vec<String> {
+        let (items, _) = frame(&[bytes]);
+        items
+            .into_iter()
+            .filter_map(|item| match item {
+                Item::Line(text) => Some(text.text),
+                Item::Hold(_) => None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn all_four_line_ends_end_a_line() {
+        assert_eq!(lines(b"a\rb\nc\r\nd\n\re\r\n\r\nf"), ["a", "b", "c", "d", "e"]);
+    }
+
+    #[test]
+    fn a_span_holds_just_the_bytes_of_its_line() {
+        let (items, pending) = frame(&[b"\r\nab\r\npass"]);
+        assert_eq!(items, [Item::Line(Text { span: Span { start: 2, end: 4 }, text: "ab".into() })]);
+        assert_eq!(pending, Some(Text { span: Span { start: 6, end: 10 }, text: "pass".into() }));
+    }
+
+    #[test]
+    fn flow_control_is_lifted_out_of_the_line() {
+        let (items, pending) = frame(&[b"..\x13.\x11."]);
+        assert_eq!(items, [Item::Hold(true), Item::Hold(false)]);
+        assert_eq!(pending.map(|text| text.text).as_deref(), Some("...."));
+    }
+
+    #[test]
+    fn colours_vanish_and_cursor_moves_part_lines() {
+        assert_eq!(lines(b"\x1b[1;32mAXTC4CO\x1b[0m V1.1.0\r\n"), ["AXTC4CO V1.1.0"]);
+        assert_eq!(lines(b"\x1b[2J\x1b[1;1HSupply 24.1\x1b[2;1HErrors 0\x1b[3;1H"), ["Supply 24.1", "Errors 0"]);
+        assert_eq!(lines(b"\x1b]0;title\x07a\x1b]52;c;AAAA\x1b\\b\r\n"), ["ab"]);
+    }
+
+    #[test]
+    fn a_line_without_end_is_cut_and_a_string_without_end_given_up() {
+        assert_eq!(lines(&[b'x'; LONGEST_LINE * 2 + 1]).len(), 2);
+        let mut endless = b"\x1b]0;".to_vec();
+        endless.extend([b'y'; 200]);
+        endless.extend(b"\r\n");
+        assert_eq!(lines(&endless).len(), 1);
+    }
+
+    proptest! {
+        #[test]
+        fn chunks_do_not_matter(bytes in prop::collection::vec(any::<u8>(), 0..400), cuts in prop::collection::vec(0usize..400, 0..8)) {
+            let whole = frame(&[&bytes]);
+            let mut cuts: Vec<usize> = cuts.into_iter().map(|cut| cut.min(bytes.len())).collect();
+            cuts.extend([0, bytes.len()]);
+            cuts.sort_unstable();
+            let chunks: Vec<&[u8]> = cuts.windows(2).map(|pair| &bytes[pair[0]..pair[1]]).collect();
+            prop_assert_eq!(frame(&chunks), whole);
+        }
+
+        #[test]
+        fn spans_are_in_order_and_never_overlap(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+            let (items, pending) = frame(&[&bytes]);
+            let mut end = 0;
+            let texts = items.iter().filter_map(|item| match item { Item::Line(text) => Some(text), Item::Hold(_) => None });
+            for text in texts.chain(pending.as_ref()) {
+                prop_assert!(text.span.start >= end && text.span.end > text.span.start);
+                prop_assert!(text.span.end <= bytes.len() as u64);
+                end = text.span.end;
+            }
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Banner, main menu and the CANopen network variables (AXTC4CO manual, section 4.1).
+//!
+//! Stable are the keys, the subjects behind them, the product name and a version of three numbers. Wording and layout
+//! are unknown, so a line is taken for what its words and numbers say, in any order.
+
+use super::words::{Words, number};
+use crate::version::Version;
+
+/// An entry of the main menu.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum MenuKey {
+    /// M: print the menu.
+    Menu,
+    /// V: view the object dictionary.
+    View,
+    /// D: restore the default object dictionary.
+    Default,
+    /// T: toggle the data stream.
+    Stream,
+    /// S: show or stop diagnostics.
+    Diagnostics,
+    /// L: load new software.
+    Load,
+}
+
+/// Product and software version, as far as a line names them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SoftwareName {
+    /// Product name, in the product file's spelling.
+    pub product: Option<String>,
+    /// Version of three numbers.
+    pub version: Option<Version>,
+    /// How surely the version is that of the application: a line may speak of hardware or of a protocol instead.
+    pub confidence: Confidence,
+}
+
+/// How surely a version is that of the application.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Confidence {
+    /// It stands alone.
+    Bare,
+    /// The line calls it software, firmware or application.
+    Named,
+    /// It stands beside the product name.
+    WithProduct,
+}
+
+/// CANopen network variables, as far as a line names them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Network {
+    /// Node-ID, 1 to 127.
+    pub node_id: Option<u8>,
+    /// Bit rate in kbit/s.
+    pub can_kbps: Option<u16>,
+    /// State.
+    pub nmt_state: Option<NmtState>,
+}
+
+/// CANopen state of a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum NmtState {
+    /// Configured by SDO, no PDOs.
+    PreOperational,
+    /// In normal service.
+    Operational,
+    /// Neither.
+    Stopped,
+}
+
+impl NmtState {
+    /// The name CANopen uses.
+    pub const fn name(self) -> &'static str {
+        match self {
+            NmtState::PreOperational => "pre-operational",
+            NmtState::Operational => "operational",
+            NmtState::Stopped => "stopped",
+        }
+    }
+}
+
+/// The menu entry a line offers: its key as a word of its own (or bracketed within its word), and its subject.
+pub(super) fn key(line: &str, words: &Words) -> Option<MenuKey> {
+    let subjects: [(char, &[&str], MenuKey); 6] = [
+        ('v', &["view", "dictionary"], MenuKey::View),
+        ('d', &["default", "restore"], MenuKey::Default),
+        ('t', &["toggle", "stream"], MenuKey::Stream),
+        ('s', &["diagnos"], MenuKey::Diagnostics),
+        ('l', &["load", "software"], MenuKey::Load),
+        ('m', &["menu"], MenuKey::Menu),
+    ];
+    let first = words.iter().take(3).find(|word| word.len() == 1)?.chars().next()?;
+    // A sentence about the subject is no entry: the key leads the line, or is the last of a short one.
+    let leads = line.trim_start().trim_start_matches(|c: char| !c.is_alphanumeric()).to_lowercase();
+    let alone = |c: char| leads.strip_prefix(c).is_some_and(|rest| !rest.starts_with(char::is_alphanumeric));
+    let subject_words = Words::joined(line);
+    let pressed = words.get(0) == Some("press") || words.get(0) == Some("hit") || words.get(0) == Some("key");
+    subjects
+        .iter()
+        .find(|(key, subject, _)| *key == first && (alone(*key) || pressed) && subject_words.has_any(subject))
+        .map(|&(_, _, entry)| entry)
+}
+
+/// Product and version a line names.
+pub(super) fn software(words: &Words, products: &[&str]) -> Option<SoftwareName> {
+    let product = products
+        .iter()
+        .find(|product| words.iter().any(|word| word.eq_ignore_ascii_case(product)))
+        .map(|product| (*product).to_owned());
+    let other = ["hardware", "loader", "bootloader", "boot", "protocol", "canopen", "profile", "manual", "board"];
+    let own = ["software", "firmware", "application", "program", "fw", "sw"];
+    let version = words.iter().find_map(|word| word.parse::<Version>().ok());
+    let speaks_of_other = words.has_any(&other) && !words.has_any(&own) && product.is_none();
+    let version = version.filter(|_| !speaks_of_other);
+    let confidence = match (&product, words.has_any(&own)) {
+        (Some(_), _) => Confidence::WithProduct,
+        (None, true) => Confidence::Named,
+        (None, false) => Confidence::Bare,
+    };
+    (product.is_some() || version.is_some()).then_some(SoftwareName { product, version, confidence })
+}
+
+/// Network variables a line names.
+pub(super) fn network(line: &str, words: &Words) -> Option<Network> {
+    let node_id = words.position("node").and_then(|at| {
+        let after = words.iter().skip(at + 1).take(4).find_map(number)?;
+        u8::try_from(after).ok().filter(|node_id| (1..=127).contains(node_id))
+    });
+    let network = Network {
+        node_id,
+        can_kbps: can_kbps(words).filter(|_| !speaks_of_serial_line(words)),
+        nmt_state: nmt_state(line),
+    };
+    (network != Network::default()).then_some(network)
+}
+
+/// Whether the unit says no to what was typed.
+pub(super) fn is_refusal(words: &Words) -> bool {
+    words.has_any(&["wrong", "invalid", "incorrect", "denied", "refused", "illegal", "rejected"])
+        || (words.has_any(&["not", "only"]) && words.has_any(&["allowed", "accepted", "available", "possible", "pre"]))
+}
+
+fn speaks_of_serial_line(words: &Words) -> bool {
+    words.has_any(&["rs", "rs232", "serial", "uart", "115200"])
+}
+
+fn can_kbps(words: &Words) -> Option<u16> {
+    let rates = [10u16, 20, 50, 100, 125, 250, 500, 800, 1000];
+    let list: Vec<&str> = words.iter().collect();
+    let speaks_of_rate = words.has_any(&["baud", "kbit", "kbps", "kbaud", "kb", "mbit", "mbps", "bitrate"])
+        || words.has_all(&["bit", "rate"])
+        || list.iter().any(|word| word.ends_with("kbit") || word.ends_with("kbps") || word.ends_with("k"));
+    if !speaks_of_rate {
+        return None;
+    }
+    list.iter().enumerate().find_map(|(at, word)| {
+        let digits = word.trim_end_matches(|c: char| c.is_alphabetic());
+        let unit =
+            if digits.len() < word.len() { &word[digits.len()..] } else { list.get(at + 1).copied().unwrap_or("") };
+        let value = number(digits)?;
+        let kbps = match unit.chars().next() {
+            Some('m') => value.checked_mul(1000)?,
+            Some('b') if value >= 10_000 => value / 1000,
+            _ if value >= 10_000 => value / 1000,
+            _ => value,
+        };
+        u16::try_from(kbps).ok().filter(|kbps| rates.contains(kbps))
+    })
+}
+
+fn nmt_state(line: &str) -> Option<NmtState> {
+    let squeezed: String = line.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
+    let named = squeezed.contains("state") || squeezed.contains("nmt") || squeezed.contains("mode");
+    if squeezed.contains("preop") {
+        Some(NmtState::PreOperational)
+    } else if named && squeezed.contains("operational") {
+        Some(NmtState::Operational)
+    } else if named && squeezed.contains("stopped") {
+        Some(NmtState::Stopped)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_menu_entry_is_known_by_key_and_subject() {
+        let table = [
+            ("V - View Object Dictionary", Some(MenuKey::View)),
+            ("  [D] Default Object Dictionary", Some(MenuKey::Default)),
+            ("T – Toggle RS-232 Stream On/Off", Some(MenuKey::Stream)),
+            ("s) show/stop diagnostics", Some(MenuKey::Diagnostics)),
+            ("(L)oad new software", Some(MenuKey::Load)),
+            ("Press M for the menu", Some(MenuKey::Menu)),
+            ("L: LOAD NEW SOFTWARE", Some(MenuKey::Load)),
+            ("V1.2.3", None),
+            ("Supply voltage V 24.1", None),
+            ("T 23.5", None),
+            ("Load New Software", None),
+        ];
+        for (line, expected) in table {
+            assert_eq!(key(line, &Words::of(line)), expected, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn product_and_version_are_found_in_any_order_and_other_versions_are_not_taken() {
+        let table = [
+            (
+                "AXTC4CO 4 Thermocouple Scanner V1.1.0",
+                Some((Some("AXTC4CO"), Some((1, 1, 0)), Confidence::WithProduct)),
+            ),
+            ("Version 1.2.0 of axtc4co", Some((Some("AXTC4CO"), Some((1, 2, 0)), Confidence::WithProduct))),
+            ("Software version: V1.2.0", Some((None, Some((1, 2, 0)), Confidence::Named))),
+            ("V1.2.0", Some((None, Some((1, 2, 0)), Confidence::Bare))),
+            ("Welcome to AXTC4CO", Some((Some("AXTC4CO"), None, Confidence::WithProduct))),
+            ("Hardware version 2.0.1", None),
+            ("Boot loader V1.0.0", None),
+            ("CANopen stack 4.2.0", None),
+            ("Node-ID 127", None),
+        ];
+        for (line, expected) in table {
+            let found =
+                software(&Words::of(line), &["AXTC4CO"]).map(|name| (name.product, name.version, name.confidence));
+            let expected = expected.map(|(product, version, confidence)| {
+                (product.map(String::from), version.map(|(a, b, c)| Version::new(a, b, c)), confidence)
+            });
+            assert_eq!(found, expected, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn network_variables_are_read_in_many_spellings() {
+        let table = [
+            ("Node-ID: 127 (0x7F)", Some(127), None, None),
+            ("NODE ID = 7Fh, 125 kbit/s", Some(127), Some(125), None),
+            ("CAN baudrate 250 kbps", None, Some(250), None),
+            ("Bit rate: 1 Mbit/s", None, Some(1000), None),
+            ("CAN bit rate 500000 bit/s", None, Some(500), None),
+            ("Baudrate: 125k", None, Some(125), None),
+            ("State: Pre-Operational", None, None, Some(NmtState::PreOperational)),
+            ("NMT state OPERATIONAL", None, None, Some(NmtState::Operational)),
+            ("Node 5 is PRE OPERATIONAL at 20 kbit/s", Some(5), Some(20), Some(NmtState::PreOperational)),
+        ];
+        for (line, node_id, can_kbps, nmt_state) in table {
+            let expected = Network { node_id, can_kbps, nmt_state };
+            assert_eq!(network(line, &Words::of(line)), Some(expected), "{line:?}");
+        }
+        for line in ["RS-232: 115200 baud", "Node-ID: 300", "Uptime 127 s", "operational amplifier"] {
+            assert_eq!(network(line, &Words::of(line)), None, "{line:?}");
+        }
+    }
+}
