@@ -76,6 +76,18 @@ impl Sub<Duration> for Instant {
     }
 }
 
+/// Bits on the wire for one character: a start bit, 8 data bits, a stop bit (AXTC4CO manual, appendix A).
+pub const BITS_PER_CHARACTER: u32 = 10;
+
+/// How long one character takes at `baud` bits a second.
+///
+/// # Panics
+/// If `baud` is 0.
+pub fn character_time(baud: u32) -> Duration {
+    assert!(baud > 0, "a line of 0 baud carries nothing");
+    Duration::from_nanos(u64::from(BITS_PER_CHARACTER) * 1_000_000_000 / u64::from(baud))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,18 +8,6 @@ use std::collections::VecDeque;
 use crate::endpoint::Endpoint;
 use crate::time::{Duration, Instant};
 
-/// Bits on the wire for one character: a start bit, 8 data bits, a stop bit (AXTC4CO manual, appendix A).
-pub const BITS_PER_CHARACTER: u32 = 10;
-
-/// How long one character takes at `baud` bits a second.
-///
-/// # Panics
-/// If `baud` is 0.
-pub fn character_time(baud: u32) -> Duration {
-    assert!(baud > 0, "a line of 0 baud carries nothing");
-    Duration::from_nanos(u64::from(BITS_PER_CHARACTER) * 1_000_000_000 / u64::from(baud))
-}
-
 /// One direction of the line: characters leave one after the other, each arrives when its stop bit is over and the
 /// latency has passed.
 #[derive(Clone, Debug)]
@@ -142,6 +130,7 @@ impl<U: Endpoint> Plugged<U> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::time::character_time;
 
     #[test]
     fn characters_follow_each_other_at_the_line_rate() {

@@ -16,7 +16,7 @@ impl CheckedImage {
     }
 
     /// What the image says it is.
-    pub fn identity(&self) -> &Identity {
-        &self.identity
+    pub fn identity(&self) -> Option<&Identity> {
+        Some(&self.identity)
     }
 }

@@ -2,6 +2,7 @@
 
 mod check;
 pub mod identity;
+pub mod srecord;
 
 use serde::Deserialize;
 

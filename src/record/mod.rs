@@ -54,6 +54,8 @@ pub struct Entry {
     pub at: Instant,
     /// Who sent.
     pub direction: Direction,
+    /// Whether the content was secret and has been replaced.
+    pub secrecy: Secrecy,
     /// Offset of the first byte among those of its direction.
     pub start: u64,
     /// What; secret bytes are already replaced by [`REDACTED`].
@@ -63,16 +65,21 @@ pub struct Entry {
 /// What stands in the record for a secret byte.
 pub const REDACTED: u8 = b'*';
 
-/// Bytes kept in memory at most, both directions together: hours of ordinary talk, seconds of a flood.
+/// Memory kept at most: hours of ordinary talk, seconds of a flood.
 pub const KEPT_BYTES: usize = 8 << 20;
 
 /// Bytes of one entry at most, so that the oldest can be let go in small steps.
 const ENTRY_BYTES: usize = 4096;
 
+/// What an entry costs besides its bytes, so that a device that sends single bytes fills no more memory than another.
+const ENTRY_COST: usize = size_of::<Entry>() + 16;
+
 /// The newest bytes, both directions, in order.
 #[derive(Debug, Default)]
 pub struct Record {
     entries: VecDeque<Entry>,
+    /// Entries let go since the record began: the number of the first one kept.
+    dropped: u64,
     kept: usize,
     from_unit: u64,
     to_unit: u64,
@@ -85,7 +92,7 @@ impl Record {
         Record::default()
     }
 
-    /// An empty record that keeps `limit` bytes instead of [`KEPT_BYTES`].
+    /// An empty record that keeps `limit` bytes of memory instead of [`KEPT_BYTES`].
     pub fn with_limit(limit: usize) -> Self {
         Record { limit: Some(limit), ..Record::default() }
     }
@@ -104,21 +111,15 @@ impl Record {
                 Secrecy::Open => chunk.to_vec(),
                 Secrecy::Secret => vec![REDACTED; chunk.len()],
             };
-            self.kept += kept.len();
-            match self.entries.back_mut() {
-                Some(last)
-                    if last.at == at && last.direction == direction && last.bytes.len() + kept.len() <= ENTRY_BYTES =>
-                {
-                    last.bytes.extend_from_slice(&kept);
-                }
-                _ => self.entries.push_back(Entry { at, direction, start, bytes: kept }),
-            }
+            self.kept += kept.len() + ENTRY_COST;
+            self.entries.push_back(Entry { at, direction, secrecy, start, bytes: kept });
             start += chunk.len() as u64;
         }
         let limit = self.limit.unwrap_or(KEPT_BYTES);
         while self.kept > limit && self.entries.len() > 1 {
             if let Some(oldest) = self.entries.pop_front() {
-                self.kept -= oldest.bytes.len();
+                self.kept -= oldest.bytes.len() + ENTRY_COST;
+                self.dropped += 1;
             }
         }
         span
@@ -129,9 +130,21 @@ impl Record {
         self.entries.iter()
     }
 
+    /// Entries from number `from` on, oldest first, as far as they are still in memory. The first entry ever has number
+    /// 0; a reader that has seen all remembers [`Record::entry_count`].
+    pub fn entries_from(&self, from: u64) -> impl Iterator<Item = &Entry> {
+        let skip = usize::try_from(from.saturating_sub(self.dropped)).unwrap_or(usize::MAX);
+        self.entries.range(skip.min(self.entries.len())..)
+    }
+
+    /// Number of entries ever appended.
+    pub fn entry_count(&self) -> u64 {
+        self.dropped + self.entries.len() as u64
+    }
+
     /// The bytes of a span from the unit, as far as they are still in memory.
     pub fn bytes(&self, span: Span) -> Vec<u8> {
-        let mut found = Vec::new();
+        let mut pieces: Vec<&[u8]> = Vec::new();
         // Newest first: spans that are asked for lie near the end.
         for entry in self.entries.iter().rev().filter(|entry| entry.direction == Direction::FromUnit) {
             let end = entry.start + entry.bytes.len() as u64;
@@ -141,10 +154,10 @@ impl Record {
             if entry.start < span.end {
                 let from = span.start.saturating_sub(entry.start) as usize;
                 let to = (span.end.min(end) - entry.start) as usize;
-                found.splice(0..0, entry.bytes[from..to].iter().copied());
+                pieces.push(&entry.bytes[from..to]);
             }
         }
-        found
+        pieces.into_iter().rev().flatten().copied().collect()
     }
 
     /// Bytes ever received from the unit.
@@ -177,14 +190,16 @@ mod tests {
 
     #[test]
     fn the_oldest_bytes_go_first_and_offsets_stay() {
-        let mut record = Record::with_limit(ENTRY_BYTES);
+        let mut record = Record::with_limit(4096);
         for round in 0..10 {
             record.push(Instant::from_millis(round), Direction::FromUnit, Secrecy::Open, &[round as u8; 1000]);
         }
-        assert_eq!(record.received(), 10_000);
+        assert_eq!((record.received(), record.entry_count()), (10_000, 10));
         assert_eq!(record.bytes(Span { start: 8_999, end: 9_001 }), [8, 9]);
         assert_eq!(record.bytes(Span { start: 0, end: 10 }), b"");
-        assert!(record.entries().map(|entry| entry.bytes.len()).sum::<usize>() <= ENTRY_BYTES);
+        assert_eq!(record.entries_from(8).map(|entry| entry.bytes[0]).collect::<Vec<_>>(), [8, 9]);
+        assert!(record.entries_from(0).count() < 10, "the oldest are gone");
+        assert_eq!(record.entries_from(10).count(), 0);
     }
 
     #[test]

@@ -71,6 +71,9 @@ pub enum Refusal {
     /// The password is empty or holds a control character, which would end it early.
     #[error("the password is empty or holds a control character")]
     Password,
+    /// The unit holds us by XOFF, and too much waits already.
+    #[error("the unit does not take what has been typed so far (held by XOFF)")]
+    Held,
 }
 
 /// News.
@@ -111,6 +114,11 @@ pub enum Outcome {
     Identified,
     /// The job has done what it should.
     Done(Job),
+    /// The stream runs as asked; rows have come.
+    StreamRuns {
+        /// Whether it was on before, with whatever settings.
+        was_on: bool,
+    },
     /// The unit did not answer in time, or not in a way we understand.
     NoAnswer {
         /// Which job.
@@ -152,8 +160,6 @@ pub struct Facts {
     pub nmt_state: Option<Known<String>>,
     /// Whether the stream runs, and with what.
     pub stream: Option<Source>,
-    /// Whether the diagnostics page is being repeated.
-    pub diagnostics: bool,
     /// Lines that no recogniser understood.
     pub unrecognised_lines: u64,
 }

@@ -1,37 +1,136 @@
-//! Our end of the cable.
+//! Our end of the cable: commands in, bytes and events out.
+//!
+//! A session appends every byte to the record first, then makes lines of them, recognises what it can, folds that into
+//! [`Facts`], and drives at most one job: a dialogue with the unit that ends in an [`Outcome`]. It knows the unit only
+//! through bytes. Whatever a job does, the lines and rows go out as events as well.
 
+mod console;
 mod event;
+mod identify;
+mod job;
+mod transfer;
+mod transmitter;
+mod upload;
 
 pub use event::*;
 
-use crate::endpoint::{Endpoint, Transmit};
-use crate::record::Record;
-use crate::time::Instant;
+use std::collections::VecDeque;
+
+use crate::device::Product;
+use crate::endpoint::{Endpoint, Secrecy, Transmit};
+use crate::record::{Direction, Record, Span};
+use crate::time::character_time;
+use crate::time::{Duration, Instant};
+use crate::wire::{Framer, Item, LoaderText, Message, NmtState, Prompt, Text, Vocabulary};
+use job::{Desk, Signal, Work};
+use transmitter::Transmitter;
+
+/// Silence behind a text without a line end that makes a prompt of it: several character times, and more than an
+/// adapter's latency of 16 ms.
+const PROMPT_QUIET: Duration = Duration::from_millis(60);
 
 /// A conversation with one unit.
-#[derive(Debug, Default)]
 pub struct Session {
+    now: Instant,
     record: Record,
+    framer: Framer,
+    vocabulary: Vocabulary<'static>,
+    transmitter: Transmitter,
     facts: Facts,
+    running: Option<Running>,
+    events: VecDeque<Event>,
+    prompt: PromptWatch,
+    /// The unit asks for the password, or its answer may echo it: bytes both ways are secret until the line ends.
+    password_open: bool,
+}
+
+/// The job that runs, and which it is.
+struct Running {
+    job: Job,
+    work: Box<dyn Work + Send>,
+}
+
+/// Watches for text without a line end behind which the unit falls silent.
+#[derive(Debug, Default)]
+struct PromptWatch {
+    /// When the text counts as a prompt.
+    due: Option<Instant>,
+    /// End of the text that has been looked at already.
+    seen: u64,
 }
 
 impl Session {
     /// A conversation about to begin on a line of this many baud.
-    pub fn new(_baud: u32) -> Self {
-        Session::default()
+    ///
+    /// # Panics
+    /// If `baud` is 0.
+    pub fn new(baud: u32) -> Self {
+        let products = Product::all();
+        Session {
+            now: Instant::ZERO,
+            record: Record::new(),
+            framer: Framer::default(),
+            vocabulary: Vocabulary {
+                products: products.iter().map(|product| product.name.as_str()).collect(),
+                layouts: products.iter().map(|product| &product.stream).collect(),
+            },
+            transmitter: Transmitter::new(character_time(baud)),
+            facts: Facts::default(),
+            running: None,
+            events: VecDeque::new(),
+            prompt: PromptWatch::default(),
+            password_open: false,
+        }
     }
 
     /// Takes a command, or says why not.
     ///
     /// # Errors
     /// If another job runs or the command makes no sense; nothing has been sent then.
-    pub fn command(&mut self, _now: Instant, _command: Command) -> Result<(), Refusal> {
+    pub fn command(&mut self, now: Instant, command: Command) -> Result<(), Refusal> {
+        self.now = self.now.max(now);
+        let (job, work): (Job, Box<dyn Work + Send>) = match command {
+            Command::Cancel => {
+                self.signal(Signal::Cancel);
+                return Ok(());
+            }
+            Command::Keys(keys) => return self.keys(&keys),
+            Command::Identify => (Job::Identify, Box::new(identify::Identify::default())),
+            Command::StreamOn { source, period } => {
+                if !(Duration::from_millis(1)..=Duration::from_secs(60)).contains(&period) {
+                    return Err(Refusal::Period(period));
+                }
+                (Job::StreamOn, Box::new(console::StreamOn::new(source, period)))
+            }
+            Command::StreamOff => (Job::StreamOff, Box::new(console::StreamOff::default())),
+            Command::RestoreDefaults => (Job::RestoreDefaults, Box::new(console::RestoreDefaults::default())),
+            Command::Load(order) => {
+                let password = order.password.reveal();
+                if password.is_empty() || password.iter().any(u8::is_ascii_control) {
+                    return Err(Refusal::Password);
+                }
+                (Job::Load, Box::new(upload::Upload::new(*order)))
+            }
+        };
+        if let Some(running) = &self.running {
+            return Err(Refusal::Busy(running.job));
+        }
+        self.running = Some(Running { job, work });
+        self.signal(Signal::Begin);
         Ok(())
+    }
+
+    /// The port is gone: the running job ends with what that means, and nothing more is sent.
+    pub fn link_lost(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        self.transmitter.clear();
+        self.signal(Signal::LinkLost);
+        self.transmitter.clear();
     }
 
     /// The next piece of news.
     pub fn poll_event(&mut self) -> Option<Event> {
-        None
+        self.events.pop_front()
     }
 
     /// What is known of the unit.
@@ -41,22 +140,212 @@ impl Session {
 
     /// The job that runs.
     pub fn job(&self) -> Option<Job> {
-        None
+        self.running.as_ref().map(|running| running.job)
     }
 
     /// Every byte, both directions.
     pub fn record(&self) -> &Record {
         &self.record
     }
+
+    /// Since when the unit holds us by XOFF.
+    pub fn held_since(&self) -> Option<Instant> {
+        self.transmitter.held_since()
+    }
+
+    /// Whether the unit is asking for the password: what is typed now is secret.
+    pub fn password_open(&self) -> bool {
+        self.password_open
+    }
+
+    fn keys(&mut self, keys: &[u8]) -> Result<(), Refusal> {
+        if let Some(running) = &self.running {
+            return Err(Refusal::Busy(running.job));
+        }
+        // The Enter behind a password is no secret, and neither is what follows it.
+        let secret =
+            if self.password_open { keys.iter().position(|&key| key == b'\r').unwrap_or(keys.len()) } else { 0 };
+        let (hidden, open) = keys.split_at(secret);
+        let taken =
+            self.transmitter.push_text(hidden, Secrecy::Secret) && self.transmitter.push_text(open, Secrecy::Open);
+        if taken { Ok(()) } else { Err(Refusal::Held) }
+    }
+
+    /// Appends to the record; what may echo the password is secret up to the next line end.
+    fn append(&mut self, bytes: &[u8]) {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let (part, secrecy) = if self.password_open {
+                let end = rest.iter().position(|&byte| byte == b'\r' || byte == b'\n');
+                (&rest[..end.unwrap_or(rest.len())], Secrecy::Secret)
+            } else {
+                (rest, Secrecy::Open)
+            };
+            if part.is_empty() {
+                self.password_open = false;
+                continue;
+            }
+            self.record.push(self.now, Direction::FromUnit, secrecy, part);
+            rest = &rest[part.len()..];
+            self.frame(part);
+        }
+    }
+
+    fn frame(&mut self, bytes: &[u8]) {
+        let mut items = Vec::new();
+        self.framer.push(bytes, |item| items.push(item));
+        for item in items {
+            match item {
+                Item::Line(text) => {
+                    let message = self.vocabulary.line(&text.text);
+                    self.heard(text, message);
+                }
+                Item::Hold(held) => {
+                    self.transmitter.hold(self.now, held);
+                    self.events.push_back(Event::Held(held));
+                    self.signal(Signal::Hold(held));
+                }
+            }
+        }
+        let pending = self.framer.pending();
+        let asks_password = pending.as_ref().is_some_and(|text| {
+            text.span.end > self.prompt.seen && self.vocabulary.prompt(&text.text) == Some(Prompt::Password)
+        });
+        self.password_open |= asks_password;
+        self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);
+    }
+
+    /// Looks at a text without a line end behind which the unit has fallen silent.
+    fn look_at_prompt(&mut self) {
+        self.prompt.due = None;
+        let Some(text) = self.framer.pending() else { return };
+        self.prompt.seen = text.span.end;
+        let message = match self.vocabulary.prompt(&text.text) {
+            Some(prompt) => Message::Prompt(prompt),
+            None => self.vocabulary.line(&text.text),
+        };
+        if message != Message::Text {
+            self.heard(text, message);
+        }
+    }
+
+    fn heard(&mut self, text: Text, message: Message) {
+        self.learn(text.span, &message);
+        self.events.push_back(match &message {
+            Message::Row(row) => Event::Row { at: self.now, span: text.span, row: row.clone() },
+            _ => Event::Heard { at: self.now, span: text.span, message: message.clone() },
+        });
+        self.signal(Signal::Heard(&text, &message));
+    }
+
+    /// Folds a message into the facts.
+    fn learn(&mut self, span: Span, message: &Message) {
+        let before = self.facts.clone();
+        let asked = self.job() == Some(Job::Identify);
+        let origin = if asked { Origin::Menu } else { Origin::Banner };
+        let facts = &mut self.facts;
+        match message {
+            Message::Text => facts.unrecognised_lines += 1,
+            Message::Refusal | Message::Prompt(_) => {}
+            Message::Row(row) => {
+                facts.state = UnitState::Application;
+                facts.stream = Some(row.source);
+            }
+            Message::MenuKey(_) | Message::FirstStart => facts.state = UnitState::Application,
+            Message::Loader(text) => {
+                if matches!(text, LoaderText::Waiting | LoaderText::AnyKey | LoaderText::Restarting) {
+                    facts.enter_loader();
+                }
+            }
+            Message::Software(name) => {
+                facts.state = UnitState::Application;
+                if let Some(product) = &name.product {
+                    facts.product = Some(Known { value: product.clone(), origin, span });
+                }
+                if let Some(version) = name.version {
+                    facts.version = Some(Known { value: version, origin, span });
+                }
+            }
+            Message::Network(network) => {
+                facts.state = UnitState::Application;
+                if let Some(value) = network.node_id {
+                    facts.node_id = Some(Known { value, origin, span });
+                }
+                if let Some(value) = network.can_kbps {
+                    facts.can_kbps = Some(Known { value, origin, span });
+                }
+                if let Some(state) = network.nmt_state {
+                    facts.nmt_state = Some(Known { value: NmtState::name(state).to_owned(), origin, span });
+                }
+            }
+        }
+        if matches!(message, Message::Prompt(Prompt::WaitingForFile)) {
+            facts.enter_loader();
+        }
+        if *facts != before {
+            self.events.push_back(Event::FactsChanged);
+        }
+    }
+
+    /// Tells the running job something, and ends it if it says so.
+    fn signal(&mut self, signal: Signal<'_>) {
+        let Some(mut running) = self.running.take() else { return };
+        let before = self.facts.clone();
+        let pending = self.framer.pending();
+        let outcome = running.work.handle(
+            signal,
+            &mut Desk {
+                now: self.now,
+                transmitter: &mut self.transmitter,
+                facts: &mut self.facts,
+                events: &mut self.events,
+                pending: pending.as_ref(),
+                received: self.record.received(),
+                echo_is_secret: &mut self.password_open,
+            },
+        );
+        if self.facts != before {
+            self.events.push_back(Event::FactsChanged);
+        }
+        match outcome {
+            Some(outcome) => self.events.push_back(Event::Finished(outcome)),
+            None => self.running = Some(running),
+        }
+    }
+}
+
+impl Facts {
+    /// The loader talks: what the application said of itself is history. The product stays what it is.
+    fn enter_loader(&mut self) {
+        let product = self.product.take();
+        let unrecognised_lines = self.unrecognised_lines;
+        *self = Facts { state: UnitState::Loader, product, unrecognised_lines, ..Facts::default() };
+    }
 }
 
 impl Endpoint for Session {
-    fn handle_bytes(&mut self, _now: Instant, _bytes: &[u8]) {}
-    fn handle_timeout(&mut self, _now: Instant) {}
-    fn poll_transmit(&mut self) -> Option<Transmit> {
-        None
+    fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        self.now = self.now.max(now);
+        self.append(bytes);
+        self.signal(Signal::Tick);
     }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        if self.prompt.due.is_some_and(|due| due <= self.now) {
+            self.look_at_prompt();
+        }
+        self.signal(Signal::Tick);
+    }
+
+    fn poll_transmit(&mut self) -> Option<Transmit> {
+        let transmit = self.transmitter.poll(self.now)?;
+        self.record.push(self.now, Direction::ToUnit, transmit.secrecy, &transmit.bytes);
+        Some(transmit)
+    }
+
     fn poll_timeout(&self) -> Option<Instant> {
-        None
+        let job = self.running.as_ref().and_then(|running| running.work.deadline());
+        [self.prompt.due, self.transmitter.poll_timeout(), job].into_iter().flatten().min()
     }
 }

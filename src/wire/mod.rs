@@ -13,7 +13,7 @@ mod words;
 
 pub use boot::LoaderText;
 pub use framer::{Framer, Item, LONGEST_LINE, Text, XOFF, XON};
-pub use menu::{MenuKey, Network, NmtState, SoftwareName};
+pub use menu::{Confidence, MenuKey, Network, NmtState, SoftwareName};
 pub use prompt::{Prompt, SourceKeys};
 
 use stream::{Layout, Row};
@@ -35,6 +35,8 @@ pub enum Message {
     Software(SoftwareName),
     /// One or more of the CANopen network variables.
     Network(Network),
+    /// A question, recognised once the unit has fallen silent behind it.
+    Prompt(Prompt),
     /// The unit refuses what was typed: wrong password, invalid entry, not in this state.
     Refusal,
 }

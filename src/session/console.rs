@@ -1,0 +1,256 @@
+//! Talks with the firmware: switching the stream (T) and restoring the defaults (D).
+//!
+//! Questions are answered by what they offer. Where a question is not understood the job leaves the dialogue, with
+//! Enter and no answer, and says what it was waiting for; it never guesses.
+
+use super::event::{Job, Outcome};
+use super::job::{Desk, Signal, Work};
+use crate::record::Span;
+use crate::time::{Duration, Instant};
+use crate::wire::stream::Source;
+use crate::wire::{Message, Prompt, SourceKeys};
+
+/// How long a unit may take to ask or to answer.
+const ANSWER: Duration = Duration::from_millis(1500);
+/// How long a single key may go without a reaction before Enter is sent behind it.
+const KEY_ALONE: Duration = Duration::from_millis(400);
+/// How long after T a line without a question means "switched off".
+const NO_QUESTION: Duration = Duration::from_millis(400);
+/// No values come for 3 s after power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO): rows may take that long.
+const FIRST_VALUES: Duration = Duration::from_secs(6);
+/// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
+const RESET: Duration = Duration::from_secs(10);
+
+/// Switches the stream on.
+#[derive(Debug)]
+pub(super) struct StreamOn {
+    source: Source,
+    period: Duration,
+    was_on: bool,
+    stage: OnStage,
+    deadline: Option<Instant>,
+    heard: Option<Span>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum OnStage {
+    /// T is out: a question says that the stream was off, its absence that it was on and is off now.
+    Toggled,
+    /// The key for the source is out.
+    Source { enter_sent: bool },
+    /// The period is out.
+    Period,
+}
+
+impl StreamOn {
+    pub(super) fn new(source: Source, period: Duration) -> Self {
+        StreamOn { source, period, was_on: false, stage: OnStage::Toggled, deadline: None, heard: None }
+    }
+
+    fn toggle(&mut self, desk: &mut Desk<'_>) {
+        desk.send(b"t");
+        self.stage = OnStage::Toggled;
+        self.deadline = Some(desk.now + ANSWER);
+    }
+
+    fn heard(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match (self.stage, message) {
+            (OnStage::Toggled, Message::Prompt(Prompt::Source(keys))) => {
+                desk.send(key_for(self.source, *keys).encode_utf8(&mut [0; 4]).as_bytes());
+                self.stage = OnStage::Source { enter_sent: false };
+                self.deadline = Some(desk.now + KEY_ALONE);
+            }
+            (OnStage::Source { .. } | OnStage::Toggled, Message::Prompt(Prompt::Period)) => {
+                desk.send(format!("{}\r", self.period.as_millis()).as_bytes());
+                self.stage = OnStage::Period;
+                self.deadline = Some(desk.now + FIRST_VALUES + self.period * 2);
+            }
+            (OnStage::Toggled, Message::Prompt(_)) => return Some(self.give_up(desk)),
+            (OnStage::Toggled, Message::Row(_)) => {}
+            (OnStage::Toggled, _) => {
+                let soon = desk.now + NO_QUESTION;
+                self.deadline = self.deadline.map(|deadline| deadline.min(soon));
+            }
+            (OnStage::Period, Message::Row(row)) if row.source == self.source => {
+                return Some(Outcome::StreamRuns { was_on: self.was_on });
+            }
+            (OnStage::Period, Message::Refusal) => {
+                let reason = "the unit did not take the repetition time".into();
+                return Some(Outcome::Refused { job: Job::StreamOn, reason, heard: self.heard });
+            }
+            _ => {}
+        }
+        None
+    }
+
+    fn tick(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match self.stage {
+            OnStage::Toggled if desk.pending.is_none() && !self.was_on => {
+                self.was_on = true;
+                self.toggle(desk);
+                None
+            }
+            OnStage::Source { enter_sent: false } => {
+                desk.send(b"\r");
+                self.stage = OnStage::Source { enter_sent: true };
+                self.deadline = Some(desk.now + ANSWER);
+                None
+            }
+            OnStage::Toggled | OnStage::Source { enter_sent: true } | OnStage::Period => Some(self.give_up(desk)),
+        }
+    }
+
+    fn give_up(&mut self, desk: &mut Desk<'_>) -> Outcome {
+        let awaited = match self.stage {
+            OnStage::Toggled => "the question for the stream's source",
+            OnStage::Source { .. } => "the question for the repetition time",
+            OnStage::Period => "a row of the stream",
+        };
+        if self.stage != OnStage::Period {
+            desk.leave_dialogue();
+        }
+        let heard = desk.pending.map(|text| text.span).or(self.heard);
+        Outcome::NoAnswer { job: Job::StreamOn, awaited, heard }
+    }
+}
+
+impl Work for StreamOn {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Begin => {
+                self.toggle(desk);
+                None
+            }
+            Signal::Heard(text, message) => {
+                self.heard = Some(text.span);
+                self.heard(message, desk)
+            }
+            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
+            Signal::Tick | Signal::Hold(_) => None,
+            Signal::Cancel => {
+                if self.stage != OnStage::Period {
+                    desk.leave_dialogue();
+                }
+                Some(Outcome::Cancelled(Job::StreamOn))
+            }
+            Signal::LinkLost => Some(Outcome::Cancelled(Job::StreamOn)),
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.deadline
+    }
+}
+
+/// Switches the stream off.
+#[derive(Debug, Default)]
+pub(super) struct StreamOff {
+    deadline: Option<Instant>,
+}
+
+impl Work for StreamOff {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Begin => {
+                desk.send(b"t");
+                self.deadline = Some(desk.now + ANSWER);
+                None
+            }
+            // A question: it was off already, and shall stay so.
+            Signal::Heard(_, Message::Prompt(_)) => {
+                desk.leave_dialogue();
+                desk.facts.stream = None;
+                Some(Outcome::Done(Job::StreamOff))
+            }
+            Signal::Heard(_, Message::Row(_)) => None,
+            Signal::Heard(..) => {
+                let soon = desk.now + NO_QUESTION;
+                self.deadline = self.deadline.map(|deadline| deadline.min(soon));
+                None
+            }
+            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => match desk.pending {
+                Some(text) => {
+                    desk.leave_dialogue();
+                    let awaited = "that the stream is off";
+                    Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: Some(text.span) })
+                }
+                None => {
+                    desk.facts.stream = None;
+                    Some(Outcome::Done(Job::StreamOff))
+                }
+            },
+            Signal::Tick | Signal::Hold(_) => None,
+            Signal::Cancel => {
+                desk.leave_dialogue();
+                Some(Outcome::Cancelled(Job::StreamOff))
+            }
+            Signal::LinkLost => Some(Outcome::Cancelled(Job::StreamOff)),
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.deadline
+    }
+}
+
+/// Restores the default object dictionary and waits for the unit to come back.
+#[derive(Debug, Default)]
+pub(super) struct RestoreDefaults {
+    confirmed: bool,
+    deadline: Option<Instant>,
+    heard: Option<Span>,
+}
+
+impl Work for RestoreDefaults {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Begin => {
+                desk.send(b"d");
+                self.deadline = Some(desk.now + ANSWER);
+                None
+            }
+            Signal::Heard(text, message) => {
+                self.heard = Some(text.span);
+                match message {
+                    Message::Prompt(Prompt::ConfirmDefaults) if !self.confirmed => {
+                        desk.send(b"Yes\r");
+                        self.confirmed = true;
+                        self.deadline = Some(desk.now + RESET);
+                        None
+                    }
+                    // Only the banner shows that the unit has reset itself.
+                    Message::Software(name) if self.confirmed && name.product.is_some() => {
+                        Some(Outcome::Done(Job::RestoreDefaults))
+                    }
+                    _ => None,
+                }
+            }
+            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => {
+                if !self.confirmed {
+                    desk.leave_dialogue();
+                }
+                let awaited = if self.confirmed { "the banner after the reset" } else { "the question for Yes" };
+                Some(Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard: self.heard })
+            }
+            Signal::Tick | Signal::Hold(_) => None,
+            Signal::Cancel => {
+                if !self.confirmed {
+                    desk.leave_dialogue();
+                }
+                Some(Outcome::Cancelled(Job::RestoreDefaults))
+            }
+            Signal::LinkLost => Some(Outcome::Cancelled(Job::RestoreDefaults)),
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.deadline
+    }
+}
+
+fn key_for(source: Source, keys: SourceKeys) -> char {
+    match source {
+        Source::FieldValue => keys.field_value,
+        Source::ProcessValue => keys.process_value,
+    }
+}

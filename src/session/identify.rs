@@ -1,0 +1,113 @@
+//! Finding out what is at the other end.
+//!
+//! The question is `m`, which a unit may be asked at any time (AXTC4CO manual, section 4.1). It may stand in a dialogue
+//! that swallows the key, so the question is repeated in other words: Enter leaves every prompt, `x` the view of the
+//! object dictionary (section 4.1.1). A loader that waits for a file calls the key an error, and so shows itself.
+
+use super::event::{Outcome, UnitState};
+use super::job::{Desk, Signal, Work};
+use crate::time::{Duration, Instant};
+use crate::wire::{LoaderText, MenuKey, Message, Prompt, XON};
+
+/// How long a unit may take to begin its answer: the menu comes at once, an adapter adds some 20 ms.
+const ANSWER: Duration = Duration::from_millis(800);
+/// Silence behind an answer that ends it.
+const QUIET: Duration = Duration::from_millis(150);
+/// How long an answer may go on: the stream may run on behind the menu.
+const LONGEST_ANSWER: Duration = Duration::from_millis(1500);
+/// Entries that make a menu of lines that look like entries.
+const MENU_ENTRIES: u32 = 3;
+
+/// The ways to ask. Xon first: if an earlier program left the unit stopped, it could not answer.
+const QUESTIONS: [&[u8]; 3] = [&[XON, b'm'], b"\rm", b"xm"];
+
+/// The job.
+#[derive(Debug, Default)]
+pub(super) struct Identify {
+    asked: usize,
+    asked_at: Instant,
+    deadline: Option<Instant>,
+    menu: u8,
+    software: bool,
+    loader: bool,
+    /// Anything came at all.
+    alive: bool,
+}
+
+impl Identify {
+    fn ask(&mut self, desk: &mut Desk<'_>) {
+        desk.send(QUESTIONS[self.asked]);
+        self.asked += 1;
+        self.asked_at = desk.now;
+        self.deadline = Some(desk.now + ANSWER);
+    }
+
+    fn note(&mut self, message: &Message) {
+        match message {
+            Message::MenuKey(key) => self.menu |= 1 << key_number(*key),
+            Message::Software(_) => self.software = true,
+            Message::Loader(
+                LoaderText::Waiting | LoaderText::Error(_) | LoaderText::Restarting | LoaderText::AnyKey,
+            )
+            | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => self.loader = true,
+            _ => {}
+        }
+        self.alive = true;
+    }
+
+    fn is_answered(&self) -> bool {
+        self.loader || self.menu.count_ones() >= MENU_ENTRIES || (self.software && self.menu > 0)
+    }
+
+    fn conclude(&self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if !self.is_answered() && desk.facts.state != UnitState::Application {
+            let alive = self.alive || desk.pending.is_some();
+            desk.facts.state = if alive { UnitState::Unknown } else { UnitState::Silent };
+        }
+        Some(Outcome::Identified)
+    }
+}
+
+impl Work for Identify {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Begin => {
+                desk.facts.state = UnitState::Silent;
+                self.ask(desk);
+                None
+            }
+            Signal::Heard(_, message) => {
+                self.note(message);
+                if self.is_answered() && !matches!(message, Message::Row(_)) {
+                    self.deadline = Some((desk.now + QUIET).min(self.asked_at + LONGEST_ANSWER));
+                }
+                None
+            }
+            Signal::Hold(_) => None,
+            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => {
+                if self.is_answered() || self.asked == QUESTIONS.len() {
+                    return self.conclude(desk);
+                }
+                self.ask(desk);
+                None
+            }
+            Signal::Tick => None,
+            Signal::Cancel | Signal::LinkLost => self.conclude(desk),
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.deadline
+    }
+}
+
+fn key_number(key: MenuKey) -> u32 {
+    match key {
+        MenuKey::Menu => 0,
+        MenuKey::View => 1,
+        MenuKey::Default => 2,
+        MenuKey::Stream => 3,
+        MenuKey::Diagnostics => 4,
+        MenuKey::Load => 5,
+    }
+}

@@ -1,0 +1,69 @@
+//! What the jobs have in common: what they are told, and what they can do.
+
+use std::collections::VecDeque;
+
+use super::event::{Event, Facts, Outcome};
+use super::transmitter::Transmitter;
+use crate::endpoint::{Secrecy, Transmit};
+use crate::time::Instant;
+use crate::wire::{Message, Text};
+
+/// What a job is told.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Signal<'a> {
+    /// It begins.
+    Begin,
+    /// The unit has printed something; the facts are up to date already.
+    Heard(&'a Text, &'a Message),
+    /// The unit has stopped us (`true`) or lets us go on; the transmitter knows already.
+    Hold(bool),
+    /// Its deadline has come, or it is looked after early.
+    Tick,
+    /// The user has had enough.
+    Cancel,
+    /// The port is gone: nothing can be sent or heard any more.
+    LinkLost,
+}
+
+/// What a job can do.
+pub(super) struct Desk<'a> {
+    pub(super) now: Instant,
+    pub(super) transmitter: &'a mut Transmitter,
+    pub(super) facts: &'a mut Facts,
+    pub(super) events: &'a mut VecDeque<Event>,
+    /// Text without a line end, the last thing the unit has printed.
+    pub(super) pending: Option<&'a Text>,
+    /// Bytes received so far: text that begins here or later is newer than this moment.
+    pub(super) received: u64,
+    /// Set when secret bytes have been queued: what comes back until the next line end may echo them.
+    pub(super) echo_is_secret: &'a mut bool,
+}
+
+impl Desk<'_> {
+    /// Sends keys.
+    pub(super) fn send(&mut self, keys: &[u8]) {
+        // Only a unit that holds us lets this queue fill, and jobs send a few bytes between two deadlines.
+        self.transmitter.push_text(keys, Secrecy::Open);
+    }
+
+    /// Sends a secret and the Enter behind it.
+    pub(super) fn send_secret(&mut self, secret: &[u8]) {
+        self.transmitter.push_piece(Transmit { bytes: secret.to_vec(), secrecy: Secrecy::Secret });
+        self.transmitter.push_piece(Transmit::open(*b"\r"));
+        *self.echo_is_secret = true;
+    }
+
+    /// Leaves whatever question is open: Enter without an answer.
+    pub(super) fn leave_dialogue(&mut self) {
+        self.send(b"\r");
+    }
+}
+
+/// A job.
+pub(super) trait Work {
+    /// Takes a signal; gives the outcome when it is over.
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome>;
+
+    /// When it wants to be looked after.
+    fn deadline(&self) -> Option<Instant>;
+}

@@ -1,0 +1,156 @@
+//! What leaves for the unit, and when: our half of Xon/Xoff, and what is still on its way.
+//!
+//! The operating system cannot be asked what it has sent (a pseudo-terminal says "all of it" while it is stopped, a
+//! USB adapter keeps some hundred bytes), so the line is reckoned here: pieces are let go one at a time, each when the
+//! one before must have left. Whatever happens, no more than one piece is out of our hands and not yet on the wire.
+
+use std::collections::VecDeque;
+
+use crate::endpoint::{Secrecy, Transmit};
+use crate::time::{Duration, Instant};
+
+/// How long before the line runs dry the next piece is let go: several times what a wake-up is late.
+const LEAD: Duration = Duration::from_millis(2);
+
+/// Bytes of typed text in one piece: 5.6 ms at 115,200 baud.
+const PIECE: usize = 64;
+
+/// Bytes that may wait while the unit holds us.
+const LIMIT: usize = 64 << 10;
+
+/// The way out.
+#[derive(Debug)]
+pub(super) struct Transmitter {
+    waiting: VecDeque<Transmit>,
+    waiting_bytes: usize,
+    held_since: Option<Instant>,
+    character_time: Duration,
+    /// When everything let go so far must have left the line.
+    free_at: Instant,
+}
+
+impl Transmitter {
+    /// A line on which one character takes `character_time`.
+    pub(super) fn new(character_time: Duration) -> Self {
+        Transmitter {
+            waiting: VecDeque::new(),
+            waiting_bytes: 0,
+            held_since: None,
+            character_time,
+            free_at: Instant::ZERO,
+        }
+    }
+
+    /// Queues typed text. Gives `false`, and takes nothing, if too much waits already.
+    pub(super) fn push_text(&mut self, bytes: &[u8], secrecy: Secrecy) -> bool {
+        if self.waiting_bytes + bytes.len() > LIMIT {
+            return false;
+        }
+        for piece in bytes.chunks(PIECE) {
+            self.push_piece(Transmit { bytes: piece.to_vec(), secrecy });
+        }
+        true
+    }
+
+    /// Queues one piece that is let go whole.
+    pub(super) fn push_piece(&mut self, piece: Transmit) {
+        self.waiting_bytes += piece.bytes.len();
+        self.waiting.push_back(piece);
+    }
+
+    /// The unit has sent XOFF (`true`) or XON.
+    pub(super) fn hold(&mut self, now: Instant, held: bool) {
+        self.held_since = match (held, self.held_since) {
+            (true, None) => Some(now),
+            (true, since) => since,
+            (false, _) => None,
+        };
+    }
+
+    /// The next piece, if it may go now.
+    pub(super) fn poll(&mut self, now: Instant) -> Option<Transmit> {
+        if self.held_since.is_some() || self.ready_at() > now {
+            return None;
+        }
+        let piece = self.waiting.pop_front()?;
+        self.waiting_bytes -= piece.bytes.len();
+        self.free_at = self.free_at.max(now) + self.time_for(piece.bytes.len());
+        Some(piece)
+    }
+
+    /// When [`poll`](Transmitter::poll) has something, should nothing change until then.
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        (self.held_since.is_none() && !self.waiting.is_empty()).then(|| self.ready_at())
+    }
+
+    /// When another piece may be let go.
+    pub(super) fn ready_at(&self) -> Instant {
+        self.free_at - LEAD
+    }
+
+    /// When everything let go so far must have left the line.
+    pub(super) fn free_at(&self) -> Instant {
+        self.free_at
+    }
+
+    /// How long this many characters take.
+    pub(super) fn time_for(&self, characters: usize) -> Duration {
+        self.character_time * characters as u32
+    }
+
+    /// Whether nothing waits.
+    pub(super) fn is_empty(&self) -> bool {
+        self.waiting.is_empty()
+    }
+
+    /// Since when the unit holds us.
+    pub(super) fn held_since(&self) -> Option<Instant> {
+        self.held_since
+    }
+
+    /// Forgets what has not been let go.
+    pub(super) fn clear(&mut self) {
+        self.waiting.clear();
+        self.waiting_bytes = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line() -> Transmitter {
+        Transmitter::new(Duration::from_millis(1))
+    }
+
+    #[test]
+    fn pieces_go_when_the_one_before_has_all_but_left() {
+        let mut line = line();
+        line.push_piece(Transmit::open(*b"0123456789"));
+        line.push_piece(Transmit::open(*b"next"));
+        assert!(line.poll(Instant::ZERO).is_some());
+        assert_eq!(line.poll(Instant::from_millis(7)), None);
+        assert_eq!(line.poll_timeout(), Some(Instant::from_millis(8)));
+        assert!(line.poll(Instant::from_millis(8)).is_some());
+        assert_eq!(line.free_at(), Instant::from_millis(14));
+    }
+
+    #[test]
+    fn nothing_goes_while_the_unit_holds_us() {
+        let mut line = line();
+        line.push_text(b"m", Secrecy::Open);
+        line.hold(Instant::from_millis(3), true);
+        line.hold(Instant::from_millis(5), true);
+        assert_eq!((line.poll(Instant::from_millis(9)), line.poll_timeout()), (None, None));
+        assert_eq!(line.held_since(), Some(Instant::from_millis(3)));
+        line.hold(Instant::from_millis(9), false);
+        assert!(line.poll(Instant::from_millis(9)).is_some());
+    }
+
+    #[test]
+    fn a_queue_that_nobody_empties_has_a_limit() {
+        let mut line = line();
+        assert!(line.push_text(&[b'x'; LIMIT], Secrecy::Open));
+        assert!(!line.push_text(b"y", Secrecy::Open));
+    }
+}
