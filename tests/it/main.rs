@@ -1,1 +1,6 @@
 //! Everything that needs more than one module, in one binary.
+
+mod support;
+mod talks;
+mod tidy;
+mod uploads;

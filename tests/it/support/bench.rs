@@ -1,0 +1,202 @@
+//! Two ends, one cable, virtual time: a console session and an emulated unit without threads, clocks or ports.
+//!
+//! Every byte travels at the moment it would travel on a real line at 115,200 baud, plus the latency of an adapter.
+//! A middleman sits on the way to the unit and may change, lose or double a byte.
+
+use std::collections::VecDeque;
+
+use axcon::device::{LoaderKind, Product};
+use axcon::emulator::cable::{Line, Plugged};
+use axcon::emulator::{Setup, Unit};
+use axcon::endpoint::Endpoint;
+use axcon::image::{CheckedImage, make};
+use axcon::secret::Secret;
+use axcon::session::{Command, Event, LoadOrder, LoadReport, Outcome, Session};
+use axcon::time::{Duration, Instant, character_time};
+use axcon::version::Version;
+
+/// The rate of the units (AXTC4CO manual, appendix A).
+pub const BAUD: u32 = 115_200;
+
+/// What may happen to a byte on its way to the unit, given its number since the cable was plugged in.
+pub type Middleman = Box<dyn FnMut(u64, u8) -> Vec<u8>>;
+
+/// The two ends.
+pub struct Bench {
+    pub now: Instant,
+    pub session: Session,
+    pub unit: Plugged<Unit>,
+    to_session: Line,
+    middleman: Option<Middleman>,
+    sent: u64,
+    /// Everything that has left for the unit, in order.
+    pub wire: Vec<u8>,
+    pub events: VecDeque<Event>,
+}
+
+impl Bench {
+    /// A unit with V1.1.0 in flash, just powered on, and a console on a cable without latency.
+    pub fn new() -> Self {
+        Bench::with(factory_flash("1.1.0"), Duration::ZERO)
+    }
+
+    /// A unit with this flash, just powered on, behind an adapter of this latency.
+    pub fn with(flash: Vec<u8>, latency: Duration) -> Self {
+        let product = axtc4co();
+        let setup = Setup { product, loader: LoaderKind::G1, seed: 1, flash, parameters: Vec::new() };
+        let mut unit = Unit::new(setup);
+        unit.power_on(Instant::ZERO);
+        Bench {
+            now: Instant::ZERO,
+            session: Session::new(BAUD),
+            unit: Plugged::new(unit, Line::new(character_time(BAUD), latency)),
+            to_session: Line::new(Duration::ZERO, latency),
+            middleman: None,
+            sent: 0,
+            wire: Vec::new(),
+            events: VecDeque::new(),
+        }
+    }
+
+    /// Puts somebody on the way to the unit.
+    pub fn disturb(&mut self, middleman: impl FnMut(u64, u8) -> Vec<u8> + 'static) {
+        self.middleman = Some(Box::new(middleman));
+    }
+
+    /// Takes him away.
+    pub fn leave_in_peace(&mut self) {
+        self.middleman = None;
+    }
+
+    /// Gives the session a command.
+    pub fn command(&mut self, command: Command) {
+        self.session.command(self.now, command).expect("the session takes the command");
+        self.drain();
+    }
+
+    /// Lets time pass.
+    pub fn run_for(&mut self, span: Duration) {
+        let end = self.now + span;
+        self.run_until(end, |_| false);
+    }
+
+    /// Lets time pass until a job has ended.
+    pub fn outcome(&mut self) -> Outcome {
+        let limit = self.now + Duration::from_secs(300);
+        match self.run_until(limit, |event| matches!(event, Event::Finished(_))) {
+            Some(Event::Finished(outcome)) => outcome,
+            _ => panic!("no outcome within {limit:?}; heard:\n{}", self.transcript()),
+        }
+    }
+
+    /// Gives a command and lets time pass until its job has ended.
+    pub fn ask(&mut self, command: Command) -> Outcome {
+        self.command(command);
+        self.outcome()
+    }
+
+    /// Uploads and gives the report.
+    pub fn load(&mut self, order: LoadOrder) -> LoadReport {
+        match self.ask(Command::Load(Box::new(order))) {
+            Outcome::Loaded(report) => *report,
+            other => panic!("an upload ended as {other:?}"),
+        }
+    }
+
+    /// Lets time pass until `end`, or until an event for which `stop` says yes, and gives that event.
+    pub fn run_until(&mut self, end: Instant, mut stop: impl FnMut(&Event) -> bool) -> Option<Event> {
+        loop {
+            while let Some(event) = self.events.pop_front() {
+                if stop(&event) {
+                    return Some(event);
+                }
+            }
+            let due = [self.session.poll_timeout(), self.unit.poll_timeout(), self.to_session.next_arrival()];
+            let next = due.into_iter().flatten().min().unwrap_or(Instant::NEVER).max(self.now);
+            if next > end {
+                self.now = end;
+                return None;
+            }
+            self.step(next);
+        }
+    }
+
+    /// Cuts the unit's power and gives it back.
+    pub fn power_cycle(&mut self, off: Duration) {
+        let now = self.now;
+        self.unit.unit_mut().power_off(now);
+        self.run_for(off);
+        let now = self.now;
+        self.unit.unit_mut().power_on(now);
+    }
+
+    /// What the unit has said, for messages of failing tests.
+    pub fn transcript(&self) -> String {
+        let record = self.session.record();
+        record.entries().map(|entry| entry.bytes.escape_ascii().to_string()).collect::<String>().replace("\\n", "\\n\n")
+    }
+
+    fn step(&mut self, next: Instant) {
+        self.now = next;
+        let to_session = &mut self.to_session;
+        self.unit.advance(next, |at, bytes| to_session.push(at, bytes));
+        while let Some((at, byte)) = self.to_session.pop_arrived(next) {
+            self.session.handle_bytes(at.max(next), &[byte]);
+            self.drain();
+        }
+        self.session.handle_timeout(next);
+        self.drain();
+    }
+
+    fn drain(&mut self) {
+        while let Some(transmit) = self.session.poll_transmit() {
+            for &byte in &transmit.bytes {
+                self.wire.push(byte);
+                let through = match &mut self.middleman {
+                    Some(middleman) => middleman(self.sent, byte),
+                    None => vec![byte],
+                };
+                self.sent += 1;
+                self.unit.send(self.now, &through);
+            }
+        }
+        while let Some(event) = self.session.poll_event() {
+            self.events.push_back(event);
+        }
+    }
+}
+
+/// The product under test.
+pub fn axtc4co() -> &'static Product {
+    Product::named("AXTC4CO").expect("a product of this name")
+}
+
+/// An image small enough for many runs: 3,000 words, 12 pages, the last one partly filled.
+pub fn small_image(product: &str, version: &str) -> CheckedImage {
+    checked(product, version, 3000)
+}
+
+/// An image of the usual size.
+pub fn full_image(version: &str) -> CheckedImage {
+    checked("AXTC4CO", version, 0xC000)
+}
+
+/// Program flash with a small image in it.
+pub fn factory_flash(version: &str) -> Vec<u8> {
+    flash_with(&small_image("AXTC4CO", version))
+}
+
+/// Erased program flash with just this image in it.
+pub fn flash_with(image: &CheckedImage) -> Vec<u8> {
+    let mut flash = vec![0xFF; axtc4co().flash.program_words as usize * 2];
+    for block in &image.image().blocks {
+        let at = block.address as usize * 2;
+        flash[at..at + block.data.len()].copy_from_slice(&block.data);
+    }
+    flash
+}
+
+/// An order to upload with the right password.
+pub fn order(image: CheckedImage) -> LoadOrder {
+    LoadOrder { image, password: Secret::new(b"AXIO-2010".to_vec()), product: None }
+}

@@ -1,0 +1,104 @@
+//! Stories of talks with the firmware: console and unit on one cable, in virtual time.
+
+use axcon::session::{Command, Event, Job, Outcome, UnitState};
+use axcon::time::Duration;
+use axcon::version::Version;
+use axcon::wire::stream::Source;
+
+use crate::support::bench::Bench;
+
+#[test]
+fn the_unit_says_who_it_is() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    assert_eq!(bench.ask(Command::Identify), Outcome::Identified);
+    let facts = bench.session.facts();
+    assert_eq!(facts.state, UnitState::Application);
+    assert_eq!(facts.product.as_ref().map(|known| known.value.as_str()), Some("AXTC4CO"));
+    assert_eq!(facts.version.as_ref().map(|known| known.value), Some(Version::new(1, 1, 0)));
+    assert_eq!(facts.node_id.as_ref().map(|known| known.value), Some(127));
+    assert_eq!(facts.can_kbps.as_ref().map(|known| known.value), Some(125));
+    assert_eq!(facts.nmt_state.as_ref().map(|known| known.value.as_str()), Some("pre-operational"));
+}
+
+#[test]
+fn a_unit_that_stands_in_a_dialogue_is_found_all_the_same() {
+    for keys in [&b"l"[..], b"d", b"t", b"tf", b"v", b"s", b"lAX"] {
+        let mut bench = Bench::new();
+        bench.run_for(Duration::from_secs(4));
+        bench.command(Command::Keys(keys.to_vec()));
+        bench.run_for(Duration::from_millis(500));
+        bench.ask(Command::Identify);
+        let product = bench.session.facts().product.as_ref().map(|known| known.value.clone());
+        assert_eq!(product.as_deref(), Some("AXTC4CO"), "after {}", keys.escape_ascii());
+    }
+}
+
+#[test]
+fn the_stream_is_switched_on_read_and_switched_off() {
+    for source in [Source::FieldValue, Source::ProcessValue] {
+        let mut bench = Bench::new();
+        bench.run_for(Duration::from_secs(4));
+        let outcome = bench.ask(Command::StreamOn { source, period: Duration::from_millis(200) });
+        assert_eq!(outcome, Outcome::StreamRuns { was_on: false }, "{}", bench.transcript());
+        let mut rows = 0;
+        let end = bench.now + Duration::from_secs(2);
+        bench.run_until(end, |event| {
+            if let Event::Row { row, .. } = event {
+                assert_eq!((row.source, row.readings.len()), (source, 5));
+                rows += 1;
+            }
+            false
+        });
+        assert!((9..=11).contains(&rows), "{rows} rows in 2 s at 200 ms");
+        assert_eq!(bench.ask(Command::StreamOff), Outcome::Done(Job::StreamOff));
+        let end = bench.now + Duration::from_secs(2);
+        assert_eq!(bench.run_until(end, |event| matches!(event, Event::Row { .. })), None);
+    }
+}
+
+#[test]
+fn a_stream_that_was_on_is_changed_and_said_to_have_been_on() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    bench.ask(Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(500) });
+    let outcome = bench.ask(Command::StreamOn { source: Source::ProcessValue, period: Duration::from_millis(200) });
+    assert_eq!(outcome, Outcome::StreamRuns { was_on: true }, "{}", bench.transcript());
+    assert_eq!(bench.session.facts().stream, Some(Source::ProcessValue));
+}
+
+#[test]
+fn a_stream_survives_a_power_cycle() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    bench.ask(Command::StreamOn { source: Source::ProcessValue, period: Duration::from_millis(300) });
+    bench.power_cycle(Duration::from_secs(1));
+    let end = bench.now + Duration::from_secs(5);
+    let row = bench.run_until(end, |event| matches!(event, Event::Row { row, .. } if row.source == Source::ProcessValue));
+    assert!(row.is_some(), "{}", bench.transcript());
+}
+
+#[test]
+fn the_defaults_are_restored_by_yes_and_the_unit_comes_back() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    assert_eq!(bench.ask(Command::RestoreDefaults), Outcome::Done(Job::RestoreDefaults), "{}", bench.transcript());
+}
+
+#[test]
+fn a_password_typed_by_hand_is_secret_too() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    bench.command(Command::Keys(b"l".to_vec()));
+    bench.run_for(Duration::from_millis(300));
+    for key in b"AXIO-2011" {
+        bench.command(Command::Keys(vec![*key]));
+        bench.run_for(Duration::from_millis(90));
+    }
+    bench.command(Command::Keys(b"\r".to_vec()));
+    bench.run_for(Duration::from_millis(900));
+    assert!(bench.wire.ends_with(b"AXIO-2011\r"));
+    let sent: String = bench.transcript();
+    assert!(!sent.contains("AXIO") && !sent.contains("2011"), "{sent}");
+    assert!(!bench.session.password_open(), "the next key is no secret any more");
+}

@@ -1,0 +1,160 @@
+//! Stories of uploads: console and unit on one cable, in virtual time.
+
+use axcon::image::Identity;
+use axcon::secret::Secret;
+use axcon::session::{Command, Event, Phase, UnitNow, Verdict};
+use axcon::time::Duration;
+use axcon::version::Version;
+
+use crate::support::bench::{Bench, factory_flash, flash_with, full_image, order, small_image};
+
+#[test]
+fn an_upload_succeeds_and_the_flash_holds_exactly_the_image() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    let image = small_image("AXTC4CO", "1.2.0");
+    let report = bench.load(order(image.clone()));
+    assert_eq!((report.verdict, report.unit), (Verdict::Done, UnitNow::Application), "{report:?}");
+    assert_eq!(report.version_before, Some(Version::new(1, 1, 0)));
+    assert_eq!(report.version_after, Some(Version::new(1, 2, 0)));
+    assert_eq!(report.records, report.records_total);
+    // Words of the old program behind the new one stay: compare what the image mentions, and what it does not.
+    let flash = bench.unit.unit().flash();
+    for block in &image.image().blocks {
+        let at = block.address as usize * 2;
+        assert_eq!(&flash[at..at + block.data.len()], block.data, "word {:#x}", block.address);
+    }
+    assert_eq!(Identity::verify(flash).map(|identity| identity.version), Ok(Version::new(1, 2, 0)));
+}
+
+#[test]
+fn an_upload_takes_hardly_longer_than_the_line_and_the_flash_need() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    let report = bench.load(order(full_image("1.2.0")));
+    assert_eq!(report.verdict, Verdict::Done, "{report:?}");
+    // 192 pages, each erased (20 ms) and written word by word (256 x 20 us); flash beyond the old program is erased.
+    let characters = bench.wire.len() as f64;
+    let on_the_line = characters / 11_520.0;
+    let seconds = report.duration.as_secs_f64();
+    assert!(seconds < on_the_line + 192.0 * 0.030 + 3.0, "{seconds} s for {on_the_line} s of characters");
+}
+
+#[test]
+fn a_late_adapter_costs_time_and_no_record() {
+    for latency in [1, 4, 16, 20] {
+        let mut bench = Bench::with(factory_flash("1.1.0"), Duration::from_millis(latency));
+        bench.run_for(Duration::from_secs(4));
+        let report = bench.load(order(small_image("AXTC4CO", "1.2.0")));
+        assert_eq!(report.verdict, Verdict::Done, "{latency} ms: {report:?}\n{}", bench.transcript());
+    }
+}
+
+#[test]
+fn a_wrong_password_is_the_units_refusal_and_changes_nothing() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    let before = bench.unit.unit().flash().to_vec();
+    let mut wrong = order(small_image("AXTC4CO", "1.2.0"));
+    wrong.password = Secret::new(b"axio-2010".to_vec());
+    let report = bench.load(wrong);
+    assert_eq!((report.verdict, report.unit), (Verdict::UnitRefused, UnitNow::Application), "{report:?}");
+    assert_eq!((report.phase, report.records), (Phase::EnterLoader, 0));
+    assert_eq!(bench.unit.unit().flash(), before);
+    // The unit is left in peace: it answers like any other.
+    bench.ask(Command::Identify);
+    assert_eq!(bench.session.facts().version.as_ref().map(|known| known.value), Some(Version::new(1, 1, 0)));
+}
+
+#[test]
+fn an_image_for_another_product_is_refused_before_the_unit_is_asked_for_anything() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    let mut other = order(small_image("AXTC4CO", "1.2.0"));
+    other.product = Some("AXRTD8CO".into());
+    bench.wire.clear();
+    let report = bench.load(other);
+    assert_eq!((report.verdict, report.unit), (Verdict::Refused, UnitNow::Application), "{report:?}");
+    assert_eq!(bench.wire, b"\x11m", "only the question who is there");
+}
+
+#[test]
+fn a_corrupted_record_stops_the_upload_within_a_record_and_the_next_one_succeeds() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    // The 5,000th character of the file loses a bit: the check sum of its record is wrong.
+    bench.disturb(|number, byte| vec![if number == 5_000 { byte ^ 0x01 } else { byte }]);
+    let report = bench.load(order(small_image("AXTC4CO", "1.2.0")));
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
+    assert_eq!(report.phase, Phase::Transfer);
+    let damaged = 5_000 / 79;
+    assert!(report.records <= damaged + 3, "{} records left, the {damaged}th was damaged", report.records);
+    assert!(report.what.contains("error"), "{}", report.what);
+    bench.leave_in_peace();
+    let mut again = order(small_image("AXTC4CO", "1.2.0"));
+    again.product = Some("AXTC4CO".into());
+    let report = bench.load(again);
+    assert_eq!(report.verdict, Verdict::Done, "{report:?}");
+}
+
+#[test]
+fn a_power_cut_at_any_record_leaves_a_unit_that_a_second_upload_saves() {
+    let image = small_image("AXTC4CO", "1.2.0");
+    for cut in (0..190).step_by(17) {
+        let mut bench = Bench::new();
+        bench.run_for(Duration::from_secs(4));
+        bench.command(Command::Load(Box::new(order(image.clone()))));
+        let limit = bench.now + Duration::from_secs(60);
+        let moment = |event: &Event| matches!(event, Event::Progress(progress) if progress.phase == Phase::Transfer && progress.records >= cut);
+        assert!(bench.run_until(limit, moment).is_some(), "record {cut} is reached");
+        bench.power_cycle(Duration::from_millis(500));
+        let outcome = bench.outcome();
+        let axcon::session::Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+        assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "cut at {cut}: {report:?}");
+        // The loader does not say which product it belongs to: somebody has to.
+        let report = bench.load(order(image.clone()));
+        assert_eq!(report.verdict, Verdict::Refused, "cut at {cut}: {report:?}");
+        let mut again = order(image.clone());
+        again.product = Some("AXTC4CO".into());
+        let report = bench.load(again);
+        assert_eq!(report.verdict, Verdict::Done, "cut at {cut}: {report:?}\n{}", bench.transcript());
+        let wanted = flash_with(&image);
+        let end = image.identity().expect("an identity").program_words as usize * 2;
+        assert_eq!(bench.unit.unit().flash()[..end], wanted[..end], "cut at {cut}");
+    }
+}
+
+#[test]
+fn nobody_at_the_other_end_is_said_within_seconds() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    let now = bench.now;
+    bench.unit.unit_mut().power_off(now);
+    let report = bench.load(order(small_image("AXTC4CO", "1.2.0")));
+    assert_eq!((report.verdict, report.unit), (Verdict::NoAnswer, UnitNow::Unknown), "{report:?}");
+    assert!(bench.now.since(now) < Duration::from_secs(5));
+}
+
+#[test]
+fn cancelling_in_the_middle_of_the_file_says_that_the_unit_waits_in_its_loader() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    bench.command(Command::Load(Box::new(order(small_image("AXTC4CO", "1.2.0")))));
+    let limit = bench.now + Duration::from_secs(60);
+    bench.run_until(limit, |event| matches!(event, Event::Progress(progress) if progress.records > 50));
+    let axcon::session::Outcome::Loaded(report) = bench.ask(Command::Cancel) else { panic!("no report") };
+    assert_eq!((report.verdict, report.unit), (Verdict::Interrupted, UnitNow::Loader), "{report:?}");
+    let sent = bench.wire.len();
+    bench.run_for(Duration::from_secs(2));
+    assert_eq!(bench.wire.len(), sent, "nothing leaves after that");
+}
+
+#[test]
+fn the_password_is_nowhere_in_the_record() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    let report = bench.load(order(small_image("AXTC4CO", "1.2.0")));
+    assert_eq!(report.verdict, Verdict::Done);
+    assert!(bench.wire.windows(9).any(|window| window == b"AXIO-2010"), "it was sent");
+    assert!(!bench.transcript().contains("AXIO"), "and not kept");
+}
