@@ -1,10 +1,42 @@
 //! The device's end of the cable: an emulated unit as a machine without clock, thread or file.
+//!
+//! Here are power and reset: which program runs, and when. The loader lives in flash of its own and runs first; it
+//! starts the application if the program in flash is intact and made for this product, unless it has been told to
+//! wait for a file. What the programs say and do is in [`firmware`] and [`bootloader`]; the port they talk through
+//! in [`uart`]; what outlives the power in [`memory`]; what they measure in [`sensors`].
+//!
+//! Deterministic: the same setup and the same inputs at the same times give the same bytes, however often
+//! [`handle_timeout`](Endpoint::handle_timeout) is called in between, because things happen only when they are due.
 
+mod bootloader;
 pub mod cable;
+mod dialect;
+mod firmware;
+pub mod memory;
+pub mod sensors;
+mod uart;
+
+pub use dialect::NetworkState;
+
+use std::collections::VecDeque;
 
 use crate::device::{LoaderKind, Product};
 use crate::endpoint::{Endpoint, Transmit};
-use crate::time::Instant;
+use crate::image::Identity;
+use crate::rng::Rng;
+use crate::time::{Duration, Instant};
+use bootloader::Bootloader;
+use dialect::Dialect;
+use firmware::Firmware;
+use memory::{Flash, ParameterStore, Parameters, StartDelay};
+use sensors::Sensors;
+use uart::Uart;
+
+/// From power or reset to the first program's first character; keys are lost meanwhile. A guess.
+pub const START_TIME: Duration = Duration::from_millis(50);
+
+/// The longest a powered unit asks to be left alone: its watchdog has to be served.
+const WATCHDOG_TIME: Duration = Duration::from_secs(1);
 
 /// What a unit is made of before power comes.
 #[derive(Clone, Debug)]
@@ -17,7 +49,8 @@ pub struct Setup {
     pub seed: u64,
     /// Program flash, bytes in S-record order; as long as the product's flash, FFh where erased.
     pub flash: Vec<u8>,
-    /// Non-volatile memory as [`Unit::parameters`] gave it; empty for a unit fresh from the factory.
+    /// Non-volatile memory as [`Unit::parameters`] gave it; empty for a unit fresh from the factory. One that cannot
+    /// be used makes the unit run on factory settings: ask [`Parameters::read`] first to know.
     pub parameters: Vec<u8>,
 }
 
@@ -41,10 +74,72 @@ pub enum Area {
     Parameters,
 }
 
+/// What a unit is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Running {
+    /// Nothing: it has no power.
+    Off,
+    /// It starts; nothing has been printed yet.
+    Starting,
+    /// The loader waits for a file, or takes one.
+    Loader,
+    /// The application.
+    Application,
+}
+
 /// An emulated unit. As an [`Endpoint`] it is the unit's RS-232 port.
 #[derive(Debug)]
 pub struct Unit {
-    setup: Setup,
+    product: &'static Product,
+    loader: LoaderKind,
+    serial_number: u32,
+    flash: Flash,
+    parameters: ParameterStore,
+    sensors: Sensors,
+    uart: Uart,
+    stores: VecDeque<Store>,
+    power: Power,
+}
+
+#[derive(Debug)]
+enum Power {
+    Off,
+    On {
+        program: Program,
+        watchdog_at: Instant,
+        /// A program has asked for it; it happens when the last text has left.
+        reset: Option<Reset>,
+    },
+}
+
+#[derive(Debug)]
+enum Program {
+    Starting { until: Instant, reset: Reset },
+    Loader(Box<Bootloader>),
+    Application(Box<Firmware>),
+}
+
+/// Why the unit starts anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reset {
+    /// The usual way: power, restored defaults, a finished load.
+    Start,
+    /// Menu L: the loader has to wait for a file.
+    StayInLoader,
+}
+
+/// What a program finds on the board, at the moment it does something.
+#[derive(Debug)]
+struct Board<'a> {
+    now: Instant,
+    product: &'static Product,
+    serial_number: u32,
+    flash: &'a mut Flash,
+    parameters: &'a mut ParameterStore,
+    sensors: &'a mut Sensors,
+    uart: &'a mut Uart,
+    stores: &'a mut VecDeque<Store>,
+    reset: &'a mut Option<Reset>,
 }
 
 impl Unit {
@@ -53,43 +148,197 @@ impl Unit {
     /// # Panics
     /// If the flash is not as long as the product's.
     pub fn new(setup: Setup) -> Self {
-        Unit { setup }
+        let Setup { product, loader, seed, flash, parameters } = setup;
+        let mut stores = VecDeque::new();
+        Unit {
+            product,
+            loader,
+            serial_number: Rng::new(seed).fork("serial number").next_u64() as u32,
+            flash: Flash::new(product.flash, flash, seed),
+            parameters: ParameterStore::new(product, parameters, &mut stores),
+            sensors: Sensors::new(seed),
+            uart: Uart::new(),
+            stores,
+            power: Power::Off,
+        }
     }
 
     /// Supply voltage comes: the unit starts. Nothing happens if it is on.
-    pub fn power_on(&mut self, _now: Instant) {}
+    pub fn power_on(&mut self, now: Instant) {
+        if matches!(self.power, Power::Off) {
+            self.uart.reset();
+            let program = Program::Starting { until: now + START_TIME, reset: Reset::Start };
+            self.power = Power::On { program, watchdog_at: now + WATCHDOG_TIME, reset: None };
+        }
+    }
 
     /// Supply voltage goes: everything but flash and parameters is lost, in the middle of a word if need be.
-    pub fn power_off(&mut self, _now: Instant) {}
+    pub fn power_off(&mut self, now: Instant) {
+        if matches!(self.power, Power::On { .. }) {
+            self.run_until(now);
+            self.uart.power_lost(now);
+            self.flash.power_lost(now, &mut self.stores);
+            self.power = Power::Off;
+        }
+    }
+
+    /// What the unit is doing.
+    pub fn running(&self) -> Running {
+        match &self.power {
+            Power::Off => Running::Off,
+            Power::On { program: Program::Starting { .. }, .. } => Running::Starting,
+            Power::On { program: Program::Loader(_), .. } => Running::Loader,
+            Power::On { program: Program::Application(_), .. } => Running::Application,
+        }
+    }
 
     /// Program flash, bytes in S-record order.
     pub fn flash(&self) -> &[u8] {
-        &self.setup.flash
+        self.flash.bytes()
     }
 
     /// Non-volatile parameters, as [`Setup::parameters`] takes them.
     pub fn parameters(&self) -> &[u8] {
-        &self.setup.parameters
+        self.parameters.image()
+    }
+
+    /// The values in the non-volatile parameters.
+    pub fn settings(&self) -> &Parameters {
+        self.parameters.values()
     }
 
     /// The next write to memory that outlives the power.
     pub fn poll_store(&mut self) -> Option<Store> {
-        None
+        self.stores.pop_front()
     }
 
     /// Whether the unit has sent XOFF and not yet XON.
     pub fn holds_sender(&self) -> bool {
-        false
+        match &self.power {
+            Power::On { program: Program::Loader(loader), .. } => loader.holds_sender(),
+            Power::Off | Power::On { .. } => false,
+        }
+    }
+
+    /// The process at its inputs.
+    pub fn sensors(&self) -> &Sensors {
+        &self.sensors
+    }
+
+    /// The process at its inputs, to turn its knobs; the unit notices at its next scan.
+    pub fn sensors_mut(&mut self) -> &mut Sensors {
+        &mut self.sensors
+    }
+
+    /// Makes one word of program flash refuse what is programmed, or none: a worn-out cell.
+    pub fn wear_out_word(&mut self, word: Option<u32>) {
+        self.flash.wear_out(word);
+    }
+
+    /// Puts the CANopen node into a state, as a network master would. Without effect unless the application runs.
+    pub fn set_network_state(&mut self, now: Instant, state: NetworkState) {
+        self.run_until(now);
+        if let Power::On { program: Program::Application(firmware), .. } = &mut self.power {
+            firmware.set_network_state(state);
+        }
+    }
+
+    /// Does everything that is due by `now`, in its order.
+    fn run_until(&mut self, now: Instant) {
+        while let Some(due) = self.poll_timeout().filter(|&due| due <= now) {
+            self.step(due);
+        }
+    }
+
+    fn step(&mut self, now: Instant) {
+        self.uart.step(now);
+        self.with_program(now, |program, board| match program {
+            Program::Starting { .. } => {}
+            Program::Loader(loader) => loader.step(board),
+            Program::Application(firmware) => firmware.step(board),
+        });
+        let Power::On { program, watchdog_at, reset } = &mut self.power else { return };
+        if *watchdog_at <= now {
+            *watchdog_at = now + WATCHDOG_TIME;
+        }
+        // A reset waits for the last text: the programs print it before they let go.
+        if self.uart.backlog() == 0
+            && let Some(reset) = reset.take()
+        {
+            self.uart.reset();
+            *program = Program::Starting { until: now + START_TIME, reset };
+        }
+        if let Program::Starting { until, reset } = *program
+            && until <= now
+        {
+            self.start_program(now, reset);
+        }
+    }
+
+    /// The boot ROM's decision.
+    fn start_program(&mut self, now: Instant, cause: Reset) {
+        let identity = Identity::verify(self.flash.bytes()).ok();
+        let own = identity.filter(|identity| identity.product == self.product.name);
+        let may_start = match (cause, self.parameters.values().start_delay) {
+            (Reset::Start, StartDelay::AtOnce) => own,
+            (Reset::Start, StartDelay::WaitsForEver) | (Reset::StayInLoader, _) => None,
+        };
+        let loader = self.loader;
+        self.with_program(now, |program, board| {
+            *program = match (may_start, loader) {
+                (Some(identity), _) => {
+                    Program::Application(Box::new(Firmware::start(board, identity, Dialect::plain())))
+                }
+                (None, LoaderKind::G1) => Program::Loader(Box::new(Bootloader::start(board))),
+            }
+        });
+    }
+
+    /// Lets the running program do something with the board.
+    fn with_program(&mut self, now: Instant, act: impl FnOnce(&mut Program, &mut Board<'_>)) {
+        let Power::On { program, reset, .. } = &mut self.power else { return };
+        let mut board = Board {
+            now,
+            product: self.product,
+            serial_number: self.serial_number,
+            flash: &mut self.flash,
+            parameters: &mut self.parameters,
+            sensors: &mut self.sensors,
+            uart: &mut self.uart,
+            stores: &mut self.stores,
+            reset,
+        };
+        act(program, &mut board);
     }
 }
 
 impl Endpoint for Unit {
-    fn handle_bytes(&mut self, _now: Instant, _bytes: &[u8]) {}
-    fn handle_timeout(&mut self, _now: Instant) {}
-    fn poll_transmit(&mut self) -> Option<Transmit> {
-        None
+    fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        self.run_until(now);
+        for &byte in bytes {
+            self.with_program(now, |program, board| match program {
+                Program::Starting { .. } => {}
+                Program::Loader(loader) => loader.receive(board, byte),
+                Program::Application(firmware) => firmware.receive(board, byte),
+            });
+        }
     }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.run_until(now);
+    }
+
+    fn poll_transmit(&mut self) -> Option<Transmit> {
+        self.uart.poll_transmit()
+    }
+
     fn poll_timeout(&self) -> Option<Instant> {
-        None
+        let Power::On { program, watchdog_at, .. } = &self.power else { return None };
+        let program_due = match program {
+            Program::Starting { until, .. } => Some(*until),
+            Program::Loader(loader) => loader.deadline(&self.flash),
+            Program::Application(firmware) => Some(firmware.deadline()),
+        };
+        [Some(*watchdog_at), program_due, self.uart.deadline()].into_iter().flatten().min()
     }
 }

@@ -1,0 +1,218 @@
+//! S-records as the G1 loader takes them: one character at a time, judged as early as it can.
+//!
+//! Control characters are ignored wherever they stand. Both cases of hex digits are taken. What is wrong is one of
+//! the loader's own error numbers; the console's reader (`image`) is a different thing and tells more.
+
+/// What goes wrong, by the loader's numbers (public facts about the Motorola loaders).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Characters were lost because the loader did not listen.
+    Receive,
+    /// A character that cannot stand here.
+    Character,
+    /// A record of a type it does not take, too short, or before S0.
+    Record,
+    /// The sum is wrong.
+    Checksum,
+    /// A second data record while one is parked.
+    Overrun,
+    /// Flash does not read back as written.
+    Flash,
+}
+
+impl Fault {
+    /// Its number.
+    pub fn number(self) -> u8 {
+        match self {
+            Fault::Receive => 1,
+            Fault::Character => 2,
+            Fault::Record => 3,
+            Fault::Checksum => 4,
+            Fault::Overrun => 5,
+            Fault::Flash => 6,
+        }
+    }
+}
+
+/// A complete record with the right sum.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Record {
+    /// S0. What it says is of no interest to the loader, not even the length of its address.
+    Header,
+    /// S3.
+    Data(DataRecord),
+    /// S7. The entry point is not used: the application starts by a reset.
+    End,
+}
+
+/// Data of an S3 record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DataRecord {
+    /// Address of the first word.
+    pub address: u32,
+    /// Words, low byte first in the record. An odd last byte is no word and is dropped.
+    pub words: Vec<u16>,
+}
+
+/// Takes characters and gives records.
+#[derive(Debug, Default)]
+pub struct Decoder {
+    place: Place,
+}
+
+/// Where in a record the next character stands.
+#[derive(Debug, Default)]
+enum Place {
+    #[default]
+    Start,
+    Type,
+    Body {
+        kind: Kind,
+        /// The count and what it counts.
+        bytes: Vec<u8>,
+        high_digit: Option<u8>,
+    },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Header,
+    Data,
+    End,
+}
+
+/// Bytes the count byte has to count at least: the check sum, and an address where one is read.
+const SHORTEST_HEADER: u8 = 1;
+const SHORTEST_WITH_ADDRESS: u8 = 5;
+const ADDRESS_BYTES: usize = 4;
+
+impl Decoder {
+    /// Takes one character. `header_seen` says whether an S0 has come: data and end are refused before it.
+    ///
+    /// # Errors
+    /// What the loader has against the character. The caller starts over with a new decoder.
+    pub fn take(&mut self, character: u8, header_seen: bool) -> Result<Option<Record>, Fault> {
+        if character.is_ascii_control() {
+            return Ok(None);
+        }
+        match &mut self.place {
+            Place::Start if character == b'S' => {
+                self.place = Place::Type;
+                Ok(None)
+            }
+            Place::Start => Err(Fault::Character),
+            Place::Type => {
+                let kind = match character {
+                    b'0' => Kind::Header,
+                    b'3' if header_seen => Kind::Data,
+                    b'7' if header_seen => Kind::End,
+                    _ => return Err(Fault::Record),
+                };
+                self.place = Place::Body { kind, bytes: Vec::new(), high_digit: None };
+                Ok(None)
+            }
+            Place::Body { kind, bytes, high_digit } => {
+                let digit = hex_digit(character).ok_or(Fault::Character)?;
+                let Some(high) = high_digit.take() else {
+                    *high_digit = Some(digit);
+                    return Ok(None);
+                };
+                bytes.push(high << 4 | digit);
+                let shortest = match kind {
+                    Kind::Header => SHORTEST_HEADER,
+                    Kind::Data | Kind::End => SHORTEST_WITH_ADDRESS,
+                };
+                if bytes[0] < shortest {
+                    return Err(Fault::Record);
+                }
+                if bytes.len() <= usize::from(bytes[0]) {
+                    return Ok(None);
+                }
+                let record = complete(*kind, bytes)?;
+                self.place = Place::Start;
+                Ok(Some(record))
+            }
+        }
+    }
+}
+
+/// Count, content and check sum add up to FFh in their lowest byte.
+fn complete(kind: Kind, bytes: &[u8]) -> Result<Record, Fault> {
+    let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
+    if sum != 0xFF {
+        return Err(Fault::Checksum);
+    }
+    Ok(match kind {
+        Kind::Header => Record::Header,
+        Kind::End => Record::End,
+        Kind::Data => {
+            let (address, data) = bytes[1..bytes.len() - 1].split_at(ADDRESS_BYTES);
+            Record::Data(DataRecord {
+                address: address.iter().fold(0, |address, byte| address << 8 | u32::from(*byte)),
+                words: data.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect(),
+            })
+        }
+    })
+}
+
+fn hex_digit(character: u8) -> Option<u8> {
+    char::from(character).to_digit(16).map(|digit| digit as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decode(text: &str) -> Result<Vec<Record>, Fault> {
+        let mut decoder = Decoder::default();
+        let mut records = Vec::new();
+        for character in text.bytes() {
+            let record = decoder.take(character, !records.is_empty())?;
+            records.extend(record);
+        }
+        Ok(records)
+    }
+
+    #[test]
+    fn records_are_read_in_any_case_and_with_any_control_character() {
+        let data = Record::Data(DataRecord { address: 0x80, words: vec![0x1234, 0xABCD] });
+        for text in [
+            "S0030000FC\rS309000000803412CDABB8\rS70500000000FA\r",
+            "S0030000FC\r\nS309000000803412cdabb8\r\nS70500000000fa\r\n",
+            "S0110000000050524F4752414D264441544196\nS3\t09\x7f000000803412CDABB8\x00S70500000000FA",
+        ] {
+            assert_eq!(decode(text), Ok(vec![Record::Header, data.clone(), Record::End]), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn each_fault_has_its_number() {
+        let cases = [
+            ("s0030000FC", Fault::Character),
+            ("x", Fault::Character),
+            (" ", Fault::Character),
+            ("S0030000FG", Fault::Character),
+            ("S0030000FC\r\u{e9}", Fault::Character),
+            ("S3", Fault::Record),
+            ("S7", Fault::Record),
+            ("S1", Fault::Record),
+            ("S000", Fault::Record),
+            ("S0030000FC\rS5", Fault::Record),
+            ("S0030000FC\rS8", Fault::Record),
+            ("S0030000FC\rS304", Fault::Record),
+            ("S0030000FC\rS704", Fault::Record),
+            ("S0030000FD", Fault::Checksum),
+            ("S0030000FC\rS309000000803412CDABB9", Fault::Checksum),
+        ];
+        for (text, fault) in cases {
+            assert_eq!(decode(text), Err(fault), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn an_odd_last_byte_is_no_word() {
+        let records = decode("S0030000FCS3080000008034120130").map(|records| records[1].clone());
+        let words = vec![0x1234];
+        assert_eq!(records, Ok(Record::Data(DataRecord { address: 0x80, words })));
+    }
+}
