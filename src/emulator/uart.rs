@@ -5,9 +5,8 @@
 
 use std::collections::VecDeque;
 
-use super::cable::character_time;
 use crate::endpoint::Transmit;
-use crate::time::{Duration, Instant};
+use crate::time::{Duration, Instant, character_time};
 
 /// Bits a second on the service port (AXTC4CO manual, appendix A).
 pub const BAUD: u32 = 115_200;

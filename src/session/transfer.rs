@@ -18,15 +18,16 @@ use crate::time::{Duration, Instant};
 const HOLD_EXPECTED: Duration = Duration::from_millis(300);
 /// How long the loader may hold us. Writing a page takes it some 30 ms, erasing all of its flash seconds.
 const LONGEST_HOLD: Duration = Duration::from_secs(4);
-/// Pages without any sign of life from the loader after which nobody is there.
-const SILENT_PAGES: u32 = 3;
+/// The same, if nothing at all has been heard since the crossing before: a unit that lost its power is worth a moment,
+/// and not one more record, since what comes back may be its menu.
+const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
 
 /// Why a transfer cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stall {
     /// The loader has held us for [`LONGEST_HOLD`].
     Held,
-    /// Nothing has been heard for pages.
+    /// Nothing has been heard since the crossing before.
     Silent,
 }
 
@@ -52,19 +53,11 @@ pub(super) struct Transfer {
     taken: usize,
     bytes_taken: usize,
     /// Behind a record that crosses: when its last character has left.
-    crossing: Option<Crossing>,
-    /// Crossings in a row behind which no XOFF came.
-    unheld: u32,
-    /// Something was heard since the last crossing that was not held.
+    crossing: Option<Instant>,
+    /// Something has been heard since the crossing before.
     alive: bool,
     begun: Option<Instant>,
     deadline: Option<Instant>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Crossing {
-    left_at: Instant,
-    held: bool,
 }
 
 impl Transfer {
@@ -99,7 +92,6 @@ impl Transfer {
             taken: 0,
             bytes_taken: 0,
             crossing: None,
-            unheld: 0,
             alive: false,
             begun: None,
             deadline: None,
@@ -118,13 +110,13 @@ impl Transfer {
             self.deadline = Some(limit);
             return if limit <= now { Err(Stall::Held) } else { Ok(false) };
         }
-        if let Some(crossing) = self.crossing {
-            let limit = crossing.left_at + HOLD_EXPECTED;
+        if let Some(left_at) = self.crossing {
+            let limit = left_at + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE };
             if now < limit {
                 self.deadline = Some(limit);
                 return Ok(false);
             }
-            self.give_up_waiting()?;
+            self.pass_unheld()?;
         }
         while self.sent < self.records.len() && transmitter.is_empty() {
             if transmitter.ready_at() > now {
@@ -137,8 +129,8 @@ impl Transfer {
             if record.crosses {
                 // The piece is let go in this same step, so it leaves behind what has been let go before.
                 let left_at = transmitter.free_at().max(now) + transmitter.time_for(record.text.len());
-                self.crossing = Some(Crossing { left_at, held: false });
-                self.deadline = Some(left_at + HOLD_EXPECTED);
+                self.crossing = Some(left_at);
+                self.deadline = Some(left_at + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE });
                 return Ok(false);
             }
         }
@@ -151,14 +143,13 @@ impl Transfer {
 
     /// The loader has sent XOFF (`true`) or XON.
     pub(super) fn hold(&mut self, held: bool) {
-        self.alive = true;
-        if let Some(crossing) = &mut self.crossing {
+        if self.crossing.is_some() {
             if held {
-                crossing.held = true;
+                self.alive = true;
             } else {
                 // XON alone will do: it comes when the page is written, and the XOFF may have been lost on the line.
                 self.crossing = None;
-                self.unheld = 0;
+                self.alive = false;
                 self.take_all_sent();
             }
         }
@@ -205,17 +196,15 @@ impl Transfer {
         self.begun
     }
 
-    /// No XOFF came behind a record that should have brought one. Another loader may do without; nobody at all does too.
-    fn give_up_waiting(&mut self) -> Result<(), Stall> {
-        self.crossing = None;
-        self.unheld = if self.alive { 0 } else { self.unheld + 1 };
-        if self.unheld >= SILENT_PAGES {
+    /// No XOFF came behind a record that should have brought one. A loader of another kind may do without, if it shows
+    /// in another way that it is there.
+    fn pass_unheld(&mut self) -> Result<(), Stall> {
+        if !self.alive {
             return Err(Stall::Silent);
         }
-        if self.alive {
-            self.take_all_sent();
-        }
+        self.crossing = None;
         self.alive = false;
+        self.take_all_sent();
         Ok(())
     }
 }

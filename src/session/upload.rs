@@ -210,14 +210,15 @@ impl Upload {
             Message::Loader(LoaderText::Loaded | LoaderText::Started) => {
                 Some(("the loader says it is done before the end of the file was sent".to_owned(), UnitNow::Unknown))
             }
-            Message::Loader(LoaderText::AnyKey)
-            | Message::Prompt(_)
-            | Message::MenuKey(_)
+            Message::Loader(LoaderText::AnyKey) | Message::Prompt(_) => {
+                Some(("the unit asks for something else in the middle of the file".to_owned(), UnitNow::Unknown))
+            }
+            Message::MenuKey(_)
             | Message::Software(_)
             | Message::Network(_)
             | Message::FirstStart
             | Message::Row(_) => {
-                Some(("the unit left its loader in the middle of the file".to_owned(), UnitNow::Unknown))
+                Some(("the unit left its loader in the middle of the file".to_owned(), UnitNow::Application))
             }
         };
         match failed {
@@ -226,13 +227,19 @@ impl Upload {
                     transfer.heard();
                 }
             }
-            Some((what, unit)) => self.fail(desk, end, what, unit),
+            Some((what, unit)) => {
+                desk.transmitter.clear();
+                if unit != UnitNow::Loader {
+                    // What was on its way may have been keys for a menu: leave whatever dialogue they opened.
+                    desk.leave_dialogue();
+                }
+                self.fail(desk, end, what, unit);
+            }
         }
     }
 
-    /// Stops sending at once, then listens to what comes behind `mark`, for what the unit is now.
-    fn fail(&mut self, desk: &mut Desk<'_>, mark: u64, what: String, unit: UnitNow) {
-        desk.transmitter.clear();
+    /// Nothing is sent any more; what comes behind `mark` says what the unit is now.
+    fn fail(&mut self, desk: &Desk<'_>, mark: u64, what: String, unit: UnitNow) {
         self.mark = mark;
         self.stage = Stage::Failing { what, unit };
         self.deadline = Some(desk.now + RESTART);
@@ -434,6 +441,7 @@ impl Upload {
                     Stall::Held => "the loader stopped us (XOFF) and did not let us go on",
                     Stall::Silent => "the loader has fallen silent",
                 };
+                desk.transmitter.clear();
                 self.fail(desk, desk.received, what.to_owned(), unit);
             }
         }

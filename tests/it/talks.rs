@@ -74,7 +74,8 @@ fn a_stream_survives_a_power_cycle() {
     bench.ask(Command::StreamOn { source: Source::ProcessValue, period: Duration::from_millis(300) });
     bench.power_cycle(Duration::from_secs(1));
     let end = bench.now + Duration::from_secs(5);
-    let row = bench.run_until(end, |event| matches!(event, Event::Row { row, .. } if row.source == Source::ProcessValue));
+    let row =
+        bench.run_until(end, |event| matches!(event, Event::Row { row, .. } if row.source == Source::ProcessValue));
     assert!(row.is_some(), "{}", bench.transcript());
 }
 

@@ -54,11 +54,13 @@ fn arrows_point_downward() {
     let mut reversed = Vec::new();
     for (path, text) in sources() {
         let Some(module) = module_of(&path) else { continue };
-        let allowed = arrows.get(module.as_str()).unwrap_or_else(|| panic!("{module} has no place in the list of arrows"));
+        let allowed =
+            arrows.get(module.as_str()).unwrap_or_else(|| panic!("{module} has no place in the list of arrows"));
         for (number, line) in code_lines(&text) {
             for used in crate_paths(line) {
                 let is_loop = path.ends_with(TUI_LOOP) && used == "host";
-                if used != module && !is_loop && arrows.contains_key(used.as_str()) && !allowed.contains(&used.as_str()) {
+                if used != module && !is_loop && arrows.contains_key(used.as_str()) && !allowed.contains(&used.as_str())
+                {
                     reversed.push(format!("{}:{number}: {module} -> {used}", path.display()));
                 }
             }
@@ -86,7 +88,12 @@ fn the_pure_part_touches_no_system() {
 
 #[test]
 fn nothing_is_left_open() {
-    let marks = ["to".to_owned() + "do!(", "unimplemented".to_owned() + "!(", "#[ig".to_owned() + "nore", "FIX".to_owned() + "ME"];
+    let marks = [
+        "to".to_owned() + "do!(",
+        "unimplemented".to_owned() + "!(",
+        "#[ig".to_owned() + "nore",
+        "FIX".to_owned() + "ME",
+    ];
     for (path, text) in sources().into_iter().chain(files("tests", "rs")) {
         for mark in &marks {
             assert!(!text.contains(mark.as_str()), "{} holds {mark}", path.display());

@@ -110,10 +110,14 @@ fn a_power_cut_at_any_record_leaves_a_unit_that_a_second_upload_saves() {
         bench.power_cycle(Duration::from_millis(500));
         let outcome = bench.outcome();
         let axcon::session::Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
-        assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "cut at {cut}: {report:?}");
-        // The loader does not say which product it belongs to: somebody has to.
-        let report = bench.load(order(image.clone()));
-        assert_eq!(report.verdict, Verdict::Refused, "cut at {cut}: {report:?}");
+        // Before the header has arrived the old software is intact and comes back; then the loader waits for ever.
+        let now = if cut == 0 { UnitNow::Application } else { UnitNow::Loader };
+        assert_eq!((report.verdict, report.unit), (Verdict::Failed, now), "cut at {cut}: {report:?}");
+        if now == UnitNow::Loader {
+            // It does not say which product it belongs to: somebody has to.
+            let report = bench.load(order(image.clone()));
+            assert_eq!(report.verdict, Verdict::Refused, "cut at {cut}: {report:?}");
+        }
         let mut again = order(image.clone());
         again.product = Some("AXTC4CO".into());
         let report = bench.load(again);

@@ -200,3 +200,14 @@ pub fn flash_with(image: &CheckedImage) -> Vec<u8> {
 pub fn order(image: CheckedImage) -> LoadOrder {
     LoadOrder { image, password: Secret::new(b"AXIO-2010".to_vec()), product: None }
 }
+
+fn checked(product: &str, version: &str, words: u32) -> CheckedImage {
+    let product = Product::named(product).expect("a product of this name");
+    let version: Version = version.parse().expect("a version");
+    let target = product.target();
+    let recipe = make::Recipe { target: &target, version, words, flaw: None };
+    let file = make::make(&recipe).expect("an image of this size");
+    let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
+    let report = axcon::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice can be read");
+    report.image().unwrap_or_else(|| panic!("{:?}", report.defects))
+}
