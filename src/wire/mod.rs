@@ -4,6 +4,7 @@
 //! unknown is text.
 
 pub mod stream;
+pub mod visible;
 
 /// What a line, prompt or page means.
 #[derive(Clone, Debug, PartialEq)]
