@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn one_thread_carries_both_directions_and_notices_the_end() {
-        let pty = Pty::open().expect("a pseudo-terminal");
+        let pty = Pty::open(115_200).expect("a pseudo-terminal");
         let (inputs, received) = super::super::channel();
         let (mut lines, outgoing) =
             open(pty.path(), Options { baud: 115_200 }, Clock::start(), inputs).expect("opened");

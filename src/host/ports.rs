@@ -206,7 +206,7 @@ mod tests {
     fn ports_are_ordered_as_a_person_counts() {
         let mut names = ["/dev/ttyUSB10", "/dev/ttyS0", "/dev/ttyUSB9", "COM3", "COM12"];
         names.sort_by_key(|name| natural_key(name));
-        assert_eq!(names, ["COM3", "COM12", "/dev/ttyS0", "/dev/ttyUSB9", "/dev/ttyUSB10"]);
+        assert_eq!(names, ["/dev/ttyS0", "/dev/ttyUSB9", "/dev/ttyUSB10", "COM3", "COM12"]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! One descriptor of the client's side stays open (the keeper), so that clients come and go without a hang-up on our
 //! side. A fresh pseudo-terminal echoes and edits lines, so it is made raw before the first byte, and again when the
-//! last client has gone, as a real port forgets its settings. The client's settings are read on our side: the line
+//! last client has gone. The client's settings are read on our side: the line
 //! rate it chose, and whether it obeys XOFF.
 
 use std::fs;
@@ -42,11 +42,11 @@ pub enum Visit {
 }
 
 impl Pty {
-    /// A new pseudo-terminal, raw, with nobody on it.
+    /// A new pseudo-terminal, raw, with nobody on it, at this line rate until a client sets another.
     ///
     /// # Errors
     /// If the system gives none.
-    pub fn open() -> io::Result<Self> {
+    pub fn open(baud: u32) -> io::Result<Self> {
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
         let master = openpt(flags)?;
         unlockpt(&master)?;
@@ -58,6 +58,10 @@ impl Pty {
         rustix::fs::fcntl_setfl(&master, rustix::fs::fcntl_getfl(&master)? | rustix::fs::OFlags::NONBLOCK)?;
         // Watching begins behind the keeper's own opening.
         let watch = watch::Watch::start(&path)?;
+        let mut settings = tcgetattr(&keeper)?;
+        settings.input_modes -= InputModes::IXON;
+        settings.set_speed(baud)?;
+        tcsetattr(&keeper, OptionalActions::Now, &settings)?;
         let pty = Pty { master, keeper, path, watch };
         pty.reset()?;
         Ok(pty)
@@ -68,19 +72,22 @@ impl Pty {
         &self.path
     }
 
-    /// Makes the port as new: raw, unlocked, empty. For when the last client has gone.
+    /// Makes the port ready for the next client: raw, running, unlocked, empty. Line rate and flow control stay as the
+    /// last client left them, as on real ports, where `stty` sets them for the program that comes next.
     ///
     /// # Errors
     /// If the system refuses.
     pub fn reset(&self) -> io::Result<()> {
         let mut settings = tcgetattr(&self.keeper)?;
+        let kept = settings.input_modes & InputModes::IXON;
         settings.make_raw();
-        // With IXON on and off again, an output that an XOFF has stopped runs again.
-        settings.input_modes |= InputModes::IXON;
         settings.input_modes -= InputModes::IXOFF | InputModes::IXANY;
-        tcsetattr(&self.keeper, OptionalActions::Now, &settings)?;
-        settings.input_modes -= InputModes::IXON;
-        tcsetattr(&self.keeper, OptionalActions::Now, &settings)?;
+        // With IXON on and off again, an output that an XOFF has stopped runs again.
+        for flow_control in [InputModes::IXON, InputModes::empty(), kept] {
+            settings.input_modes -= InputModes::IXON;
+            settings.input_modes |= flow_control;
+            tcsetattr(&self.keeper, OptionalActions::Now, &settings)?;
+        }
         // A client that was killed leaves its lock behind.
         ioctl_tiocnxcl(&self.keeper)?;
         tcflush(&self.keeper, QueueSelector::IOFlush)?;
@@ -128,7 +135,8 @@ impl Pty {
         Ok(written)
     }
 
-    /// Bytes that the client has not read yet.
+    /// Bytes that the client has not read yet. What was written a moment ago may be missing: the kernel carries it over
+    /// in its own time.
     pub fn unread(&self) -> u64 {
         rustix::io::ioctl_fionread(&self.keeper).unwrap_or(0)
     }
@@ -339,8 +347,14 @@ mod tests {
 
     #[test]
     fn a_fresh_port_neither_echoes_nor_stops() {
-        let pty = Pty::open().expect("a pseudo-terminal");
+        let pty = Pty::open(115_200).expect("a pseudo-terminal");
         assert_eq!(pty.write(b"boot\r\n\x13").expect("written"), 7);
+        for _ in 0..1_000 {
+            if pty.unread() == 7 {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
         assert_eq!(pty.unread(), 7);
         let mut buffer = [0; 16];
         assert_eq!(pty.read(&mut buffer).expect("read"), 0, "nothing comes back");
@@ -350,7 +364,7 @@ mod tests {
 
     #[test]
     fn clients_are_seen_coming_and_going() {
-        let pty = Pty::open().expect("a pseudo-terminal");
+        let pty = Pty::open(115_200).expect("a pseudo-terminal");
         drop(fs::File::options().read(true).write(true).open(pty.path()).expect("opened"));
         assert_eq!(pty.visits().expect("visits"), [Visit::Opened, Visit::Closed]);
     }

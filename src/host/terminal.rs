@@ -114,6 +114,18 @@ pub fn listen(inputs: SyncSender<Input>) -> io::Result<()> {
     Ok(())
 }
 
+/// Whether reading standard input is harmless: a background job that reads its terminal is stopped by the system.
+pub fn may_read_standard_input() -> bool {
+    #[cfg(unix)]
+    {
+        let stdin = io::stdin();
+        if stdin.is_terminal() {
+            return rustix::termios::tcgetpgrp(&stdin).is_ok_and(|foreground| foreground == rustix::process::getpgrp());
+        }
+    }
+    true
+}
+
 fn take_screen() -> io::Result<()> {
     enable_raw_mode()?;
     TAKEN.store(SCREEN, Ordering::SeqCst);

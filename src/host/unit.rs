@@ -168,7 +168,7 @@ impl HostedUnit {
     /// # Errors
     /// If the system gives no pseudo-terminal or no thread.
     pub fn start<U: Hosted>(unit: U, hosting: Hosting) -> Result<Self, HostError> {
-        let pty = Pty::open().map_err(|error| HostError::Pty("open", error))?;
+        let pty = Pty::open(BAUD).map_err(|error| HostError::Pty("open", error))?;
         let (ring, bell) = io::pipe().map_err(|error| HostError::Pty("watch", error))?;
         let (commands, orders) = sync_channel(COMMANDS);
         let counts = Arc::new(Counts::default());
@@ -436,8 +436,12 @@ impl<U: Hosted> Host<U> {
     /// Lets the client read what was sent: the hang-up that follows discards it.
     fn farewell(&self) {
         let until = self.clock.now() + FAREWELL;
-        while self.clients > 0 && self.pty.unread() > 0 && self.clock.now() < until {
+        while self.clients > 0 && self.clock.now() < until {
+            // First a moment: what was just written takes one to reach the client's side.
             thread::sleep(FAREWELL_STEP);
+            if self.pty.unread() == 0 {
+                return;
+            }
         }
     }
 }
