@@ -3,6 +3,7 @@
 pub mod emulate;
 pub mod error;
 pub mod image;
+pub mod link;
 pub mod output;
 pub mod ports;
 pub mod terminal;

@@ -9,6 +9,7 @@ mod framer;
 mod menu;
 mod prompt;
 pub mod stream;
+pub mod visible;
 mod words;
 
 pub use boot::LoaderText;

@@ -1,0 +1,166 @@
+//! From `--port` to an open link: which port, and what to do when it does not open.
+
+use std::sync::mpsc::SyncSender;
+
+use super::Global;
+use super::error::{CliError, Kind};
+use crate::host::Input;
+use crate::host::clock::Clock;
+use crate::host::link::{Cause, Connection, LinkError, LinkSpec, LinkSpecError, Options};
+use crate::host::ports::{self, Port};
+use crate::host::pump::PumpError;
+use crate::host::recorder::Plan;
+
+/// The link that the user named, or the only USB serial port there is.
+///
+/// # Errors
+/// If the name makes no sense, or none was given and there is not exactly one candidate.
+pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
+    match &global.port {
+        Some(text) => text.parse().map_err(|error: LinkSpecError| {
+            let refused = CliError::new(Kind::Usage, anyhow::Error::new(error.clone()).context("--port"));
+            match error {
+                LinkSpecError::Unsupported { scheme: "tcp://" } => {
+                    refused.hint("'socat pty,link=/tmp/unit,raw tcp:HOST:PORT' makes a port of it: --port /tmp/unit")
+                }
+                LinkSpecError::Unsupported { .. } | LinkSpecError::UnknownProduct { .. } | LinkSpecError::Empty => {
+                    refused
+                }
+            }
+        }),
+        None => only_port(ports::list().map_err(|error| CliError::new(Kind::PortNone, error))?),
+    }
+}
+
+/// Opens a link as the command line says.
+///
+/// # Errors
+/// If it does not open, with what to do about it.
+pub fn open(spec: &LinkSpec, global: &Global, clock: Clock, inputs: SyncSender<Input>) -> Result<Connection, CliError> {
+    Connection::open(spec, Options { baud: global.baud }, clock, inputs).map_err(link_error)
+}
+
+/// Where a session is recorded, as the command line says.
+pub fn recording(global: &Global) -> Plan {
+    match &global.record {
+        _ if global.no_record => Plan::Nothing,
+        Some(file) => Plan::File(file.clone()),
+        None => Plan::Unasked,
+    }
+}
+
+/// What a failed link means to the user, and what helps.
+pub fn link_error(error: LinkError) -> CliError {
+    let kind = match &error.cause {
+        Cause::Missing => Kind::PortMissing,
+        Cause::Denied { .. } => Kind::PortDenied,
+        Cause::Busy { .. } => Kind::PortBusy,
+        Cause::NotSerial { .. } | Cause::Gone | Cause::Stuck { .. } | Cause::Io(_) => Kind::PortGone,
+        Cause::Baud { .. } => Kind::Usage,
+    };
+    let mut hints = Vec::new();
+    match &error.cause {
+        Cause::Missing => {
+            hints.push("'axcon ports' lists what there is; is the adapter plugged in?".to_owned());
+        }
+        Cause::Denied { group: Some(group) } => {
+            hints.push(format!("join the group that has access, then log in again: sudo usermod -aG {group} $USER"));
+        }
+        Cause::Denied { group: None } => hints.push("ask the owner of the port for access".to_owned()),
+        Cause::Busy { holder: Some(holder) } => hints.push(format!("close {holder} first")),
+        Cause::Busy { holder: None } => {
+            hints.push("close the other program; 'sudo fuser PORT' names it".to_owned());
+        }
+        Cause::NotSerial { .. } => hints.push("'axcon ports' lists the serial ports".to_owned()),
+        Cause::Gone => {
+            hints.push("plug the adapter in again; its name may be another one then: 'axcon ports'".to_owned())
+        }
+        Cause::Stuck { .. } => hints.push("unplug the adapter and plug it in again".to_owned()),
+        Cause::Baud { .. } => hints.push("the units have 115200: leave --baud away, or use another adapter".to_owned()),
+        Cause::Io(_) => {}
+    }
+    let mut refused = CliError::new(kind, error);
+    refused.hints = hints;
+    refused
+}
+
+/// What the end of a headless session means to the user, where the command knows nothing better.
+pub fn pump_error(error: PumpError) -> CliError {
+    match error {
+        PumpError::Link(error) => link_error(error),
+        PumpError::Send { .. } => CliError::new(Kind::PortGone, error),
+        PumpError::Deadline => CliError::new(Kind::NoAnswer, error),
+        PumpError::Interrupted(_) => CliError::new(Kind::Interrupted, error),
+    }
+}
+
+fn only_port(found: Vec<Port>) -> Result<LinkSpec, CliError> {
+    let names = |ports: &[&Port]| ports.iter().map(|port| port.path.clone()).collect::<Vec<_>>().join(", ");
+    let usb: Vec<&Port> = found.iter().filter(|port| port.kind == ports::Kind::Usb).collect();
+    match usb.as_slice() {
+        [only] => Ok(LinkSpec::Serial(only.path.clone().into())),
+        [] => {
+            let others: Vec<&Port> = found.iter().collect();
+            let error = CliError::message(Kind::PortNone, "there is no USB serial port");
+            let error = if others.is_empty() {
+                error.hint("plug the adapter in; 'axcon ports' lists the ports")
+            } else {
+                error.hint(format!("there are others: {}; name one with --port", names(&others)))
+            };
+            Err(error.hint("an emulated unit needs no port: --port emu:axtc4co"))
+        }
+        several => {
+            let message = format!("there are {} USB serial ports: {}", several.len(), names(several));
+            Err(CliError::message(Kind::PortAmbiguous, message).hint("name one with --port, or set AXCON_PORT"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::host::ports::Holder;
+
+    fn port(path: &str, kind: ports::Kind) -> Port {
+        Port { path: path.into(), kind, usb: None, driver: None }
+    }
+
+    #[test]
+    fn only_a_single_usb_port_is_taken_unasked() {
+        use ports::Kind::{Native, Usb};
+        assert_eq!(
+            only_port(vec![port("/dev/ttyUSB0", Usb), port("/dev/ttyS0", Native)]).expect("the only one"),
+            LinkSpec::Serial("/dev/ttyUSB0".into())
+        );
+        let error = only_port(vec![port("/dev/ttyUSB0", Usb), port("/dev/ttyUSB1", Usb)]).expect_err("two");
+        assert_eq!(error.kind, Kind::PortAmbiguous);
+        assert_eq!(error.to_string(), "there are 2 USB serial ports: /dev/ttyUSB0, /dev/ttyUSB1");
+        let error = only_port(vec![port("/dev/ttyS0", Native)]).expect_err("none on USB");
+        assert_eq!(error.kind, Kind::PortNone);
+        assert_eq!(error.hints[0], "there are others: /dev/ttyS0; name one with --port");
+        assert_eq!(only_port(Vec::new()).expect_err("none").kind, Kind::PortNone);
+    }
+
+    #[test]
+    fn every_cause_has_its_kind_and_says_what_helps() {
+        use crate::host::link::Operation::Open;
+        let shown = |cause| {
+            let error = link_error(LinkError { port: "/dev/ttyUSB0".into(), operation: Open, cause });
+            (error.kind, error.hints.join("; "))
+        };
+        let holder = Holder { name: "picocom".into(), pid: 7 };
+        for (cause, kind, hint) in [
+            (Cause::Missing, Kind::PortMissing, "plugged in"),
+            (Cause::Denied { group: Some("dialout".into()) }, Kind::PortDenied, "-aG dialout"),
+            (Cause::Busy { holder: Some(holder) }, Kind::PortBusy, "close picocom (process 7)"),
+            (Cause::Busy { holder: None }, Kind::PortBusy, "fuser"),
+            (Cause::NotSerial { what: "a directory" }, Kind::PortGone, "axcon ports"),
+            (Cause::Gone, Kind::PortGone, "plug the adapter in again"),
+            (Cause::Baud { asked: 3_000_000, set: 9_600 }, Kind::Usage, "115200"),
+        ] {
+            let (found, hints) = shown(cause);
+            assert_eq!(found, kind);
+            assert!(hints.contains(hint), "{hints}");
+        }
+    }
+}

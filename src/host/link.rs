@@ -1,0 +1,378 @@
+//! A link to a unit: what the user wrote, and the open connection.
+//!
+//! A connection is a thread that reads and one that writes. The session owns flow control, so XON and XOFF pass both
+//! ways as bytes, and nothing here asks the system whether bytes are "out": a pseudo-terminal and most USB adapters do
+//! not know. What the unit has taken, only its answers tell.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+use std::sync::mpsc::{SyncSender, TrySendError};
+
+use super::Input;
+use super::clock::Clock;
+use super::ports::{self, Holder};
+use crate::device::Product;
+use crate::time::Duration;
+
+#[cfg(windows)]
+use super::duplex as serial;
+#[cfg(unix)]
+use super::serial;
+
+/// Where a unit is, as `--port` says it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LinkSpec {
+    /// A serial port: a path, or `COM3`.
+    Serial(PathBuf),
+    /// An emulated unit in this process.
+    Emulated(&'static Product),
+}
+
+/// Why a link makes no sense.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LinkSpecError {
+    /// Nothing was named.
+    #[error("the link is empty")]
+    Empty,
+    /// No such product can be emulated.
+    #[error("there is no emulated '{name}'; there is {}", known.join(", "))]
+    UnknownProduct {
+        /// What was asked for.
+        name: String,
+        /// What there is, as links.
+        known: Vec<String>,
+    },
+    /// A kind of link that this version does not open.
+    #[error("{scheme} links are not supported yet")]
+    Unsupported {
+        /// Which kind, as it is written.
+        scheme: &'static str,
+    },
+}
+
+impl std::str::FromStr for LinkSpec {
+    type Err = LinkSpecError;
+
+    fn from_str(text: &str) -> Result<Self, LinkSpecError> {
+        for scheme in ["tcp://", "rfc2217://", "replay:"] {
+            if starts_with(text, scheme) {
+                return Err(LinkSpecError::Unsupported { scheme });
+            }
+        }
+        if text.is_empty() {
+            return Err(LinkSpecError::Empty);
+        }
+        if !starts_with(text, EMULATED) {
+            return Ok(LinkSpec::Serial(PathBuf::from(text)));
+        }
+        let name = &text[EMULATED.len()..];
+        let unknown = || LinkSpecError::UnknownProduct {
+            name: name.to_owned(),
+            known: Product::all().iter().map(|product| format!("{EMULATED}{}", product.name.to_lowercase())).collect(),
+        };
+        Product::named(name).map(LinkSpec::Emulated).ok_or_else(unknown)
+    }
+}
+
+impl fmt::Display for LinkSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LinkSpec::Serial(path) => path.display().fmt(f),
+            LinkSpec::Emulated(product) => write!(f, "{EMULATED}{}", product.name.to_lowercase()),
+        }
+    }
+}
+
+/// What went wrong, with which port, while doing what.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot {operation} {port}: {cause}")]
+pub struct LinkError {
+    /// The port as the user named it.
+    pub port: String,
+    /// What was being done.
+    pub operation: Operation,
+    /// What came of it.
+    pub cause: Cause,
+}
+
+/// What was being done with a port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operation {
+    /// Opening it.
+    Open,
+    /// Setting it up.
+    Configure,
+    /// Reading.
+    Read,
+    /// Writing.
+    Write,
+}
+
+impl fmt::Display for Operation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Operation::Open => "open",
+            Operation::Configure => "set up",
+            Operation::Read => "read from",
+            Operation::Write => "write to",
+        })
+    }
+}
+
+/// Why an operation on a port failed.
+#[derive(Debug, thiserror::Error)]
+pub enum Cause {
+    /// There is no such port.
+    #[error("there is no such port")]
+    Missing,
+    /// The system denies access.
+    #[error("permission denied{}", group.as_ref().map(|group| format!(" (it belongs to group '{group}')")).unwrap_or_default())]
+    Denied {
+        /// The group that has access, where the system tells.
+        group: Option<String>,
+    },
+    /// Another program has it.
+    #[error("in use by {}", holder.as_ref().map_or_else(|| "another program".to_owned(), Holder::to_string))]
+    Busy {
+        /// Who, where the system tells.
+        holder: Option<Holder>,
+    },
+    /// It is something else.
+    #[error("{what}, not a serial port")]
+    NotSerial {
+        /// What it is.
+        what: &'static str,
+    },
+    /// It has gone away: unplugged, or the other side of a pseudo-terminal closed.
+    #[error("the port has gone")]
+    Gone,
+    /// The hardware does another line rate than it was asked for.
+    #[error("it runs at {set} baud when asked for {asked}")]
+    Baud {
+        /// What was asked.
+        asked: u32,
+        /// What the driver set.
+        set: u32,
+    },
+    /// It takes no more bytes.
+    #[error("it has taken no byte for {} s", after.as_secs())]
+    Stuck {
+        /// For how long.
+        after: Duration,
+    },
+    /// Anything else the system says.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+/// How to open a serial port. It is always 8 data bits, no parity, one stop bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Line rate.
+    pub baud: u32,
+}
+
+/// An open link. Dropping it closes the port, within [`CLOSE_PATIENCE`] and little more, whatever the other side does.
+#[derive(Debug)]
+pub struct Connection {
+    // Closed in this order: first our side, then the unit that hangs on the other.
+    lines: serial::Lines,
+    #[cfg(unix)]
+    unit: Option<super::unit::HostedUnit>,
+    outgoing: Option<SyncSender<Vec<u8>>>,
+    port: String,
+    settings: String,
+    driver: Option<String>,
+}
+
+/// Bytes could not be queued.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SendError {
+    /// [`QUEUED`] pieces already wait: nobody takes them.
+    #[error("too much waits to be sent")]
+    Full,
+    /// The port is gone; the channel says why.
+    #[error("the port has gone")]
+    Gone,
+}
+
+/// Pieces that wait for the writer at most. A session sends a record and waits for the answer; hundreds of pieces mean
+/// that nothing leaves any more.
+pub const QUEUED: usize = 256;
+
+/// How long the port may take no byte before it counts as gone. Nothing here obeys XOFF, so only a dead driver or the
+/// full pipe of a pseudo-terminal that nobody reads takes this long.
+pub const WRITE_PATIENCE: Duration = Duration::from_secs(5);
+
+/// How long closing waits for queued bytes to leave: enough for the key that leaves a sub-menu, at any line rate.
+pub const CLOSE_PATIENCE: Duration = Duration::from_millis(300);
+
+const EMULATED: &str = "emu:";
+
+impl Connection {
+    /// Opens a link and starts reading. What comes is put on `inputs`, stamped by `clock`; while that is full, nothing
+    /// is read.
+    ///
+    /// # Errors
+    /// If the port cannot be opened or set up, or the emulated unit cannot be hosted.
+    pub fn open(spec: &LinkSpec, options: Options, clock: Clock, inputs: SyncSender<Input>) -> Result<Self, LinkError> {
+        match spec {
+            LinkSpec::Serial(path) => {
+                let (lines, outgoing) = serial::open(path, options, clock, inputs)?;
+                let driver = ports::describe(path).driver;
+                Ok(Connection::new(spec, options, lines, outgoing, driver))
+            }
+            LinkSpec::Emulated(product) => Connection::emulated(spec, product, options, clock, inputs),
+        }
+    }
+
+    #[cfg(unix)]
+    fn emulated(
+        spec: &LinkSpec,
+        product: &'static Product,
+        options: Options,
+        clock: Clock,
+        inputs: SyncSender<Input>,
+    ) -> Result<Self, LinkError> {
+        use super::unit::{HostedUnit, Hosting, Power, factory_unit};
+
+        let failed = |error: anyhow::Error| LinkError {
+            port: spec.to_string(),
+            operation: Operation::Open,
+            cause: Cause::Io(io::Error::other(error)),
+        };
+        let hosting = Hosting { power: Power::AtFirstClient, ..Hosting::default() };
+        let unit = HostedUnit::start(factory_unit(product, 0), hosting).map_err(|error| failed(error.into()))?;
+        let (lines, outgoing) = serial::open(unit.serial(), options, clock, inputs)?;
+        let mut connection = Connection::new(spec, options, lines, outgoing, Some("emulator".into()));
+        connection.unit = Some(unit);
+        Ok(connection)
+    }
+
+    #[cfg(not(unix))]
+    fn emulated(
+        spec: &LinkSpec,
+        _product: &'static Product,
+        _options: Options,
+        _clock: Clock,
+        _inputs: SyncSender<Input>,
+    ) -> Result<Self, LinkError> {
+        let cause = Cause::Io(io::Error::new(
+            io::ErrorKind::Unsupported,
+            "emulated units need pseudo-terminals, which this system does not have",
+        ));
+        Err(LinkError { port: spec.to_string(), operation: Operation::Open, cause })
+    }
+
+    fn new(
+        spec: &LinkSpec,
+        options: Options,
+        lines: serial::Lines,
+        outgoing: SyncSender<Vec<u8>>,
+        driver: Option<String>,
+    ) -> Self {
+        Connection {
+            lines,
+            #[cfg(unix)]
+            unit: None,
+            outgoing: Some(outgoing),
+            port: spec.to_string(),
+            settings: format!("{} 8N1", options.baud),
+            driver,
+        }
+    }
+
+    /// Queues bytes for the line. Never waits.
+    ///
+    /// # Errors
+    /// If the port is gone or takes nothing.
+    pub fn send(&self, bytes: impl Into<Vec<u8>>) -> Result<(), SendError> {
+        let outgoing = self.outgoing.as_ref().ok_or(SendError::Gone)?;
+        outgoing.try_send(bytes.into()).map_err(|error| match error {
+            TrySendError::Full(_) => SendError::Full,
+            TrySendError::Disconnected(_) => SendError::Gone,
+        })
+    }
+
+    /// The port as the user named it.
+    pub fn port(&self) -> &str {
+        &self.port
+    }
+
+    /// Line settings, e.g. `115200 8N1`.
+    pub fn settings(&self) -> &str {
+        &self.settings
+    }
+
+    /// Driver of the port, where known.
+    pub fn driver(&self) -> Option<&str> {
+        self.driver.as_deref()
+    }
+
+    /// The emulated unit at the other end, if it lives in this process.
+    #[cfg(unix)]
+    pub fn unit(&self) -> Option<&super::unit::HostedUnit> {
+        self.unit.as_ref()
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        // The writer ends when the queue is empty and closed.
+        self.outgoing = None;
+        self.lines.close(CLOSE_PATIENCE);
+    }
+}
+
+fn starts_with(text: &str, scheme: &str) -> bool {
+    text.get(..scheme.len()).is_some_and(|start| start.eq_ignore_ascii_case(scheme))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_are_read_as_documented() {
+        let read = |text: &str| text.parse::<LinkSpec>();
+        assert_eq!(read("/dev/ttyUSB0"), Ok(LinkSpec::Serial("/dev/ttyUSB0".into())));
+        assert_eq!(read("COM3"), Ok(LinkSpec::Serial("COM3".into())));
+        assert_eq!(read("EMU:AxTc4Co").map(|link| link.to_string()), Ok("emu:axtc4co".to_owned()));
+        assert_eq!(read(""), Err(LinkSpecError::Empty));
+        let error = read("emu:toaster").expect_err("no such product").to_string();
+        assert!(error.starts_with("there is no emulated 'toaster'; there is emu:axtc4co"), "{error}");
+        for (text, scheme) in
+            [("tcp://host:1", "tcp://"), ("RFC2217://host:1", "rfc2217://"), ("replay:a.cast", "replay:")]
+        {
+            assert_eq!(read(text), Err(LinkSpecError::Unsupported { scheme }), "{text}");
+        }
+    }
+
+    #[test]
+    fn errors_say_port_operation_and_cause() {
+        let error = |operation, cause| LinkError { port: "/dev/ttyUSB0".into(), operation, cause }.to_string();
+        for (said, expected) in [
+            (error(Operation::Open, Cause::Missing), "cannot open /dev/ttyUSB0: there is no such port"),
+            (
+                error(Operation::Open, Cause::Denied { group: Some("dialout".into()) }),
+                "cannot open /dev/ttyUSB0: permission denied (it belongs to group 'dialout')",
+            ),
+            (
+                error(Operation::Open, Cause::Busy { holder: Some(Holder { name: "picocom".into(), pid: 7 }) }),
+                "cannot open /dev/ttyUSB0: in use by picocom (process 7)",
+            ),
+            (
+                error(Operation::Open, Cause::NotSerial { what: "a directory" }),
+                "cannot open /dev/ttyUSB0: a directory, not a serial port",
+            ),
+            (error(Operation::Read, Cause::Gone), "cannot read from /dev/ttyUSB0: the port has gone"),
+            (
+                error(Operation::Configure, Cause::Baud { asked: 250_000, set: 9_600 }),
+                "cannot set up /dev/ttyUSB0: it runs at 9600 baud when asked for 250000",
+            ),
+        ] {
+            assert_eq!(said, expected);
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! Which serial ports there are, what they hang on, and who holds them.
+
+use std::path::{Path, PathBuf};
+
+use serialport::SerialPortType;
+
+/// A serial port of this computer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Port {
+    /// What to open.
+    pub path: String,
+    /// What it hangs on.
+    pub kind: Kind,
+    /// USB vendor and product.
+    pub usb: Option<Usb>,
+    /// The kernel's driver, where the system tells.
+    pub driver: Option<String>,
+}
+
+/// What a port hangs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A USB adapter or device.
+    Usb,
+    /// A UART of the computer itself.
+    Native,
+    /// A pseudo-terminal, named by hand: the system lists none.
+    Pty,
+    /// A Bluetooth serial profile.
+    Bluetooth,
+}
+
+impl Kind {
+    /// The stable name in JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Kind::Usb => "usb",
+            Kind::Native => "native",
+            Kind::Pty => "pty",
+            Kind::Bluetooth => "bluetooth",
+        }
+    }
+}
+
+/// What a USB device says about itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Usb {
+    /// Vendor.
+    pub vid: u16,
+    /// Product.
+    pub pid: u16,
+    /// Serial number, where it has one.
+    pub serial_number: Option<String>,
+    /// Maker, in its own words.
+    pub manufacturer: Option<String>,
+    /// Product, in its own words.
+    pub product: Option<String>,
+}
+
+/// A process that has a port open.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Holder {
+    /// Name of the program, as the system shows it.
+    pub name: String,
+    /// Process number.
+    pub pid: u32,
+}
+
+impl std::fmt::Display for Holder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} (process {})", self.name, self.pid)
+    }
+}
+
+/// All serial ports, USB first, each kind in the order of its numbers.
+///
+/// # Errors
+/// If the system does not list them.
+pub fn list() -> Result<Vec<Port>, serialport::Error> {
+    // serialport 4.10 panics where the directory is missing, as in small containers.
+    if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
+        return Ok(Vec::new());
+    }
+    let mut ports: Vec<Port> =
+        serialport::available_ports()?.into_iter().filter(|info| !is_phantom(&info.port_name)).map(port).collect();
+    ports.sort_by_key(|port| (port.kind != Kind::Usb, natural_key(&port.path)));
+    Ok(ports)
+}
+
+/// What a path names, for one that a list need not hold.
+pub fn describe(path: &Path) -> Port {
+    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let listed = list().unwrap_or_default().into_iter().find(|port| Path::new(&port.path) == target);
+    let kind = if target.starts_with("/dev/pts") { Kind::Pty } else { Kind::Native };
+    listed.unwrap_or_else(|| Port { path: path.display().to_string(), kind, usb: None, driver: None })
+}
+
+/// The first process that has the port open, apart from the host of a pseudo-terminal itself. `None` also where the
+/// system does not say: other users' processes are not visible.
+pub fn holder(path: &Path) -> Option<Holder> {
+    processes::holder(path)
+}
+
+fn port(info: serialport::SerialPortInfo) -> Port {
+    let (kind, usb) = match info.port_type {
+        SerialPortType::UsbPort(usb) => (
+            Kind::Usb,
+            Some(Usb {
+                vid: usb.vid,
+                pid: usb.pid,
+                serial_number: usb.serial_number,
+                manufacturer: usb.manufacturer,
+                product: usb.product,
+            }),
+        ),
+        SerialPortType::BluetoothPort => (Kind::Bluetooth, None),
+        SerialPortType::PciPort | SerialPortType::Unknown => (Kind::Native, None),
+    };
+    Port { driver: driver(&info.port_name), path: info.port_name, kind, usb }
+}
+
+fn driver(path: &str) -> Option<String> {
+    let link = sysfs(path)?.join("device/driver");
+    Some(std::fs::read_link(link).ok()?.file_name()?.to_string_lossy().into_owned())
+}
+
+/// Whether the kernel made a node for a UART that is not there: the 8250 driver always makes a few.
+fn is_phantom(path: &str) -> bool {
+    let kind = sysfs(path).and_then(|port| std::fs::read_to_string(port.join("type")).ok());
+    kind.is_some_and(|kind| kind.trim() == "0")
+}
+
+fn sysfs(path: &str) -> Option<PathBuf> {
+    cfg!(target_os = "linux").then(|| Path::new("/sys/class/tty").join(path.strip_prefix("/dev/").unwrap_or(path)))
+}
+
+/// Orders `ttyUSB10` behind `ttyUSB9`.
+fn natural_key(path: &str) -> (String, u64) {
+    let digits = path.bytes().rev().take_while(u8::is_ascii_digit).count();
+    let (name, number) = path.split_at(path.len() - digits);
+    (name.to_owned(), number.parse().unwrap_or(0))
+}
+
+#[cfg(target_os = "linux")]
+mod processes {
+    //! Open files of processes, as `/proc` shows them.
+
+    use std::fs;
+    use std::path::Path;
+
+    use super::Holder;
+
+    pub fn holder(path: &Path) -> Option<Holder> {
+        let target = fs::canonicalize(path).ok()?;
+        let mut pids: Vec<u32> =
+            fs::read_dir("/proc").ok()?.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).collect();
+        pids.sort_unstable();
+        let pid = pids.into_iter().find(|&pid| holds(pid, &target))?;
+        let name = fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
+        Some(Holder { name: name.trim_end().to_owned(), pid })
+    }
+
+    /// Whether the process uses the port. The host of a pseudo-terminal keeps one descriptor of the client's side
+    /// open; that one does not count.
+    fn holds(pid: u32, target: &Path) -> bool {
+        let Ok(files) = fs::read_dir(format!("/proc/{pid}/fd")) else { return false };
+        let mut uses = 0;
+        let mut hosts = false;
+        for file in files.flatten() {
+            let Ok(open) = fs::read_link(file.path()) else { continue };
+            if open == target {
+                uses += 1;
+            } else if open.ends_with("ptmx") {
+                hosts |= hosted(pid, &file.file_name().to_string_lossy()).is_some_and(|pts| pts == target);
+            }
+        }
+        uses > usize::from(hosts)
+    }
+
+    /// The client's side of the pseudo-terminal whose master this descriptor is.
+    fn hosted(pid: u32, fd: &str) -> Option<std::path::PathBuf> {
+        let info = fs::read_to_string(format!("/proc/{pid}/fdinfo/{fd}")).ok()?;
+        let index = info.lines().find_map(|line| line.strip_prefix("tty-index:"))?;
+        Some(Path::new("/dev/pts").join(index.trim()))
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod processes {
+    //! Not known how to ask here.
+
+    use std::path::Path;
+
+    use super::Holder;
+
+    pub fn holder(_path: &Path) -> Option<Holder> {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ports_are_ordered_as_a_person_counts() {
+        let mut names = ["/dev/ttyUSB10", "/dev/ttyS0", "/dev/ttyUSB9", "COM3", "COM12"];
+        names.sort_by_key(|name| natural_key(name));
+        assert_eq!(names, ["/dev/ttyS0", "/dev/ttyUSB9", "/dev/ttyUSB10", "COM3", "COM12"]);
+    }
+
+    #[test]
+    fn listing_never_fails_where_there_is_nothing() {
+        for port in list().expect("a list, if an empty one") {
+            assert!(!port.path.is_empty());
+        }
+        assert_eq!(holder(Path::new("/nowhere/ttyUSB0")), None);
+    }
+}

@@ -1,0 +1,123 @@
+//! Runs an endpoint over a connection, without a screen: bytes and deadlines in, bytes out, and a look at the endpoint
+//! after each step.
+
+use std::ops::ControlFlow;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+
+use super::Input;
+use super::clock::Clock;
+use super::link::{Connection, LinkError, SendError};
+use super::recorder::Recorder;
+use crate::endpoint::{Endpoint, Secrecy};
+use crate::record::Direction;
+use crate::time::{Duration, Instant};
+
+/// A connection with the loop that serves it.
+#[derive(Debug)]
+pub struct Pump {
+    connection: Connection,
+    inputs: Receiver<Input>,
+    clock: Clock,
+    recorder: Recorder,
+}
+
+/// Why a loop ended before the command was content. The endpoint is as it was, and the pump can run it again: to
+/// cancel what it does, for example.
+#[derive(Debug, thiserror::Error)]
+pub enum PumpError {
+    /// The port failed.
+    #[error(transparent)]
+    Link(LinkError),
+    /// The port takes no more bytes.
+    #[error("{port}: {error}")]
+    Send {
+        /// Which port.
+        port: String,
+        /// Why.
+        error: SendError,
+    },
+    /// The deadline is over.
+    #[error("no end in time")]
+    Deadline,
+    /// A signal came (its number).
+    #[error("interrupted")]
+    Interrupted(i32),
+}
+
+/// Longest wait for anything: bounds the arithmetic, nothing else.
+const LONGEST_WAIT: Duration = Duration::from_secs(3600);
+
+impl Pump {
+    /// A pump for an open connection, whose inputs (and signals) come on this channel.
+    pub fn new(connection: Connection, inputs: Receiver<Input>, clock: Clock, recorder: Recorder) -> Self {
+        Pump { connection, inputs, clock, recorder }
+    }
+
+    /// Runs until `look` breaks with what the command wanted, or `deadline`. `look` sees the endpoint after each step;
+    /// `secrecy` says whether bytes that arrive now may be recorded.
+    ///
+    /// # Errors
+    /// If the port fails, the deadline passes, or a signal comes.
+    pub fn run<E: Endpoint, T>(
+        &mut self,
+        endpoint: &mut E,
+        deadline: Instant,
+        mut secrecy: impl FnMut(&E) -> Secrecy,
+        mut look: impl FnMut(&mut E, Instant) -> ControlFlow<T>,
+    ) -> Result<T, PumpError> {
+        loop {
+            let now = self.clock.now();
+            endpoint.handle_timeout(now);
+            self.drain(endpoint, now)?;
+            if let ControlFlow::Break(result) = look(endpoint, now) {
+                // A command given in the last look may have something to say.
+                self.drain(endpoint, now)?;
+                return Ok(result);
+            }
+            self.drain(endpoint, now)?;
+            if now >= deadline {
+                return Err(PumpError::Deadline);
+            }
+            let wake = endpoint.poll_timeout().unwrap_or(Instant::NEVER).min(deadline);
+            match self.inputs.recv_timeout(self.clock.until(wake).min(LONGEST_WAIT)) {
+                Ok(Input::Bytes { at, bytes }) => {
+                    self.recorder.push(at, Direction::FromUnit, secrecy(endpoint), &bytes);
+                    endpoint.handle_bytes(at, &bytes);
+                }
+                Ok(Input::Gone(error)) => return Err(PumpError::Link(error)),
+                Ok(Input::Signal(signal)) => return Err(PumpError::Interrupted(signal)),
+                Ok(Input::Terminal(_) | Input::Typed(_) | Input::TypedEnd) | Err(RecvTimeoutError::Timeout) => {}
+                // The connection's threads hold the other end as long as it lives.
+                Err(RecvTimeoutError::Disconnected) => {
+                    let port = self.connection.port().to_owned();
+                    return Err(PumpError::Send { port, error: SendError::Gone });
+                }
+            }
+        }
+    }
+
+    /// The connection.
+    pub fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    /// The clock that all moments are of.
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// The recorder, to ask what became of the recording.
+    pub fn recorder_mut(&mut self) -> &mut Recorder {
+        &mut self.recorder
+    }
+
+    fn drain(&mut self, endpoint: &mut impl Endpoint, now: Instant) -> Result<(), PumpError> {
+        while let Some(transmit) = endpoint.poll_transmit() {
+            self.recorder.push(now, Direction::ToUnit, transmit.secrecy, &transmit.bytes);
+            self.connection
+                .send(transmit.bytes)
+                .map_err(|error| PumpError::Send { port: self.connection.port().to_owned(), error })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,275 @@
+//! Serial ports on Unix: raw, eight bits, no flow control by the kernel, no drain.
+//!
+//! Opened by hand rather than through a library, for three reasons found by measuring: the errors keep their cause
+//! (denied, busy and "not a terminal" need different advice), a failed second open leaves the first one's lock alone,
+//! and the descriptor stays non-blocking, so that a writer can keep a deadline. Opening raises DTR and RTS in every
+//! driver, which many USB devices wait for.
+
+use std::fs;
+use std::io;
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use rustix::event::PollFlags;
+use rustix::fs::{FlockOperation, Mode, OFlags};
+use rustix::io::Errno;
+use rustix::termios::{
+    Action, ControlModes, InputModes, OptionalActions, SpecialCodeIndex, Termios, ioctl_tiocexcl, ioctl_tiocnxcl,
+    isatty, tcflow, tcgetattr, tcsetattr,
+};
+
+use super::Input;
+use super::clock::Clock;
+use super::link::{Cause, LinkError, Operation, Options, QUEUED, WRITE_PATIENCE};
+use super::ports;
+use super::wait::{Stop, Stopper, ready, stop};
+use crate::time::Duration;
+
+/// The two threads of an open port.
+#[derive(Debug)]
+pub struct Lines {
+    port: Arc<OwnedFd>,
+    stopper: Option<Stopper>,
+    reader: Option<JoinHandle<()>>,
+    writer: Option<JoinHandle<()>>,
+    written: Receiver<()>,
+}
+
+/// Bytes read at once: Linux hands out no more than 4 KiB of a terminal's bytes at a time.
+const READ: usize = 4096;
+
+/// How often a reader tries again to hand over bytes while the channel is full. The owner is far behind then, and a
+/// wait on the channel itself could not be called off.
+const RETRY: Duration = Duration::from_millis(2);
+
+/// Opens a port and starts its threads; the sender feeds the writer, which ends when it is dropped.
+pub fn open(
+    path: &Path,
+    options: Options,
+    clock: Clock,
+    inputs: SyncSender<Input>,
+) -> Result<(Lines, SyncSender<Vec<u8>>), LinkError> {
+    let name = path.display().to_string();
+    let failed = |operation| {
+        let port = name.clone();
+        move |cause| LinkError { port, operation, cause }
+    };
+    let port = Arc::new(open_exclusively(path).map_err(failed(Operation::Open))?);
+    configure(&port, options.baud).map_err(failed(Operation::Configure))?;
+
+    let system = |error| failed(Operation::Open)(Cause::Io(error));
+    let (stopper, stopped) = stop().map_err(system)?;
+    let gone = Arc::new(AtomicBool::new(false));
+    let reader = Worker {
+        name: name.clone(),
+        port: port.clone(),
+        stopped: stopped.try_clone().map_err(system)?,
+        inputs: inputs.clone(),
+        gone: gone.clone(),
+    };
+    let writer = Worker { name: name.clone(), port: port.clone(), stopped, inputs, gone };
+    let (outgoing, queue) = sync_channel(QUEUED);
+    let (done, written) = sync_channel(1);
+    let reader = thread::Builder::new().name("port reader".into()).spawn(move || reader.read(clock)).map_err(system)?;
+    let writer = thread::Builder::new()
+        .name("port writer".into())
+        .spawn(move || {
+            writer.write(&queue);
+            let _ = done.try_send(());
+        })
+        .map_err(system)?;
+    let lines = Lines { port, stopper: Some(stopper), reader: Some(reader), writer: Some(writer), written };
+    Ok((lines, outgoing))
+}
+
+impl Lines {
+    /// Ends the threads: what is queued may leave for this long, then everything stops.
+    pub fn close(&mut self, patience: Duration) {
+        match self.written.recv_timeout(patience) {
+            Ok(()) | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
+        }
+        self.stopper = None;
+        for thread in [self.reader.take(), self.writer.take()].into_iter().flatten() {
+            let _ = thread.join();
+        }
+        // The host of a pseudo-terminal keeps the device open, and with it this lock.
+        let _ = ioctl_tiocnxcl(&self.port);
+    }
+}
+
+/// What both threads have.
+struct Worker {
+    name: String,
+    port: Arc<OwnedFd>,
+    stopped: Stop,
+    inputs: SyncSender<Input>,
+    /// Whether one of them has already said that the port is gone.
+    gone: Arc<AtomicBool>,
+}
+
+impl Worker {
+    fn read(self, clock: Clock) {
+        let mut buffer = [0; READ];
+        loop {
+            match ready([(self.port.as_fd(), PollFlags::IN), (self.stopped.as_fd(), PollFlags::IN)], None) {
+                Ok([_, stopped]) if !stopped.is_empty() => return,
+                Ok([port, _]) if port.is_empty() => continue,
+                Ok(_) => {}
+                Err(error) => return self.report(Operation::Read, Cause::Io(error)),
+            }
+            match rustix::io::read(&*self.port, &mut buffer) {
+                Ok(0) => return self.report(Operation::Read, Cause::Gone),
+                Ok(count) => {
+                    let bytes = buffer[..count].to_vec();
+                    if !self.deliver(Input::Bytes { at: clock.now(), bytes }) {
+                        return;
+                    }
+                }
+                Err(Errno::INTR | Errno::AGAIN) => {}
+                Err(error) => return self.report(Operation::Read, cause(error)),
+            }
+        }
+    }
+
+    fn write(&self, queue: &Receiver<Vec<u8>>) {
+        // A connection that has ended, in whatever way, drops the sender.
+        while let Ok(bytes) = queue.recv() {
+            let mut left = bytes.as_slice();
+            while !left.is_empty() {
+                match rustix::io::write(&*self.port, left) {
+                    Ok(count) => left = &left[count..],
+                    Err(Errno::INTR) => {}
+                    Err(Errno::AGAIN) => {
+                        let fds = [(self.port.as_fd(), PollFlags::OUT), (self.stopped.as_fd(), PollFlags::IN)];
+                        match ready(fds, Some(WRITE_PATIENCE)) {
+                            Ok([_, stopped]) if !stopped.is_empty() => return,
+                            Ok([port, _]) if port.is_empty() => {
+                                return self.report(Operation::Write, Cause::Stuck { after: WRITE_PATIENCE });
+                            }
+                            Ok(_) => {}
+                            Err(error) => return self.report(Operation::Write, Cause::Io(error)),
+                        }
+                    }
+                    Err(error) => return self.report(Operation::Write, cause(error)),
+                }
+            }
+        }
+    }
+
+    fn report(&self, operation: Operation, cause: Cause) {
+        if !self.gone.swap(true, Ordering::Relaxed) {
+            self.deliver(Input::Gone(LinkError { port: self.name.clone(), operation, cause }));
+        }
+    }
+
+    /// Puts an input on the channel; `false` if the connection is being closed.
+    fn deliver(&self, mut input: Input) -> bool {
+        loop {
+            match self.inputs.try_send(input) {
+                Ok(()) => return true,
+                Err(TrySendError::Disconnected(_)) => return false,
+                Err(TrySendError::Full(back)) => input = back,
+            }
+            if self.stopped.wait(RETRY) {
+                return false;
+            }
+        }
+    }
+}
+
+fn open_exclusively(path: &Path) -> Result<OwnedFd, Cause> {
+    // Looked at first: opening is not harmless for every file there is (a watchdog starts, a pipe waits).
+    let metadata = fs::metadata(path).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => Cause::Missing,
+        io::ErrorKind::PermissionDenied => Cause::Denied { group: None },
+        _ => Cause::Io(error),
+    })?;
+    let kind = metadata.file_type();
+    if !kind.is_char_device() {
+        let what = if kind.is_dir() {
+            "a directory"
+        } else if kind.is_file() {
+            "a regular file"
+        } else {
+            "a pipe, socket or disk"
+        };
+        return Err(Cause::NotSerial { what });
+    }
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    let port = rustix::fs::open(path, flags, Mode::empty()).map_err(|error| match error {
+        Errno::NOENT => Cause::Missing,
+        Errno::ACCESS | Errno::PERM | Errno::ROFS => Cause::Denied { group: group_name(metadata.gid()) },
+        Errno::BUSY => Cause::Busy { holder: ports::holder(path) },
+        Errno::NXIO | Errno::NODEV | Errno::IO => Cause::Gone,
+        error => Cause::Io(error.into()),
+    })?;
+    if !isatty(&port) {
+        return Err(Cause::NotSerial { what: "some other device" });
+    }
+    // The lock first: TIOCEXCL is the terminal's, not ours, and must not be touched while somebody else works here.
+    match rustix::fs::flock(&port, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => {}
+        Err(Errno::WOULDBLOCK) => return Err(Cause::Busy { holder: ports::holder(path) }),
+        Err(error) => return Err(cause(error)),
+    }
+    ioctl_tiocexcl(&port).map_err(cause)?;
+    Ok(port)
+}
+
+fn configure(port: &OwnedFd, baud: u32) -> Result<(), Cause> {
+    let mut settings = tcgetattr(port).map_err(cause)?;
+    settings.make_raw();
+    settings.special_codes[SpecialCodeIndex::VMIN] = 1;
+    settings.special_codes[SpecialCodeIndex::VTIME] = 0;
+    settings.control_modes |= ControlModes::CREAD | ControlModes::CLOCAL | ControlModes::CS8;
+    settings.control_modes -= ControlModes::PARENB | ControlModes::CSTOPB | ControlModes::CRTSCTS;
+    settings.input_modes -= InputModes::IXOFF | InputModes::IXANY;
+    settings.set_speed(baud).map_err(cause)?;
+    // A former user may have left the output stopped. That state is the terminal's; taking IXON away ends it, but only
+    // if IXON was there.
+    settings.input_modes |= InputModes::IXON;
+    apply(port, &settings)?;
+    settings.input_modes -= InputModes::IXON;
+    apply(port, &settings)?;
+    tcflow(port, Action::OOn).map_err(cause)?;
+
+    // Drivers take a rate they cannot do without complaint: a 16550 then runs at 9600.
+    let set = tcgetattr(port).map_err(cause)?.output_speed();
+    if set.abs_diff(baud) > baud / BAUD_TOLERANCE {
+        return Err(Cause::Baud { asked: baud, set });
+    }
+    Ok(())
+}
+
+/// The part of a line rate by which a driver may miss it: 2 %, half of what 8N1 forgives in all. Some drivers report
+/// the rate their divider really gives.
+const BAUD_TOLERANCE: u32 = 50;
+
+fn apply(port: &OwnedFd, settings: &Termios) -> Result<(), Cause> {
+    tcsetattr(port, OptionalActions::Now, settings).map_err(cause)
+}
+
+fn cause(error: Errno) -> Cause {
+    match error {
+        // An unplugged adapter and the closed side of a pseudo-terminal answer with these.
+        Errno::IO | Errno::NXIO | Errno::NODEV | Errno::PIPE => Cause::Gone,
+        Errno::NOTTY => Cause::NotSerial { what: "some other device" },
+        error => Cause::Io(error.into()),
+    }
+}
+
+/// The name of a group, from the file that has them on most systems; its number elsewhere.
+fn group_name(gid: u32) -> Option<String> {
+    let groups = fs::read_to_string("/etc/group").unwrap_or_default();
+    let name = groups.lines().find_map(|line| {
+        let mut fields = line.split(':');
+        let name = fields.next()?;
+        (fields.nth(1)?.parse() == Ok(gid)).then(|| name.to_owned())
+    });
+    name.or_else(|| Some(gid.to_string()))
+}

@@ -1,0 +1,167 @@
+//! The user's terminal: taken over for a while, and given back on every way out.
+//!
+//! Drop gives it back, the panic hook gives it back before the message is printed, and signals come as inputs
+//! (`signal`), so that the loop ends and drop does its work.
+
+use std::io::{self, IsTerminal, Write, stdout};
+use std::panic;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, Once};
+use std::thread;
+
+use ratatui::DefaultTerminal;
+use ratatui::Terminal;
+use ratatui::backend::CrosstermBackend;
+use ratatui::crossterm::cursor::Show;
+use ratatui::crossterm::event::{self, DisableBracketedPaste, EnableBracketedPaste};
+use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
+use ratatui::crossterm::{execute, queue};
+
+use super::Input;
+
+/// The whole screen, for the console. Gives the terminal back when dropped.
+#[derive(Debug)]
+pub struct Screen {
+    /// For drawing.
+    pub terminal: DefaultTerminal,
+}
+
+/// Raw mode only, for the plain terminal. Gives the terminal back when dropped.
+#[derive(Debug)]
+pub struct RawMode(());
+
+/// What of the terminal is ours at the moment.
+static TAKEN: AtomicU8 = AtomicU8::new(NOTHING);
+const NOTHING: u8 = 0;
+const RAW: u8 = 1;
+const SCREEN: u8 = 2;
+
+impl Screen {
+    /// Takes the terminal: raw mode, alternate screen, pastes in one piece.
+    ///
+    /// # Errors
+    /// If standard output is no terminal, or it refuses.
+    pub fn enter() -> io::Result<Self> {
+        if !stdout().is_terminal() {
+            return Err(io::Error::new(io::ErrorKind::Unsupported, "standard output is not a terminal"));
+        }
+        restore_on_panic();
+        take_screen()?;
+        let terminal = Terminal::new(CrosstermBackend::new(stdout())).inspect_err(|_| restore())?;
+        Ok(Screen { terminal })
+    }
+
+    /// Gives the terminal back, stops the process as Ctrl-Z does, and takes the terminal again when it is continued.
+    /// Everything is drawn anew with the next frame.
+    ///
+    /// # Errors
+    /// If the terminal refuses.
+    #[cfg(unix)]
+    pub fn suspend(&mut self) -> io::Result<()> {
+        restore();
+        rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::STOP)?;
+        take_screen()?;
+        // Not `clear`: that asks the terminal for the cursor, whose answer the key thread would take.
+        let size = self.terminal.size()?;
+        self.terminal.resize(size.into())
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        restore();
+    }
+}
+
+impl RawMode {
+    /// Switches the terminal to raw mode.
+    ///
+    /// # Errors
+    /// If standard input is no terminal, or it refuses.
+    pub fn enter() -> io::Result<Self> {
+        restore_on_panic();
+        enable_raw_mode()?;
+        TAKEN.store(RAW, Ordering::SeqCst);
+        Ok(RawMode(()))
+    }
+}
+
+impl Drop for RawMode {
+    fn drop(&mut self) {
+        restore();
+    }
+}
+
+/// Delivers what the user does at the terminal as [`Input::Terminal`], from a thread that lives as long as the
+/// process: nothing ends a read of the terminal. Started once, behind [`Screen::enter`].
+///
+/// # Errors
+/// If the system gives no thread.
+pub fn listen(inputs: SyncSender<Input>) -> io::Result<()> {
+    thread::Builder::new().name("keys".into()).spawn(move || {
+        // An error means that the terminal is gone; then a hang-up signal comes as well.
+        while let Ok(event) = event::read() {
+            // Windows reports that a key comes up again, which is not a key typed.
+            if matches!(&event, event::Event::Key(key) if key.kind == event::KeyEventKind::Release) {
+                continue;
+            }
+            if inputs.send(Input::Terminal(event)).is_err() {
+                return;
+            }
+        }
+    })?;
+    Ok(())
+}
+
+/// Whether reading standard input is harmless: a background job that reads its terminal is stopped by the system.
+pub fn may_read_standard_input() -> bool {
+    #[cfg(unix)]
+    {
+        let stdin = io::stdin();
+        if stdin.is_terminal() {
+            return rustix::termios::tcgetpgrp(&stdin).is_ok_and(|foreground| foreground == rustix::process::getpgrp());
+        }
+    }
+    true
+}
+
+fn take_screen() -> io::Result<()> {
+    enable_raw_mode()?;
+    TAKEN.store(SCREEN, Ordering::SeqCst);
+    execute!(stdout(), EnterAlternateScreen, EnableBracketedPaste).inspect_err(|_| restore())
+}
+
+/// Gives back what was taken. Harmless if nothing was.
+fn restore() {
+    let taken = TAKEN.swap(NOTHING, Ordering::SeqCst);
+    if taken == SCREEN {
+        let mut out = stdout();
+        let _ = queue!(out, DisableBracketedPaste, LeaveAlternateScreen, Show);
+        let _ = out.flush();
+    }
+    if taken != NOTHING {
+        let _ = disable_raw_mode();
+    }
+}
+
+/// Makes every panic give the terminal back before its message. A panic in a worker also ends the process: its thread
+/// is gone, and the rest would go on with half a program on a terminal that is no longer its own.
+fn restore_on_panic() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let owner = thread::current().id();
+        let report = Arc::new(panic::take_hook());
+        panic::set_hook(Box::new(move |info| {
+            let taken = TAKEN.load(Ordering::SeqCst) != NOTHING;
+            restore();
+            report(info);
+            if taken && thread::current().id() != owner {
+                std::process::exit(PANIC_EXIT_CODE);
+            }
+        }));
+    });
+}
+
+/// What the language's runtime ends with after a panic.
+const PANIC_EXIT_CODE: i32 = 101;

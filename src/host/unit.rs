@@ -1,0 +1,484 @@
+//! An emulated unit on a pseudo-terminal, in real time, in a thread of its own.
+//!
+//! The unit and the cable to it are pure ([`Plugged`]); here they get the clock. A pseudo-terminal hides the line: it
+//! takes some 19 kB at once where a wire takes a character in 87 µs, and when the unit says XOFF all that is already
+//! on its way. So the client's bytes are taken off it no faster than a wire would carry them, never more than a
+//! UART's buffer ahead ([`AHEAD`]); what still lies in the pseudo-terminal counts as not yet sent, and stays there
+//! while the unit holds a client that obeys XOFF. Bytes are counted against the clock in small slices, so a late
+//! wake-up costs no throughput and lets no more bytes slip past an XOFF.
+
+use std::io::{self, PipeWriter, Read, Write};
+use std::os::fd::AsFd;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use rustix::event::PollFlags;
+
+use super::clock::Clock;
+use super::pty::{ClientSettings, Pty, Visit};
+use super::state::{State, StateError};
+use super::wait::ready;
+use crate::device::Product;
+use crate::emulator::cable::{Line, Plugged};
+use crate::emulator::{Setup, Store, Unit};
+use crate::endpoint::Endpoint;
+use crate::image::Identity;
+use crate::rng::Rng;
+use crate::time::{Duration, Instant, character_time};
+use crate::version::Version;
+
+/// What can be hosted: a unit's serial port with the knobs the host needs.
+pub trait Hosted: Endpoint + Send + 'static {
+    /// Supply voltage comes.
+    fn power_on(&mut self, now: Instant);
+    /// Supply voltage goes.
+    fn power_off(&mut self, now: Instant);
+    /// Whether the unit has sent XOFF and not yet XON.
+    fn holds_sender(&self) -> bool;
+    /// The next write to memory that outlives the power.
+    fn poll_store(&mut self) -> Option<Store>;
+}
+
+impl Hosted for Unit {
+    fn power_on(&mut self, now: Instant) {
+        Unit::power_on(self, now);
+    }
+
+    fn power_off(&mut self, now: Instant) {
+        Unit::power_off(self, now);
+    }
+
+    fn holds_sender(&self) -> bool {
+        Unit::holds_sender(self)
+    }
+
+    fn poll_store(&mut self) -> Option<Store> {
+        Unit::poll_store(self)
+    }
+}
+
+/// A hosted unit. Dropping it takes the cable away, after the client had a moment to read what was sent.
+#[derive(Debug)]
+pub struct HostedUnit {
+    serial: PathBuf,
+    counts: Arc<Counts>,
+    commands: SyncSender<Command>,
+    /// A byte on it says that there is a command; its end says that it is over.
+    bell: Option<PipeWriter>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// How a unit is hosted.
+#[derive(Default)]
+pub struct Hosting {
+    /// Whether the client's bytes arrive as on a wire.
+    pub line_rate: LineRate,
+    /// When the unit gets its power.
+    pub power: Power,
+    /// Where the unit's memories are kept; nowhere if `None`.
+    pub state: Option<State>,
+    /// Decides what garbage looks like.
+    pub seed: u64,
+    /// Called once, from the unit's thread, if hosting fails later on.
+    pub failed: Option<Box<dyn FnOnce(HostError) + Send>>,
+}
+
+/// Whether the client's bytes arrive as on a wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LineRate {
+    /// At [`BAUD`]; a client at another rate gets garbage and sends garbage.
+    #[default]
+    Real,
+    /// As fast as they come, whatever rate the client has set.
+    Off,
+}
+
+/// When the unit gets its power.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Power {
+    /// At once, heard by nobody, like a unit on a running machine.
+    #[default]
+    AtStart,
+    /// When the first client opens the port, so that it hears the power-up messages.
+    AtFirstClient,
+}
+
+/// What a hosted unit is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// Switch its supply on.
+    PowerOn,
+    /// Switch its supply off.
+    PowerOff,
+}
+
+/// Why a unit is not hosted, or no longer.
+#[derive(Debug, thiserror::Error)]
+pub enum HostError {
+    /// The pseudo-terminal.
+    #[error("cannot {0} a pseudo-terminal")]
+    Pty(&'static str, #[source] io::Error),
+    /// The state directory.
+    #[error(transparent)]
+    State(#[from] StateError),
+}
+
+/// What became of the bytes, for a bench or a test to look at.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Bytes that reached the unit.
+    pub to_unit: AtomicU64,
+    /// Bytes that the client could read.
+    pub to_client: AtomicU64,
+    /// Bytes of the unit that were lost: the client read too slowly, or was not there.
+    pub lost: AtomicU64,
+}
+
+/// Line rate of all units (AXTC4CO manual, chapter 4).
+pub const BAUD: u32 = 115_200;
+
+/// Characters the line runs ahead of the unit: the transmit buffer of a 16550, which goes on after an XOFF too.
+pub const AHEAD: usize = 16;
+
+/// Shortest time between two wake-ups while bytes flow: 11.5 characters, less than [`AHEAD`], so the line never runs
+/// dry between two of them.
+const TICK: Duration = Duration::from_millis(1);
+
+/// A thread that wakes up later than this does not make up for it: the computer slept.
+const CATCH_UP: Duration = Duration::from_millis(250);
+
+/// Bytes taken at once without a line rate, before the unit's own clock is looked at again.
+const BURST: usize = 4096;
+
+/// How long closing waits for the client to read what was sent; then a hang-up discards it.
+const FAREWELL: Duration = Duration::from_millis(500);
+
+/// How often that is looked at: nobody tells.
+const FAREWELL_STEP: Duration = Duration::from_millis(5);
+
+/// Commands that wait at most: they are a person's.
+const COMMANDS: usize = 16;
+
+impl HostedUnit {
+    /// Puts a unit on a new pseudo-terminal and lets time run.
+    ///
+    /// # Errors
+    /// If the system gives no pseudo-terminal or no thread.
+    pub fn start<U: Hosted>(unit: U, hosting: Hosting) -> Result<Self, HostError> {
+        let pty = Pty::open(BAUD).map_err(|error| HostError::Pty("open", error))?;
+        let (ring, bell) = io::pipe().map_err(|error| HostError::Pty("watch", error))?;
+        let (commands, orders) = sync_channel(COMMANDS);
+        let counts = Arc::new(Counts::default());
+        let serial = pty.path().to_owned();
+        let line = match hosting.line_rate {
+            LineRate::Real => character_time(BAUD),
+            LineRate::Off => Duration::ZERO,
+        };
+        let host = Host {
+            plugged: Plugged::new(unit, Line::new(line, Duration::ZERO)),
+            pty,
+            clock: Clock::start(),
+            at: Instant::ZERO,
+            line_rate: hosting.line_rate,
+            power: hosting.power,
+            state: hosting.state,
+            garbage: Rng::new(hosting.seed),
+            clients: 0,
+            client: ClientSettings { baud: BAUD, obeys_xoff: false },
+            backlog: false,
+            leaving: false,
+            heard: Vec::new(),
+            counts: counts.clone(),
+        };
+        let failed = hosting.failed;
+        let thread = thread::Builder::new()
+            .name("emulated unit".into())
+            .spawn(move || {
+                if let Err(error) = host.run(ring, &orders)
+                    && let Some(failed) = failed
+                {
+                    failed(error);
+                }
+            })
+            .map_err(|error| HostError::Pty("serve", error))?;
+        Ok(HostedUnit { serial, counts, commands, bell: Some(bell), thread: Some(thread) })
+    }
+
+    /// What a client opens.
+    pub fn serial(&self) -> &Path {
+        &self.serial
+    }
+
+    /// What became of the bytes.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Tells the unit's host something; `false` if it does not listen any more.
+    pub fn command(&self, command: Command) -> bool {
+        let queued = match self.commands.try_send(command) {
+            Ok(()) => true,
+            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
+        };
+        queued && self.bell.as_ref().is_some_and(|mut bell| bell.write_all(&[1]).is_ok())
+    }
+}
+
+impl Drop for HostedUnit {
+    fn drop(&mut self) {
+        self.bell = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The thread's own things.
+struct Host<U> {
+    plugged: Plugged<U>,
+    pty: Pty,
+    clock: Clock,
+    /// How far the unit's time has come.
+    at: Instant,
+    line_rate: LineRate,
+    power: Power,
+    state: Option<State>,
+    garbage: Rng,
+    clients: u32,
+    client: ClientSettings,
+    /// Whether the line was full when bytes were last taken: more wait, and follow without a gap.
+    backlog: bool,
+    /// Whether the last client has gone and its last bytes are still to be taken.
+    leaving: bool,
+    /// What the unit has said and the client has not got yet.
+    heard: Vec<u8>,
+    counts: Arc<Counts>,
+}
+
+impl<U: Hosted> Host<U> {
+    fn run(mut self, mut ring: io::PipeReader, orders: &Receiver<Command>) -> Result<(), HostError> {
+        if self.power == Power::AtStart {
+            self.plugged.unit_mut().power_on(self.at);
+        }
+        loop {
+            self.note_visits()?;
+            self.catch_up(self.clock.now())?;
+
+            // While the line is full or the unit holds the client, bytes that wait must not wake us.
+            let input = if self.takes_bytes() && !self.backlog { PollFlags::IN } else { PollFlags::empty() };
+            let timeout = self.wake_at().map(|at| self.clock.until(at));
+            let fds = [(self.pty.as_fd(), input), (self.pty.visits_fd(), PollFlags::IN), (ring.as_fd(), PollFlags::IN)];
+            let [_, _, rung] = ready(fds, timeout).map_err(|error| HostError::Pty("watch", error))?;
+            if rung.is_empty() {
+                continue;
+            }
+            let mut rings = [0; COMMANDS];
+            if matches!(ring.read(&mut rings), Ok(0)) {
+                self.farewell();
+                return Ok(());
+            }
+            self.obey(orders)?;
+        }
+    }
+
+    fn obey(&mut self, orders: &Receiver<Command>) -> Result<(), HostError> {
+        loop {
+            let now = self.clock.now();
+            self.catch_up(now)?;
+            match orders.try_recv() {
+                Ok(Command::PowerOn) => self.plugged.unit_mut().power_on(now),
+                Ok(Command::PowerOff) => self.plugged.unit_mut().power_off(now),
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return Ok(()),
+            }
+        }
+    }
+
+    fn note_visits(&mut self) -> Result<(), HostError> {
+        for visit in self.pty.visits().map_err(|error| HostError::Pty("watch", error))? {
+            match visit {
+                Visit::Opened => {
+                    self.clients += 1;
+                    self.leaving = false;
+                    if self.power == Power::AtFirstClient {
+                        self.power = Power::AtStart;
+                        self.plugged.unit_mut().power_on(self.at.max(self.clock.now()));
+                    }
+                }
+                Visit::Closed => {
+                    self.clients = self.clients.saturating_sub(1);
+                    self.leaving = self.clients == 0;
+                }
+            }
+        }
+        if self.clients > 0 {
+            self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
+        }
+        Ok(())
+    }
+
+    /// Lets the unit's time pass until `now`: in slices while bytes queue up, so that each slice sees what the unit
+    /// said in the one before; else at once.
+    fn catch_up(&mut self, now: Instant) -> Result<(), HostError> {
+        if now.since(self.at) > CATCH_UP {
+            self.at = now - CATCH_UP;
+        }
+        while self.backlog && self.at + TICK < now {
+            self.step(self.at + TICK)?;
+        }
+        self.step(now.max(self.at))
+    }
+
+    fn step(&mut self, at: Instant) -> Result<(), HostError> {
+        self.at = at;
+        match self.line_rate {
+            LineRate::Real => {
+                self.take_bytes(AHEAD.saturating_sub(self.plugged.to_unit().in_flight()))?;
+                self.advance()?;
+            }
+            LineRate::Off => {
+                let mut burst = 0;
+                loop {
+                    burst += self.take_bytes(AHEAD)?;
+                    self.advance()?;
+                    if !self.backlog || !self.takes_bytes() || burst >= BURST {
+                        break;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes at most `room` bytes of the client and puts them on the line.
+    fn take_bytes(&mut self, room: usize) -> Result<usize, HostError> {
+        if !self.takes_bytes() {
+            self.backlog = false;
+            if self.leaving {
+                self.forget_client()?;
+            }
+            return Ok(0);
+        }
+        if room == 0 {
+            return Ok(0);
+        }
+        let mut buffer = [0; AHEAD];
+        let count = self.pty.read(&mut buffer[..room]).map_err(|error| HostError::Pty("read", error))?;
+        self.backlog = count == room;
+        if count == 0 {
+            if self.leaving {
+                self.forget_client()?;
+            }
+            return Ok(0);
+        }
+        // The client may have changed its settings since it opened the port.
+        self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
+        let bytes = &mut buffer[..count];
+        if self.at_wrong_rate() {
+            garble(&mut self.garbage, bytes);
+        }
+        self.plugged.send(self.at, bytes);
+        self.counts.to_unit.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
+
+    /// Whether what waits in the pseudo-terminal may go on the line: not while the unit holds a client that obeys.
+    fn takes_bytes(&self) -> bool {
+        !(self.plugged.unit().holds_sender() && self.client.obeys_xoff)
+    }
+
+    fn advance(&mut self) -> Result<(), HostError> {
+        let heard = &mut self.heard;
+        self.plugged.advance(self.at, |_, bytes| heard.extend_from_slice(bytes));
+        // Memory first: what the unit says about it has to be true.
+        let stores: Vec<Store> = std::iter::from_fn(|| self.plugged.unit_mut().poll_store()).collect();
+        if let Some(state) = &mut self.state
+            && !stores.is_empty()
+        {
+            state.write(&stores)?;
+        }
+        if self.heard.is_empty() {
+            return Ok(());
+        }
+        let mut taken = 0;
+        if self.clients > 0 {
+            self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
+            if self.at_wrong_rate() {
+                garble(&mut self.garbage, &mut self.heard);
+            }
+            taken = self.pty.write(&self.heard).map_err(|error| HostError::Pty("write", error))?;
+        }
+        self.counts.to_client.fetch_add(taken as u64, Ordering::Relaxed);
+        self.counts.lost.fetch_add((self.heard.len() - taken) as u64, Ordering::Relaxed);
+        self.heard.clear();
+        Ok(())
+    }
+
+    fn forget_client(&mut self) -> Result<(), HostError> {
+        self.leaving = false;
+        self.pty.reset().map_err(|error| HostError::Pty("reset", error))
+    }
+
+    fn at_wrong_rate(&self) -> bool {
+        self.line_rate == LineRate::Real && self.client.baud != BAUD
+    }
+
+    /// When to go on even if nothing comes.
+    fn wake_at(&self) -> Option<Instant> {
+        if self.backlog || self.leaving {
+            return Some(self.at + TICK);
+        }
+        self.plugged.poll_timeout().map(|at| at.max(self.at + TICK))
+    }
+
+    /// Lets the client read what was sent: the hang-up that follows discards it.
+    fn farewell(&self) {
+        let until = self.clock.now() + FAREWELL;
+        while self.clients > 0 && self.clock.now() < until {
+            // First a moment: what was just written takes one to reach the client's side.
+            thread::sleep(FAREWELL_STEP);
+            if self.pty.unread() == 0 {
+                return;
+            }
+        }
+    }
+}
+
+/// What a receiver at another rate makes of characters: framing errors, and values nobody sent. Their top bit is set,
+/// as mostly happens when a stop bit is read where data is; so garbage never is a key of the menu.
+fn garble(garbage: &mut Rng, bytes: &mut [u8]) {
+    for byte in bytes {
+        *byte = 0x80 | (garbage.next_u64() as u8);
+    }
+}
+
+/// A unit as it leaves the factory, without power.
+pub fn factory_unit(product: &'static Product, seed: u64) -> Unit {
+    unit(product, seed, factory_flash(product), Vec::new())
+}
+
+/// A unit with these memories, without power; empty `parameters` are fresh ones.
+pub fn unit(product: &'static Product, seed: u64, flash: Vec<u8>, parameters: Vec<u8>) -> Unit {
+    Unit::new(Setup { product, loader: product.loader.kind, seed, flash, parameters })
+}
+
+/// The program flash of a unit as it leaves the factory: an identity block and nothing else, which is all the emulated
+/// application needs to start.
+pub fn factory_flash(product: &Product) -> Vec<u8> {
+    let mut identity = Identity {
+        product: product.name.clone(),
+        version: Version::new(1, 1, 0),
+        build_date: "2010-01-04".into(),
+        build_time: "12:00:00".into(),
+        program_words: 0,
+        crc: 0,
+    };
+    let mut flash = vec![0xFF; product.flash.program_words as usize * 2];
+    identity.stamp(&mut flash[..FACTORY_PROGRAM]);
+    flash
+}
+
+/// Bytes of that program: up to and with the page that holds the identity block.
+const FACTORY_PROGRAM: usize = 512;
