@@ -8,8 +8,8 @@ use super::Input;
 use super::clock::Clock;
 use super::link::{Connection, LinkError, SendError};
 use super::recorder::Recorder;
-use crate::endpoint::{Endpoint, Secrecy};
-use crate::record::Direction;
+use crate::endpoint::Endpoint;
+use crate::record::Record;
 use crate::time::{Duration, Instant};
 
 /// A connection with the loop that serves it.
@@ -54,7 +54,7 @@ impl Pump {
     }
 
     /// Runs until `look` breaks with what the command wanted, or `deadline`. `look` sees the endpoint after each step;
-    /// `secrecy` says whether bytes that arrive now may be recorded.
+    /// `record` gives the endpoint's own record, which the recording follows.
     ///
     /// # Errors
     /// If the port fails, the deadline passes, or a signal comes.
@@ -62,27 +62,27 @@ impl Pump {
         &mut self,
         endpoint: &mut E,
         deadline: Instant,
-        mut secrecy: impl FnMut(&E) -> Secrecy,
+        record: impl Fn(&E) -> &Record,
         mut look: impl FnMut(&mut E, Instant) -> ControlFlow<T>,
     ) -> Result<T, PumpError> {
         loop {
             let now = self.clock.now();
             endpoint.handle_timeout(now);
-            self.drain(endpoint, now)?;
+            self.drain(endpoint, &record)?;
             if let ControlFlow::Break(result) = look(endpoint, now) {
                 // A command given in the last look may have something to say.
-                self.drain(endpoint, now)?;
+                self.drain(endpoint, &record)?;
                 return Ok(result);
             }
-            self.drain(endpoint, now)?;
+            self.drain(endpoint, &record)?;
             if now >= deadline {
                 return Err(PumpError::Deadline);
             }
             let wake = endpoint.poll_timeout().unwrap_or(Instant::NEVER).min(deadline);
             match self.inputs.recv_timeout(self.clock.until(wake).min(LONGEST_WAIT)) {
                 Ok(Input::Bytes { at, bytes }) => {
-                    self.recorder.push(at, Direction::FromUnit, secrecy(endpoint), &bytes);
                     endpoint.handle_bytes(at, &bytes);
+                    self.recorder.follow(record(endpoint));
                 }
                 Ok(Input::Gone(error)) => return Err(PumpError::Link(error)),
                 Ok(Input::Signal(signal)) => return Err(PumpError::Interrupted(signal)),
@@ -111,9 +111,9 @@ impl Pump {
         &mut self.recorder
     }
 
-    fn drain(&mut self, endpoint: &mut impl Endpoint, now: Instant) -> Result<(), PumpError> {
+    fn drain<E: Endpoint>(&mut self, endpoint: &mut E, record: &impl Fn(&E) -> &Record) -> Result<(), PumpError> {
         while let Some(transmit) = endpoint.poll_transmit() {
-            self.recorder.push(now, Direction::ToUnit, transmit.secrecy, &transmit.bytes);
+            self.recorder.follow(record(endpoint));
             self.connection
                 .send(transmit.bytes)
                 .map_err(|error| PumpError::Send { port: self.connection.port().to_owned(), error })?;

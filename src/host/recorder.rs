@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::clock::Clock;
 use super::link::Connection;
 use crate::endpoint::Secrecy;
-use crate::record::{Cast, Direction, Header};
+use crate::record::{Cast, Direction, Header, Record};
 use crate::time::Instant;
 
 /// Where a session is recorded.
@@ -28,6 +28,8 @@ pub enum Plan {
 pub struct Recorder {
     open: Option<Open>,
     warning: Option<String>,
+    /// Entries of the record that [`follow`](Recorder::follow) has written already.
+    followed: u64,
 }
 
 #[derive(Debug)]
@@ -76,7 +78,7 @@ impl Recorder {
 
     /// Records nothing.
     pub fn nothing() -> Self {
-        Recorder { open: None, warning: None }
+        Recorder { open: None, warning: None, followed: 0 }
     }
 
     fn begin(plan: &Plan, header: Header, stem: &str) -> Self {
@@ -88,19 +90,32 @@ impl Recorder {
                 .and_then(|folder| series(folder, stem, header, LIMITS)),
         };
         match opened {
-            Ok(open) => Recorder { open: Some(open), warning: None },
+            Ok(open) => Recorder { open: Some(open), warning: None, followed: 0 },
             Err(error) => {
                 let place = match plan {
                     Plan::File(path) => path.display().to_string(),
                     Plan::Unasked | Plan::Nothing => folder().unwrap_or_default().display().to_string(),
                 };
-                Recorder { open: None, warning: Some(format!("this session is not recorded: {place}: {error}")) }
+                Recorder {
+                    open: None,
+                    warning: Some(format!("this session is not recorded: {place}: {error}")),
+                    followed: 0,
+                }
             }
         }
     }
 
+    /// Writes what has come to a session's record since the last call. To be called after each input, so that a process
+    /// that is killed has recorded what it has shown.
+    pub fn follow(&mut self, record: &Record) {
+        let from = std::mem::replace(&mut self.followed, record.entry_count());
+        for entry in record.entries_from(from) {
+            self.push(entry.at, entry.direction, entry.secrecy, &entry.bytes);
+        }
+    }
+
     /// Records bytes; secret ones by their number only.
-    pub fn push(&mut self, at: Instant, direction: Direction, secrecy: Secrecy, bytes: &[u8]) {
+    fn push(&mut self, at: Instant, direction: Direction, secrecy: Secrecy, bytes: &[u8]) {
         let Some(open) = &mut self.open else { return };
         let pushed = open.cast.push(at, direction, secrecy, bytes).and_then(|()| open.next_part_if_full());
         if let Err(error) = pushed {
@@ -248,7 +263,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let limits = Limits { bytes: 2_000, files: 100, part_bytes: 500 };
         let open = series(folder.path().to_owned(), "20260131T120000Z-u0-7", header(), limits).expect("opened");
-        let mut recorder = Recorder { open: Some(open), warning: None };
+        let mut recorder = Recorder { open: Some(open), warning: None, followed: 0 };
         for round in 0..100 {
             recorder.push(Instant::from_millis(round), Direction::FromUnit, Secrecy::Open, &[b'x'; 50]);
         }
