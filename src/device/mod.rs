@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 
 use serde::Deserialize;
 
-use crate::image::FlashMap;
+use crate::image::{FlashMap, Target};
 use crate::version::Version;
 use crate::wire::stream;
 
@@ -117,6 +117,11 @@ impl Product {
     /// The product of this name, in any case.
     pub fn named(name: &str) -> Option<&'static Product> {
         Product::all().iter().find(|product| product.name.eq_ignore_ascii_case(name))
+    }
+
+    /// What the check of an image needs to know of this product.
+    pub fn target(&self) -> Target {
+        Target { product: self.name.clone(), flash: self.flash, file_name: self.loader.file_name.clone() }
     }
 
     /// What the upload file of a version is called.

@@ -1,13 +1,27 @@
 //! Program images: S-record files, what they hold, and whether they may be sent.
+//!
+//! [`check`] reads a file of any size once and gives a [`Report`] with every defect in it; only a report without an
+//! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] knows one line, [`make`]
+//! builds sample files. This module does not know the products: whoever asks passes them as [`Target`]s.
 
 mod check;
+mod defect;
 pub mod identity;
+mod lines;
+pub mod make;
+mod report;
 pub mod srecord;
+mod whole;
 
 use serde::Deserialize;
 
-pub use check::CheckedImage;
+use crate::version::Version;
+
+pub use check::check;
+pub use defect::{Defect, DefectId, Severity, UnknownDefect};
 pub use identity::{Identity, IdentityError};
+pub use lines::LineEnd;
+pub use report::{AddressRange, CheckedImage, Facts, Format, Report};
 
 /// What an address of an image counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
@@ -17,6 +31,29 @@ pub enum AddressUnit {
     Word,
     /// Bytes.
     Byte,
+}
+
+impl AddressUnit {
+    /// The name in JSON and in product files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            AddressUnit::Word => "word",
+            AddressUnit::Byte => "byte",
+        }
+    }
+
+    /// Bytes at one address.
+    pub const fn bytes(self) -> u32 {
+        match self {
+            AddressUnit::Word => 2,
+            AddressUnit::Byte => 1,
+        }
+    }
+
+    /// Addresses that so many bytes take; half a word takes a whole one.
+    pub const fn addresses(self, bytes: usize) -> u64 {
+        (bytes as u64).div_ceil(self.bytes() as u64)
+    }
 }
 
 /// The program flash of a product.
@@ -29,6 +66,40 @@ pub struct FlashMap {
     pub program_words: u32,
     /// 16-bit words that are erased and written together.
     pub page_words: u32,
+}
+
+impl FlashMap {
+    /// The first address behind the program flash, in the map's unit.
+    pub fn end(&self) -> u64 {
+        self.address_unit.addresses(self.program_words as usize * 2)
+    }
+}
+
+/// A product an image may be for, as far as an image's check needs to know it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Target {
+    /// Product name as identity blocks write it.
+    pub product: String,
+    /// Its program flash.
+    pub flash: FlashMap,
+    /// How its upload files are named, `{version}` standing for the version.
+    pub file_name: String,
+}
+
+impl Target {
+    /// The version a file name claims to hold, if the name is one of this product's.
+    ///
+    /// Copies are often renamed (`AXTC4CO_V1.2.0 (1).elf.S`), so only the start of the name has to fit.
+    pub fn version_in_name(&self, file_name: &str) -> Option<Version> {
+        let (before, _) = self.file_name.split_once("{version}")?;
+        let start = file_name.get(..before.len())?;
+        let rest = file_name.get(before.len()..)?;
+        if !start.eq_ignore_ascii_case(before) {
+            return None;
+        }
+        let end = rest.find(|found: char| !found.is_ascii_digit() && found != '.').unwrap_or(rest.len());
+        rest.get(..end)?.trim_end_matches('.').parse().ok()
+    }
 }
 
 /// A program image as its file gives it: decoded, in the file's order.
@@ -49,6 +120,27 @@ pub struct Image {
 pub struct Block {
     /// Address of the first byte, in the image's unit.
     pub address: u32,
-    /// The bytes, at least one.
+    /// The bytes, at least one; whole words where addresses count words.
     pub data: Vec<u8>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_name_tells_its_version_even_when_a_copy_was_renamed() {
+        let target = Target {
+            product: "AXTC4CO".into(),
+            flash: FlashMap { address_unit: AddressUnit::Word, program_words: 0x10000, page_words: 256 },
+            file_name: "AXTC4CO_V{version}.elf.S".into(),
+        };
+        for name in ["AXTC4CO_V1.2.0.elf.S", "axtc4co_v1.2.0.elf.s", "AXTC4CO_V1.2.0 (1).elf.S", "AXTC4CO_V1.2.0.S"] {
+            assert_eq!(target.version_in_name(name), Some(Version::new(1, 2, 0)), "{name}");
+        }
+        for name in ["", "AXTC4CO", "AXTC4CO_Vx.y.z.elf.S", "AXRTD8CO_V1.2.0.elf.S", "AXTC4CO_V1.2.elf.S", "ÄXTC4CO_V1"]
+        {
+            assert_eq!(target.version_in_name(name), None, "{name}");
+        }
+    }
 }

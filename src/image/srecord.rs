@@ -484,15 +484,22 @@ mod tests {
         fn the_srec_crate_agrees_about_valid_records((kind, address, data) in any_record()) {
             let text = Record { kind, address, data: &data }.to_text();
             let text = String::from_utf8_lossy(&text).into_owned();
+            // The crate panics on a header that is not UTF-8.
+            prop_assume!(kind != Kind::Header);
             let theirs = text.parse::<srec::Record>();
-            match kind {
-                Kind::Data16 => prop_assert_eq!(theirs, Ok(srec::Record::S1(srec::Data { address: srec::Address16(address as u16), data }))),
-                Kind::Data32 => prop_assert_eq!(theirs, Ok(srec::Record::S3(srec::Data { address: srec::Address32(address), data }))),
-                Kind::Start32 => prop_assert_eq!(theirs, Ok(srec::Record::S7(srec::Address32(address)))),
-                Kind::Start16 => prop_assert_eq!(theirs, Ok(srec::Record::S9(srec::Address16(address as u16)))),
-                // The crate wants UTF-8 in a header and has no public way to compare the other types.
-                Kind::Header | Kind::Data24 | Kind::Count16 | Kind::Count24 | Kind::Start24 => {}
-            }
+            let narrow = address as u16;
+            let ours = match kind {
+                Kind::Header => return Ok(()),
+                Kind::Data16 => srec::Record::S1(srec::Data { address: srec::Address16(narrow), data }),
+                Kind::Data24 => srec::Record::S2(srec::Data { address: srec::Address24(address), data }),
+                Kind::Data32 => srec::Record::S3(srec::Data { address: srec::Address32(address), data }),
+                Kind::Count16 => srec::Record::S5(srec::Count16(narrow)),
+                Kind::Count24 => srec::Record::S6(srec::Count24(address)),
+                Kind::Start32 => srec::Record::S7(srec::Address32(address)),
+                Kind::Start24 => srec::Record::S8(srec::Address24(address)),
+                Kind::Start16 => srec::Record::S9(srec::Address16(narrow)),
+            };
+            prop_assert_eq!(theirs, Ok(ours));
         }
     }
 }
