@@ -1,0 +1,4 @@
+//! What several stories need.
+
+pub mod screen;
+pub mod shell;
