@@ -5,7 +5,7 @@
 //! a bound that only a hang exceeds.
 
 use std::fs;
-use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt, symlink};
 use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex};
@@ -388,6 +388,22 @@ fn a_client_that_was_killed_while_held_leaves_a_port_that_works() {
     let (connection, received) = connect(unit.serial(), 115_200);
     connection.send(*b"m").expect("sent");
     assert!(receive(&received, 1).ends_with(b"m"));
+}
+
+#[test]
+fn visitors_do_not_disturb_the_client_that_stays() {
+    let unit = host(echo());
+    let (connection, received) = connect(unit.serial(), 115_200);
+    for round in 0..20u8 {
+        // As `stty` and `fuser` do, faster than anybody can look.
+        for _ in 0..5 {
+            // Not as a controlling terminal: its hang-up would end the tests.
+            let flags = rustix::fs::OFlags::NOCTTY.bits() as i32;
+            drop(fs::File::options().read(true).custom_flags(flags).open(unit.serial()).expect("opened"));
+        }
+        connection.send([round]).expect("sent");
+        assert_eq!(receive(&received, 1), [round]);
+    }
 }
 
 // The plain terminal.
