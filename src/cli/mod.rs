@@ -2,10 +2,13 @@
 
 pub mod emulate;
 pub mod error;
+pub mod identify;
 pub mod image;
 pub mod link;
 pub mod output;
 pub mod ports;
+pub mod stream;
+pub mod talk;
 pub mod terminal;
 
 use std::ffi::OsString;
@@ -55,6 +58,10 @@ pub struct Global {
 enum Command {
     /// List the serial ports, and who holds them.
     Ports(ports::Args),
+    /// Find out what is at the other end.
+    Identify(identify::Args),
+    /// Switch the data stream on and write it down.
+    Stream(stream::Args),
     /// A plain terminal: keys out, bytes in.
     Terminal(terminal::Args),
     /// Host emulated units on pseudo-terminals.
@@ -82,6 +89,8 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
     match cli.command {
         None => Ok(()),
         Some(Command::Ports(args)) => ports::run(args, global, output),
+        Some(Command::Identify(args)) => identify::run(args, global, output),
+        Some(Command::Stream(args)) => stream::run(args, global, output),
         Some(Command::Terminal(args)) => terminal::run(args, global, output),
         Some(Command::Emulate(args)) => emulate::run(args, global, output),
         Some(Command::Image(args)) => image::run(args, global, output),

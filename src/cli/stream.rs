@@ -137,7 +137,8 @@ fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
     Ok(first.zip(last).map(|((begun, _), (ended, source))| {
         let period = (rows > 1).then(|| ended.since(begun) / (rows - 1));
         // Rows come at whole milliseconds; the clock that saw them is not that exact.
-        let period = period.map(|period| Duration::from_millis((period.as_secs_f64() * 1000.0).round().max(1.0) as u64));
+        let period =
+            period.map(|period| Duration::from_millis((period.as_secs_f64() * 1000.0).round().max(1.0) as u64));
         Found { source, period }
     }))
 }
@@ -154,7 +155,11 @@ fn write_rows(
         if let Event::Row { at, span, row } = event {
             sink.row(*at, row, &session.record().bytes(*span), output)?;
         }
-        Ok(if count.is_some_and(|count| sink.rows >= count) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        Ok(if count.is_some_and(|count| sink.rows >= count) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        })
     });
     match result {
         Ok(_) => Ok(()),
@@ -250,7 +255,9 @@ impl Sink {
         self.rows += 1;
         match &mut self.file {
             None => output.data(&text),
-            Some((path, file)) => file.write_all(&text).and_then(|()| file.flush()).map_err(|error| file_error(path, error)),
+            Some((path, file)) => {
+                file.write_all(&text).and_then(|()| file.flush()).map_err(|error| file_error(path, error))
+            }
         }
     }
 
@@ -305,10 +312,9 @@ fn state(reading: Reading) -> &'static str {
 }
 
 fn seconds(seconds: f64) -> Result<Duration, CliError> {
-    Duration::try_from_secs_f64(seconds)
-        .ok()
-        .filter(|duration| !duration.is_zero())
-        .ok_or_else(|| CliError::message(Kind::Usage, format!("--duration {seconds} is not a length of time in seconds")))
+    Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero()).ok_or_else(|| {
+        CliError::message(Kind::Usage, format!("--duration {seconds} is not a length of time in seconds"))
+    })
 }
 
 fn create(path: &PathBuf) -> Result<(PathBuf, BufWriter<File>), CliError> {

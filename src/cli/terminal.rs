@@ -1,9 +1,8 @@
 //! `axcon terminal`: keys out, bytes in.
 //!
-//! The unit's XON and XOFF are obeyed here, by sending no faster than the line carries: what a driver has once taken
-//! goes out whatever the unit says.
+//! A session stands between the two, so that the unit's XON and XOFF are obeyed and a password is recorded by its number
+//! of characters only; it runs no job.
 
-use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, IsTerminal, Read, Write};
 use std::path::PathBuf;
@@ -13,17 +12,17 @@ use super::Global;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
-use crate::endpoint::Secrecy;
+use crate::endpoint::Endpoint;
 use crate::host::clock::Clock;
 use crate::host::link::Connection;
 use crate::host::recorder::Recorder;
 use crate::host::signal::Signals;
 use crate::host::terminal::RawMode;
 use crate::host::{self, Input};
-use crate::record::Direction;
-use crate::time::character_time;
+use crate::session::{Command, Session};
 use crate::time::{Duration, Instant};
 use crate::wire::visible::{Controls, Visible};
+use crate::wire::{XOFF, XON};
 
 /// Arguments of `axcon terminal`.
 ///
@@ -39,8 +38,6 @@ pub struct Args {
 
 /// Ctrl-], as in telnet: no menu of a unit uses it.
 const LEAVE: u8 = 0x1D;
-const XON: u8 = 0x11;
-const XOFF: u8 = 0x13;
 
 /// How long the line must have been silent after the end of the input: a unit answers a key much faster, and repeats
 /// its diagnostics every second.
@@ -48,9 +45,6 @@ const SILENCE: Duration = Duration::from_secs(1);
 
 /// How long the beginning of a UTF-8 character waits for its end before it is shown as bytes.
 const HALF_CHARACTER: Duration = Duration::from_millis(100);
-
-/// Characters sent at once: what may slip past an XOFF, the transmit buffer of a 16550.
-const AT_ONCE: usize = 16;
 
 /// Bytes of standard input taken at once, and how many may wait before the next are asked for.
 const TYPED: usize = 1024;
@@ -87,7 +81,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         clock,
         more,
         asked_for_more: true,
-        typist: Typist::new(global.baud),
+        session: Session::new(global.baud),
         shown: Visible::new(Controls::Layout),
         interactive,
         ended: false,
@@ -114,7 +108,7 @@ struct Conversation {
     /// Asks the reader of standard input for the next piece, so that a long file waits there and not here.
     more: SyncSender<()>,
     asked_for_more: bool,
-    typist: Typist,
+    session: Session,
     shown: Visible,
     interactive: bool,
     /// Whether standard input has ended.
@@ -128,7 +122,7 @@ impl Conversation {
         loop {
             let now = self.clock.now();
             self.send(now)?;
-            let silent_at = (self.ended && self.typist.is_empty()).then(|| self.last + SILENCE);
+            let silent_at = (self.ended && self.session.waiting() == 0).then(|| self.last + SILENCE);
             if silent_at.is_some_and(|at| at <= now) {
                 return self.show(&[], true, output);
             }
@@ -136,7 +130,7 @@ impl Conversation {
             if whole_at.is_some_and(|at| at <= now) {
                 self.show(&[], true, output)?;
             }
-            let wake = [silent_at, whole_at, self.typist.poll_timeout()].into_iter().flatten().min();
+            let wake = [silent_at, whole_at, self.session.poll_timeout()].into_iter().flatten().min();
             let input = match wake {
                 None => inputs.recv().map_err(|_| RecvTimeoutError::Disconnected),
                 Some(at) => inputs.recv_timeout(self.clock.until(at)),
@@ -149,7 +143,7 @@ impl Conversation {
                 Ok(Input::Typed(bytes)) => {
                     self.asked_for_more = false;
                     let leaves = self.interactive.then(|| bytes.iter().position(|&byte| byte == LEAVE)).flatten();
-                    self.typist.type_bytes(&bytes[..leaves.unwrap_or(bytes.len())]);
+                    self.type_keys(&bytes[..leaves.unwrap_or(bytes.len())], output);
                     if leaves.is_some() {
                         return self.send(self.clock.now());
                     }
@@ -167,11 +161,12 @@ impl Conversation {
     }
 
     fn hear(&mut self, at: Instant, bytes: &[u8], output: &mut Output) -> Result<(), CliError> {
-        self.recorder.push(at, Direction::FromUnit, Secrecy::Open, bytes);
+        self.session.handle_bytes(at, bytes);
+        self.recorder.follow(self.session.record());
+        while self.session.poll_event().is_some() {}
         if let Some((path, log)) = &mut self.log {
             log.write_all(bytes).map_err(|error| log_error(path, error))?;
         }
-        bytes.iter().for_each(|&byte| self.typist.hear(byte));
         let text: Vec<u8> = bytes.iter().copied().filter(|byte| !matches!(*byte, XON | XOFF)).collect();
         self.show(&text, false, output)
     }
@@ -185,67 +180,26 @@ impl Conversation {
         if text.is_empty() { Ok(()) } else { output.data(text.as_bytes()) }
     }
 
+    fn type_keys(&mut self, keys: &[u8], output: &mut Output) {
+        if let Err(refusal) = self.session.command(self.clock.now(), Command::Keys(keys.to_vec())) {
+            output.remark(&format!("axcon: {refusal}"));
+        }
+    }
+
     fn send(&mut self, now: Instant) -> Result<(), CliError> {
-        while let Some(bytes) = self.typist.poll(now) {
+        self.session.handle_timeout(now);
+        while self.session.poll_event().is_some() {}
+        while let Some(transmit) = self.session.poll_transmit() {
             self.last = now;
-            // Some of it may be the password, and nobody here can tell.
-            self.recorder.push(now, Direction::ToUnit, Secrecy::Secret, &bytes);
+            self.recorder.follow(self.session.record());
             self.connection
-                .send(bytes)
+                .send(transmit.bytes)
                 .map_err(|error| CliError::message(Kind::PortGone, format!("{}: {error}", self.connection.port())))?;
         }
-        if !self.asked_for_more && self.typist.waiting() <= WAITING {
+        if !self.asked_for_more && self.session.waiting() <= WAITING {
             self.asked_for_more = self.more.try_send(()).is_ok();
         }
         Ok(())
-    }
-}
-
-/// Sends what is typed, no faster than the line carries it, and not while the unit holds us.
-#[derive(Debug)]
-struct Typist {
-    queue: VecDeque<u8>,
-    character_time: Duration,
-    free_at: Instant,
-    held: bool,
-}
-
-impl Typist {
-    fn new(baud: u32) -> Self {
-        Typist { queue: VecDeque::new(), character_time: character_time(baud), free_at: Instant::ZERO, held: false }
-    }
-
-    fn type_bytes(&mut self, bytes: &[u8]) {
-        self.queue.extend(bytes);
-    }
-
-    fn hear(&mut self, byte: u8) {
-        match byte {
-            XOFF => self.held = true,
-            XON => self.held = false,
-            _ => {}
-        }
-    }
-
-    fn poll(&mut self, now: Instant) -> Option<Vec<u8>> {
-        if self.poll_timeout()? > now {
-            return None;
-        }
-        let bytes: Vec<u8> = self.queue.drain(..self.queue.len().min(AT_ONCE)).collect();
-        self.free_at = self.free_at.max(now) + self.character_time * bytes.len() as u32;
-        Some(bytes)
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        (!self.held && !self.queue.is_empty()).then_some(self.free_at)
-    }
-
-    fn is_empty(&self) -> bool {
-        self.queue.is_empty()
-    }
-
-    fn waiting(&self) -> usize {
-        self.queue.len()
     }
 }
 
@@ -285,34 +239,4 @@ fn open_log(path: PathBuf) -> Result<(PathBuf, File), CliError> {
 
 fn log_error(path: &std::path::Path, error: io::Error) -> CliError {
     CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot write the log '{}'", path.display())))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn typing_keeps_the_line_rate_and_stops_at_xoff() {
-        let mut typist = Typist::new(115_200);
-        typist.type_bytes(&[b'x'; 40]);
-        assert_eq!(typist.poll(Instant::ZERO).map(|bytes| bytes.len()), Some(16));
-        assert_eq!(typist.poll(Instant::ZERO), None, "the line is busy");
-        let free = typist.poll_timeout().expect("more to send");
-        assert_eq!(free.as_nanos() / 1_000, 1_388);
-        typist.hear(XOFF);
-        assert_eq!(typist.poll(free), None);
-        assert_eq!(typist.poll_timeout(), None, "nothing to wake up for while held");
-        typist.hear(b'.');
-        typist.hear(XON);
-        assert_eq!(typist.poll(free).map(|bytes| bytes.len()), Some(16));
-        assert_eq!(typist.waiting(), 8);
-    }
-
-    #[test]
-    fn a_single_key_leaves_at_once() {
-        let mut typist = Typist::new(115_200);
-        typist.type_bytes(b"m");
-        assert_eq!(typist.poll(Instant::from_millis(5)).as_deref(), Some(&b"m"[..]));
-        assert!(typist.is_empty());
-    }
 }

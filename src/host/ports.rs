@@ -120,7 +120,15 @@ fn port(info: serialport::SerialPortInfo) -> Port {
 }
 
 fn driver(path: &str) -> Option<String> {
-    let link = sysfs(path)?.join("device/driver");
+    let mut device = std::fs::canonicalize(sysfs(path)?.join("device")).ok()?;
+    // Since Linux 6.5 a UART has two more devices between itself and its hardware, whose driver is called "port".
+    while target_name(&device.join("subsystem"))? == "serial-base" {
+        device.pop();
+    }
+    target_name(&device.join("driver"))
+}
+
+fn target_name(link: &Path) -> Option<String> {
     Some(std::fs::read_link(link).ok()?.file_name()?.to_string_lossy().into_owned())
 }
 

@@ -365,7 +365,9 @@ mod tests {
     #[test]
     fn clients_are_seen_coming_and_going() {
         let pty = Pty::open(115_200).expect("a pseudo-terminal");
-        drop(fs::File::options().read(true).write(true).open(pty.path()).expect("opened"));
+        // Not as a controlling terminal: its hang-up would end the tests.
+        let flags = rustix::fs::OFlags::RDWR | rustix::fs::OFlags::NOCTTY;
+        drop(rustix::fs::open(pty.path(), flags, rustix::fs::Mode::empty()).expect("opened"));
         assert_eq!(pty.visits().expect("visits"), [Visit::Opened, Visit::Closed]);
     }
 

@@ -18,6 +18,7 @@ use std::thread::{self, JoinHandle};
 use rustix::event::PollFlags;
 
 use super::clock::Clock;
+use super::ports;
 use super::pty::{ClientSettings, Pty, Visit};
 use super::state::{State, StateError};
 use super::wait::ready;
@@ -186,7 +187,7 @@ impl HostedUnit {
             power: hosting.power,
             state: hosting.state,
             garbage: Rng::new(hosting.seed),
-            clients: 0,
+            attended: false,
             client: ClientSettings { baud: BAUD, obeys_xoff: false },
             backlog: false,
             leaving: false,
@@ -247,7 +248,8 @@ struct Host<U> {
     power: Power,
     state: Option<State>,
     garbage: Rng,
-    clients: u32,
+    /// Whether anybody has the port open.
+    attended: bool,
     client: ClientSettings,
     /// Whether the line was full when bytes were last taken: more wait, and follow without a gap.
     backlog: bool,
@@ -297,23 +299,21 @@ impl<U: Hosted> Host<U> {
     }
 
     fn note_visits(&mut self) -> Result<(), HostError> {
-        for visit in self.pty.visits().map_err(|error| HostError::Pty("watch", error))? {
-            match visit {
-                Visit::Opened => {
-                    self.clients += 1;
-                    self.leaving = false;
-                    if self.power == Power::AtFirstClient {
-                        self.power = Power::AtStart;
-                        self.plugged.unit_mut().power_on(self.at.max(self.clock.now()));
-                    }
-                }
-                Visit::Closed => {
-                    self.clients = self.clients.saturating_sub(1);
-                    self.leaving = self.clients == 0;
-                }
+        let visits = self.pty.visits().map_err(|error| HostError::Pty("watch", error))?;
+        if visits.contains(&Visit::Opened) {
+            self.attended = true;
+            self.leaving = false;
+            if self.power == Power::AtFirstClient {
+                self.power = Power::AtStart;
+                self.plugged.unit_mut().power_on(self.at.max(self.clock.now()));
             }
         }
-        if self.clients > 0 {
+        // Counting would be wrong: events of the same kind melt into one while we sleep.
+        if visits.contains(&Visit::Closed) {
+            self.attended = ports::holder(self.pty.path()).is_some();
+            self.leaving = !self.attended;
+        }
+        if self.attended {
             self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
         }
         Ok(())
@@ -373,7 +373,9 @@ impl<U: Hosted> Host<U> {
             }
             return Ok(0);
         }
-        // The client may have changed its settings since it opened the port.
+        // Whoever sends is there, even if the system would not show us. And it may have changed its settings since it
+        // opened the port.
+        self.attended |= !self.leaving;
         self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
         let bytes = &mut buffer[..count];
         if self.at_wrong_rate() {
@@ -403,7 +405,7 @@ impl<U: Hosted> Host<U> {
             return Ok(());
         }
         let mut taken = 0;
-        if self.clients > 0 {
+        if self.attended {
             self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
             if self.at_wrong_rate() {
                 garble(&mut self.garbage, &mut self.heard);
@@ -436,7 +438,7 @@ impl<U: Hosted> Host<U> {
     /// Lets the client read what was sent: the hang-up that follows discards it.
     fn farewell(&self) {
         let until = self.clock.now() + FAREWELL;
-        while self.clients > 0 && self.clock.now() < until {
+        while self.attended && self.clock.now() < until {
             // First a moment: what was just written takes one to reach the client's side.
             thread::sleep(FAREWELL_STEP);
             if self.pty.unread() == 0 {

@@ -42,6 +42,9 @@ pub struct Session {
     prompt: PromptWatch,
     /// The unit asks for the password, or its answer may echo it: bytes both ways are secret until the line ends.
     password_open: bool,
+    /// L has been typed by hand: what follows up to Enter may be the password, even if the unit asks for it in words we
+    /// do not know.
+    load_key: bool,
 }
 
 /// The job that runs, and which it is.
@@ -80,6 +83,7 @@ impl Session {
             events: VecDeque::new(),
             prompt: PromptWatch::default(),
             password_open: false,
+            load_key: false,
         }
     }
 
@@ -153,6 +157,11 @@ impl Session {
         self.transmitter.held_since()
     }
 
+    /// Bytes that wait to be sent.
+    pub fn waiting(&self) -> usize {
+        self.transmitter.waiting()
+    }
+
     /// Whether the unit is asking for the password: what is typed now is secret.
     pub fn password_open(&self) -> bool {
         self.password_open
@@ -162,13 +171,18 @@ impl Session {
         if let Some(running) = &self.running {
             return Err(Refusal::Busy(running.job));
         }
-        // The Enter behind a password is no secret, and neither is what follows it.
-        let secret =
-            if self.password_open { keys.iter().position(|&key| key == b'\r').unwrap_or(keys.len()) } else { 0 };
-        let (hidden, open) = keys.split_at(secret);
-        let taken =
-            self.transmitter.push_text(hidden, Secrecy::Secret) && self.transmitter.push_text(open, Secrecy::Open);
-        if taken { Ok(()) } else { Err(Refusal::Held) }
+        for piece in keys.split_inclusive(|key| matches!(key, b'\r' | b'l' | b'L')) {
+            let secret = self.password_open || self.load_key;
+            let (typed, enter) =
+                if piece.ends_with(b"\r") { piece.split_at(piece.len() - 1) } else { (piece, &[][..]) };
+            let secrecy = if secret { Secrecy::Secret } else { Secrecy::Open };
+            if !(self.transmitter.push_text(typed, secrecy) && self.transmitter.push_text(enter, Secrecy::Open)) {
+                return Err(Refusal::Held);
+            }
+            self.password_open |= secret && !typed.is_empty();
+            self.load_key = enter.is_empty() && (secret || piece.ends_with(b"l") || piece.ends_with(b"L"));
+        }
+        Ok(())
     }
 
     /// Appends to the record; what may echo the password is secret up to the next line end.

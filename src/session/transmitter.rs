@@ -103,6 +103,11 @@ impl Transmitter {
         self.waiting.is_empty()
     }
 
+    /// Bytes that wait.
+    pub(super) fn waiting(&self) -> usize {
+        self.waiting_bytes
+    }
+
     /// Since when the unit holds us.
     pub(super) fn held_since(&self) -> Option<Instant> {
         self.held_since

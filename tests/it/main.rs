@@ -1,5 +1,7 @@
 //! Everything that needs more than one module, in one binary.
 
+#[cfg(unix)]
+mod ptys;
 mod support;
 mod talks;
 mod tidy;

@@ -1,7 +1,8 @@
 //! Stories of talks with the firmware: console and unit on one cable, in virtual time.
 
-use axcon::session::{Command, Event, Job, Outcome, UnitState};
-use axcon::time::Duration;
+use axcon::endpoint::Endpoint;
+use axcon::session::{Command, Event, Job, Outcome, Session, UnitState};
+use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::stream::Source;
 
@@ -102,4 +103,26 @@ fn a_password_typed_by_hand_is_secret_too() {
     let sent: String = bench.transcript();
     assert!(!sent.contains("AXIO") && !sent.contains("2011"), "{sent}");
     assert!(!bench.session.password_open(), "the next key is no secret any more");
+}
+
+#[test]
+fn what_is_typed_behind_l_is_secret_however_the_unit_asks_for_it() {
+    let mut session = Session::new(115_200);
+    let mut now = Instant::ZERO;
+    let mut wire = Vec::new();
+    // The whole answer may come in one piece, from a script.
+    session.command(now, Command::Keys(b"mlAXIO-2010\rm".to_vec())).expect("taken");
+    for _ in 0..10 {
+        now += Duration::from_millis(10);
+        session.handle_timeout(now);
+        while let Some(transmit) = session.poll_transmit() {
+            wire.extend(transmit.bytes);
+        }
+    }
+    session.handle_bytes(now, b"Geheimwort? AXIO-2010\r\nSo sei es.\r\n");
+    assert_eq!(wire, b"mlAXIO-2010\rm");
+    let record: Vec<u8> = session.record().entries().flat_map(|entry| entry.bytes.clone()).collect();
+    let record = String::from_utf8(record).expect("text");
+    assert!(!record.contains("AXIO") && record.starts_with("ml*********\rm"), "{record}");
+    assert!(record.ends_with("So sei es.\r\n"), "{record}");
 }

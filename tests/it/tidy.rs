@@ -17,7 +17,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("device", &["image", "version", "wire"]),
     ("session", &["device", "endpoint", "image", "record", "secret", "time", "version", "wire"]),
     ("emulator", &["device", "endpoint", "image", "rng", "time", "version", "wire"]),
-    ("host", &["device", "emulator", "endpoint", "image", "record", "time", "version"]),
+    ("host", &["device", "emulator", "endpoint", "image", "record", "rng", "time", "version"]),
     ("tui", &["device", "endpoint", "image", "record", "secret", "session", "time", "version", "wire"]),
     (
         "cli",

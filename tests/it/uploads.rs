@@ -113,8 +113,9 @@ fn a_power_cut_at_any_record_leaves_a_unit_that_a_second_upload_saves() {
         // Before the header has arrived the old software is intact and comes back; then the loader waits for ever.
         let now = if cut == 0 { UnitNow::Application } else { UnitNow::Loader };
         assert_eq!((report.verdict, report.unit), (Verdict::Failed, now), "cut at {cut}: {report:?}");
+        bench.reconnect();
         if now == UnitNow::Loader {
-            // It does not say which product it belongs to: somebody has to.
+            // It does not say which product it belongs to, and a new session cannot know: somebody has to say it.
             let report = bench.load(order(image.clone()));
             assert_eq!(report.verdict, Verdict::Refused, "cut at {cut}: {report:?}");
         }

@@ -130,6 +130,12 @@ impl Bench {
         self.unit.unit_mut().power_on(now);
     }
 
+    /// Another console comes to the same cable.
+    pub fn reconnect(&mut self) {
+        self.session = Session::new(BAUD);
+        self.events.clear();
+    }
+
     /// What the unit has said, for messages of failing tests.
     pub fn transcript(&self) -> String {
         let record = self.session.record();

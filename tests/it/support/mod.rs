@@ -1,3 +1,7 @@
-//! What the tests share.
+//! What several stories need.
 
 pub mod bench;
+#[cfg(unix)]
+pub mod screen;
+#[cfg(unix)]
+pub mod shell;
