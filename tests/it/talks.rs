@@ -123,6 +123,6 @@ fn what_is_typed_behind_l_is_secret_however_the_unit_asks_for_it() {
     assert_eq!(wire, b"mlAXIO-2010\rm");
     let record: Vec<u8> = session.record().entries().flat_map(|entry| entry.bytes.clone()).collect();
     let record = String::from_utf8(record).expect("text");
-    assert!(!record.contains("AXIO") && record.starts_with("ml*********\rm"), "{record}");
+    assert!(!record.contains("AXIO") && record.starts_with("ml*********\r"), "{record}");
     assert!(record.ends_with("So sei es.\r\n"), "{record}");
 }

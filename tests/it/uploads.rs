@@ -100,7 +100,7 @@ fn a_corrupted_record_stops_the_upload_within_a_record_and_the_next_one_succeeds
 #[test]
 fn a_power_cut_at_any_record_leaves_a_unit_that_a_second_upload_saves() {
     let image = small_image("AXTC4CO", "1.2.0");
-    for cut in (0..190).step_by(17) {
+    for cut in (0..175).step_by(17) {
         let mut bench = Bench::new();
         bench.run_for(Duration::from_secs(4));
         bench.command(Command::Load(Box::new(order(image.clone()))));
