@@ -53,6 +53,8 @@ pub struct Firmware {
     scan_at: Instant,
     /// When the next row is due, if the stream is on.
     row_at: Option<Instant>,
+    /// The row of the last scan, once it has been asked for: fast streams repeat it many times.
+    row: Option<String>,
     /// When the next diagnostics page is due, if they are on.
     page_at: Option<Instant>,
     network: NetworkState,
@@ -94,6 +96,7 @@ impl Firmware {
             scanner: Scanner::default(),
             scan_at: board.now,
             row_at: None,
+            row: None,
             page_at: None,
             network: NetworkState::PreOperational,
         };
@@ -134,13 +137,17 @@ impl Firmware {
             self.scan_at += SCAN_TIME;
             if !self.is_viewing() {
                 self.scanner.scan(now, board.sensors);
+                self.row = None;
             }
         }
         if self.row_at.is_some_and(|due| due <= now) {
             let stream = board.parameters.values().stream;
-            let row = self.scanner.row(stream.source);
             self.row_at = self.row_at.map(|due| due + period(stream));
-            self.repeat(board, &format!("{}\r\n", board.product.stream.emit(&row)));
+            let scanner = &self.scanner;
+            let emit = || format!("{}\r\n", board.product.stream.emit(&scanner.row(stream.source)));
+            let row = self.row.take().unwrap_or_else(emit);
+            self.repeat(board, &row);
+            self.row = Some(row);
         }
         if self.page_at.is_some_and(|due| due <= now) {
             self.page_at = self.page_at.map(|due| due + DIAGNOSTICS_PERIOD);
@@ -328,6 +335,7 @@ impl Firmware {
 
     /// Rows come at whole periods from now, but not before the first valid data.
     fn arm_stream(&mut self, now: Instant, stream: StreamSetting) {
+        self.row = None;
         let first_data_at = self.started_at + FIRST_DATA_AFTER;
         self.row_at = stream.on.then(|| first_data_at.max(now + period(stream)));
     }

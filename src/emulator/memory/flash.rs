@@ -1,7 +1,7 @@
 //! Program flash: erasing makes a page FFFFh, programming can only clear bits, and both take their time.
 //!
 //! The times are those of the public data sheets for the 56F83xx family, which is likely but not proven to be the
-//! part in these units (`docs` and the errata call it a guess). The loader decides what to write; here is how.
+//! part in these units. The loader decides what to write; here is how.
 
 use std::collections::VecDeque;
 

@@ -1,0 +1,128 @@
+//! The emulated unit alone, driven in virtual time over a line at 115200 baud.
+
+mod console;
+mod loader;
+
+use axcon::device::{LoaderKind, Product};
+use axcon::emulator::cable::{Line, Plugged};
+use axcon::emulator::{Setup, Unit};
+use axcon::image::Identity;
+use axcon::time::{Duration, Instant, character_time};
+use axcon::version::Version;
+
+const BAUD: u32 = 115_200;
+const XON: u8 = 0x11;
+const XOFF: u8 = 0x13;
+
+fn product() -> &'static Product {
+    Product::named("AXTC4CO").expect("built in")
+}
+
+/// A program of this many words for a product, bytes in S-record order. Its content depends on the version.
+fn program(name: &str, version: Version, words: usize) -> Vec<u8> {
+    let mut bytes: Vec<u8> = (0..words * 2)
+        .map(|at| (at as u8).wrapping_mul(31).wrapping_add((at >> 8) as u8 ^ version.minor as u8))
+        .collect();
+    let mut identity = Identity {
+        product: name.into(),
+        version,
+        build_date: "2026-01-31".into(),
+        build_time: "12:34:56".into(),
+        program_words: 0,
+        crc: 0,
+    };
+    identity.stamp(&mut bytes);
+    bytes
+}
+
+/// A program as the flash that holds it, erased behind it.
+fn flash_with(program: &[u8]) -> Vec<u8> {
+    let mut flash = program.to_vec();
+    flash.resize(product().flash.program_words as usize * 2, 0xFF);
+    flash
+}
+
+fn setup(flash: Vec<u8>) -> Setup {
+    Setup { product: product(), loader: LoaderKind::G1, seed: 1, flash, parameters: Vec::new() }
+}
+
+/// What a unit of a test runs before anything is loaded.
+fn old_program() -> Vec<u8> {
+    program("AXTC4CO", Version::new(1, 2, 3), 1024)
+}
+
+/// A unit on a line, and everything it has said.
+struct Bench {
+    plugged: Plugged<Unit>,
+    now: Instant,
+    /// Each character with the moment of the release it came with.
+    heard: Vec<(Instant, u8)>,
+    read: usize,
+}
+
+impl Bench {
+    /// A unit that gets its power at time zero.
+    fn new(setup: Setup) -> Self {
+        let unit = Unit::new(setup);
+        let plugged = Plugged::new(unit, Line::new(character_time(BAUD), Duration::ZERO));
+        let mut bench = Bench { plugged, now: Instant::ZERO, heard: Vec::new(), read: 0 };
+        bench.power_on();
+        bench
+    }
+
+    /// A unit with the old program in it, its menu printed.
+    fn at_menu() -> Self {
+        let mut bench = Bench::new(setup(flash_with(&old_program())));
+        bench.run_ms(500);
+        bench.take();
+        bench
+    }
+
+    fn unit(&mut self) -> &mut Unit {
+        self.plugged.unit_mut()
+    }
+
+    fn power_on(&mut self) {
+        let now = self.now;
+        self.unit().power_on(now);
+    }
+
+    fn power_off(&mut self) {
+        let now = self.now;
+        self.unit().power_off(now);
+        self.plugged.to_unit_mut().clear();
+    }
+
+    fn run(&mut self, time: Duration) {
+        self.now += time;
+        let heard = &mut self.heard;
+        self.plugged.advance(self.now, |at, bytes| heard.extend(bytes.iter().map(|&byte| (at, byte))));
+    }
+
+    fn run_ms(&mut self, millis: u64) {
+        self.run(Duration::from_millis(millis));
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.plugged.send(self.now, bytes);
+    }
+
+    /// Presses keys and gives what the unit says within the next 300 ms.
+    fn keys(&mut self, keys: &[u8]) -> String {
+        self.send(keys);
+        self.run_ms(300);
+        self.take()
+    }
+
+    /// What has been heard since the last time.
+    fn take(&mut self) -> String {
+        let new = self.heard[self.read..].iter().map(|&(_, byte)| byte).collect();
+        self.read = self.heard.len();
+        String::from_utf8(new).expect("the port speaks ASCII")
+    }
+
+    /// Whether the unit's last word on it was XOFF.
+    fn is_stopped(&self) -> bool {
+        self.heard.iter().rev().find(|(_, byte)| [XON, XOFF].contains(byte)).is_some_and(|&(_, byte)| byte == XOFF)
+    }
+}
