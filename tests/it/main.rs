@@ -1,6 +1,7 @@
 //! Everything that needs more than one module, in one binary.
 
 mod emulator;
+mod images;
 #[cfg(unix)]
 mod ptys;
 mod support;
