@@ -187,7 +187,7 @@ fn targets() -> Vec<Target> {
     Product::all().iter().map(Product::target).collect()
 }
 
-fn product(name: &str) -> Result<&'static Product, String> {
+pub(super) fn product(name: &str) -> Result<&'static Product, String> {
     Product::named(name).ok_or_else(|| {
         let known: Vec<&str> = Product::all().iter().map(|product| product.name.as_str()).collect();
         format!("no such product; known: {}", known.join(", "))

@@ -40,6 +40,24 @@ pub fn open(spec: &LinkSpec, global: &Global, clock: Clock, inputs: SyncSender<I
     Connection::open(spec, Options { baud: global.baud }, clock, inputs).map_err(link_error)
 }
 
+/// What the journal of uploads calls the port: the adapter's serial number where it has one, since its name may be
+/// another one next time, or else the path as the user gives it. `None` for units that end with this process.
+pub fn journal_key(global: &Global) -> Option<String> {
+    match spec(global).ok()? {
+        LinkSpec::Emulated(_) => None,
+        LinkSpec::Serial(path) => {
+            let resolved = std::fs::canonicalize(&path).unwrap_or_else(|_| path.clone());
+            let listed = ports::list().unwrap_or_default();
+            let adapter = listed.iter().find(|port| std::path::Path::new(&port.path) == resolved);
+            let serial_number = adapter.and_then(|port| port.usb.as_ref()).and_then(|usb| usb.serial_number.clone());
+            Some(match serial_number {
+                Some(number) => format!("usb:{number}"),
+                None => std::path::absolute(&path).unwrap_or(path).display().to_string(),
+            })
+        }
+    }
+}
+
 /// Where a session is recorded, as the command line says.
 pub fn recording(global: &Global) -> Plan {
     match &global.record {

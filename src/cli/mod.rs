@@ -5,7 +5,9 @@ pub mod error;
 pub mod identify;
 pub mod image;
 pub mod link;
+pub mod load;
 pub mod output;
+pub mod password;
 pub mod ports;
 pub mod stream;
 pub mod talk;
@@ -62,6 +64,8 @@ enum Command {
     Identify(identify::Args),
     /// Switch the data stream on and write it down.
     Stream(stream::Args),
+    /// Check an image, upload it, and verify the new banner.
+    Load(load::Args),
     /// A plain terminal: keys out, bytes in.
     Terminal(terminal::Args),
     /// Host emulated units on pseudo-terminals.
@@ -91,6 +95,7 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Ports(args)) => ports::run(args, global, output),
         Some(Command::Identify(args)) => identify::run(args, global, output),
         Some(Command::Stream(args)) => stream::run(args, global, output),
+        Some(Command::Load(args)) => load::run(args, global, output),
         Some(Command::Terminal(args)) => terminal::run(args, global, output),
         Some(Command::Emulate(args)) => emulate::run(args, global, output),
         Some(Command::Image(args)) => image::run(args, global, output),

@@ -204,8 +204,13 @@ fn make_room(folder: &Path, limits: Limits) -> io::Result<()> {
     Ok(())
 }
 
-/// Where recordings are kept, by the customs of the system.
+/// Where recordings are kept.
 pub fn folder() -> Option<PathBuf> {
+    state_folder().map(|state| state.join("recordings"))
+}
+
+/// Where this program keeps what outlives it, by the customs of the system.
+pub fn state_folder() -> Option<PathBuf> {
     let variable = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let state = if cfg!(windows) {
         variable("LOCALAPPDATA")?
@@ -214,7 +219,7 @@ pub fn folder() -> Option<PathBuf> {
     } else {
         variable("XDG_STATE_HOME").or_else(|| Some(variable("HOME")?.join(".local/state")))?
     };
-    Some(state.join("axcon").join("recordings"))
+    Some(state.join("axcon"))
 }
 
 /// Time, port and process: `20260131T120000Z-ttyUSB0-4711`.

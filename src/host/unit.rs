@@ -26,7 +26,7 @@ use crate::device::Product;
 use crate::emulator::cable::{Line, Plugged};
 use crate::emulator::{Setup, Store, Unit};
 use crate::endpoint::Endpoint;
-use crate::image::Identity;
+use crate::image::make;
 use crate::rng::Rng;
 use crate::time::{Duration, Instant, character_time};
 use crate::version::Version;
@@ -466,21 +466,15 @@ pub fn unit(product: &'static Product, seed: u64, flash: Vec<u8>, parameters: Ve
     Unit::new(Setup { product, loader: product.loader.kind, seed, flash, parameters })
 }
 
-/// The program flash of a unit as it leaves the factory: an identity block and nothing else, which is all the emulated
-/// application needs to start.
+/// The program flash of a unit as it leaves the factory: the sample image of [`FACTORY_VERSION`], erased behind it.
 pub fn factory_flash(product: &Product) -> Vec<u8> {
-    let mut identity = Identity {
-        product: product.name.clone(),
-        version: Version::new(1, 1, 0),
-        build_date: "2010-01-04".into(),
-        build_time: "12:00:00".into(),
-        program_words: 0,
-        crc: 0,
-    };
     let mut flash = vec![0xFF; product.flash.program_words as usize * 2];
-    identity.stamp(&mut flash[..FACTORY_PROGRAM]);
+    let target = product.target();
+    let words = make::usual_words(&target);
+    let program = make::program(&make::Recipe { target: &target, version: FACTORY_VERSION, words, flaw: None });
+    flash[..program.len()].copy_from_slice(&program);
     flash
 }
 
-/// Bytes of that program: up to and with the page that holds the identity block.
-const FACTORY_PROGRAM: usize = 512;
+/// The version that emulated units leave the factory with.
+const FACTORY_VERSION: Version = Version::new(1, 1, 0);

@@ -88,8 +88,11 @@ pub fn make(recipe: &Recipe<'_>) -> Result<Vec<u8>, MakeError> {
     Ok(draft.bytes())
 }
 
-/// The program, its identity block included.
-fn program(recipe: &Recipe<'_>) -> Vec<u8> {
+/// The program alone, its identity block included: bytes in S-record order, from word 0 on.
+///
+/// # Panics
+/// If the recipe asks for fewer than [`FEWEST_WORDS`].
+pub fn program(recipe: &Recipe<'_>) -> Vec<u8> {
     let Recipe { target, version, words, flaw } = *recipe;
     let mut rng = Rng::new(PROGRAMS).fork(&target.product).fork(&version.to_string());
     let mut clock = rng.fork("build time");

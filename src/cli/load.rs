@@ -1,0 +1,440 @@
+//! `axcon load`: check, plan, upload, and believe only the new banner.
+
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::error::{CliError, Kind};
+use super::image::{self as image_cli, DefectObject};
+use super::output::Output;
+use super::talk::{Ended, Talk, no_answer_hints};
+use super::{Global, link, password};
+use crate::device::Product;
+use crate::host::journal::{Journal, Note};
+use crate::image::{CheckedImage, DefectId, Report};
+use crate::session::{
+    Command, Event, Facts, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitNow, UnitState, Verdict,
+};
+use crate::time::Duration;
+
+/// Arguments of `axcon load`.
+///
+/// The image is checked before anything is sent; one error and nothing happens (exit code 5). The unit must say that it
+/// is the product the image is for. A failed upload leaves a unit that waits in its loader: run the same command again.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The S-record file.
+    #[arg(value_name = "IMAGE")]
+    image: PathBuf,
+    /// Check the image, find out who is there, show the plan, and stop.
+    #[arg(long)]
+    dry_run: bool,
+    /// The unit's product, where the unit itself cannot say it (it waits in its loader).
+    #[arg(long, value_name = "NAME", value_parser = image_cli::product)]
+    product: Option<&'static Product>,
+    /// Read the password from FILE; otherwise AXCON_PASSWORD is taken, or it is asked for.
+    #[arg(long, value_name = "FILE")]
+    password_file: Option<PathBuf>,
+    /// Send in spite of this defect; docs/images.md lists their names.
+    #[arg(long, value_name = "DEFECT", value_parser = image_cli::allowable)]
+    allow: Vec<DefectId>,
+}
+
+/// Characters a second at 115,200 baud, 8N1.
+const CHARACTERS_PER_SECOND: f64 = 11_520.0;
+/// What erasing and writing a page takes, for the estimate only (public data of the 56F83xx parts).
+const SECONDS_PER_PAGE: f64 = 0.026;
+
+/// Uploads.
+///
+/// # Errors
+/// As the exit codes say: see the report.
+pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let name = image_cli::shown(&args.image);
+    let report = image_cli::read(&args.image, args.product.map(|product| product.name.as_str()), &args.allow)?;
+    let Some(image) = report.image() else {
+        return refuse(&report, &name, output);
+    };
+    if !output.json && (report.warnings > 0 || report.allowed > 0) {
+        output.remark(image_cli::report_text(&report, &name).trim_end());
+    }
+    let interactive = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
+    if !args.dry_run && !global.yes && !interactive {
+        return Err(CliError::message(Kind::NeedsYes, "an upload replaces the unit's software and nobody said yes")
+            .hint("add --yes where nobody can be asked"));
+    }
+    let password = if args.dry_run { None } else { password::find(args.password_file.as_deref())? };
+    if password.is_none() && !args.dry_run && !interactive {
+        return Err(CliError::message(Kind::Usage, "the password is missing")
+            .hint("give it with --password-file FILE or in AXCON_PASSWORD"));
+    }
+    if args.dry_run && global.port.is_none() {
+        return plan(&report, &image, &name, None, output);
+    }
+    let mut talk = Talk::open(global, output)?;
+    talk.ask(Command::Identify)?;
+    let journal = Desk::of(&talk, global);
+    let facts = talk.session().facts().clone();
+    plan(&report, &image, &name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
+    if args.dry_run {
+        talk.close(output);
+        return Ok(());
+    }
+    if !global.yes && !agreed(output)? {
+        talk.close(output);
+        return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
+    }
+    let password = password.map_or_else(password::ask, Ok)?;
+    // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
+    let noted = journal.note.as_ref().filter(|_| facts.state == UnitState::Loader).map(|note| note.product.clone());
+    let product = args.product.map(|product| product.name.clone()).or(noted);
+    journal.begin(&facts, product.as_deref(), &name, &talk, output);
+    let mut meter = Meter::new(output.json);
+    let order = LoadOrder { image, password, product };
+    let ended = talk.run(Command::Load(Box::new(order)), |_, event| match event {
+        Event::Progress(progress) => meter.show(progress, output),
+        _ => Ok(()),
+    })?;
+    meter.end(output);
+    let (outcome, lost) = match ended {
+        Ended::Finished { outcome, .. } => (outcome, None),
+        Ended::Lost { outcome, error } => (outcome, Some(error)),
+    };
+    let Outcome::Loaded(result) = outcome else {
+        return Err(CliError::message(Kind::Failed, "the upload ended without a report"));
+    };
+    journal.end(&result, output);
+    let result = conclude(&result, lost, &report, output);
+    talk.close(output);
+    result
+}
+
+/// The journal's part in an upload on one port.
+struct Desk {
+    journal: Option<(Journal, String)>,
+    note: Option<Note>,
+}
+
+impl Desk {
+    fn of(talk: &Talk, global: &Global) -> Self {
+        let journal = link::journal_key(global).and_then(|key| Some((Journal::of_user()?, key)));
+        let in_loader = talk.session().facts().state == UnitState::Loader;
+        let note = journal.as_ref().filter(|_| in_loader).and_then(|(journal, key)| journal.note(key));
+        Desk { journal, note }
+    }
+
+    fn begin(&self, facts: &Facts, product: Option<&str>, image: &str, talk: &Talk, output: &mut Output) {
+        let Some((journal, key)) = &self.journal else { return };
+        let said = facts.product.as_ref().map(|known| known.value.as_str());
+        let Some(product) = said.or(product) else { return };
+        let unix_seconds = talk.clock().wall(talk.now()).as_second();
+        let note = Note { product: product.to_owned(), image: image.to_owned(), unix_seconds };
+        if let Err(error) = journal.begin(key, note) {
+            output.remark(&format!("axcon: this upload is not noted, so a failed one will want --product: {error}"));
+        }
+    }
+
+    fn end(&self, report: &LoadReport, output: &mut Output) {
+        let Some((journal, key)) = &self.journal else { return };
+        if report.unit == UnitNow::Application
+            && let Err(error) = journal.end(key)
+        {
+            output.remark(&format!("axcon: the note of this upload stays: {error}"));
+        }
+    }
+}
+
+/// The image has errors: report, nothing else.
+fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliError> {
+    if output.json {
+        let identity = report.facts.identity.as_ref();
+        output.object(&LoadObject {
+            schema: "axcon.load/1",
+            exit_code: Kind::ImageRefused.exit_code(),
+            verdict: "refused",
+            unit: "unknown",
+            phase: phase_name(Phase::Check),
+            product: identity.map(|identity| identity.product.as_str()),
+            version_before: None,
+            version_after: None,
+            records: 0,
+            records_total: report.facts.records as usize,
+            address: None,
+            seconds: 0.0,
+            what: "the image has errors; nothing has been sent",
+            heard: "",
+            next: "use an image without errors",
+            defects: image_cli::defect_objects(report),
+        })?;
+    } else {
+        output.data(image_cli::report_text(report, name).as_bytes())?;
+        output.remark("axcon: the image is refused; nothing has been sent");
+    }
+    Err(CliError::reported(Kind::ImageRefused))
+}
+
+/// Says what is going to happen.
+fn plan(
+    report: &Report,
+    image: &CheckedImage,
+    name: &str,
+    unit: Option<(&Facts, &str, Option<&Note>)>,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    if output.json {
+        return Ok(());
+    }
+    let contents = image.identity().map_or_else(
+        || "it does not say what it is".to_owned(),
+        |identity| format!("{} V{}", identity.product, identity.version),
+    );
+    output.remark(&format!("image  {name}: {contents}, {} records", report.facts.records));
+    if let Some((facts, port, note)) = unit {
+        let version = facts.version.as_ref().map_or_else(String::new, |known| format!(" V{}", known.value));
+        let unit = match (&facts.product, facts.state) {
+            (_, UnitState::Loader) => match note {
+                Some(note) => format!("waits in its loader; it is the {} that '{}' was for", note.product, note.image),
+                None => "waits in its loader".to_owned(),
+            },
+            (Some(product), _) => format!("{}{version}", product.value),
+            (None, UnitState::Silent) => "does not answer".to_owned(),
+            (None, _) => "does not say what it is".to_owned(),
+        };
+        output.remark(&format!("unit   {port}: {unit}"));
+    }
+    let pages = report.facts.data_bytes as f64 / 512.0;
+    let seconds = report.facts.characters as f64 / CHARACTERS_PER_SECOND + pages * SECONDS_PER_PAGE;
+    output.remark(&format!(
+        "plan   enter the loader, send {} characters (some {seconds:.0} s), then believe only the new banner",
+        report.facts.characters
+    ));
+    Ok(())
+}
+
+fn agreed(output: &mut Output) -> Result<bool, CliError> {
+    let _ = write!(output.err, "Upload? Type yes: ").and_then(|()| output.err.flush());
+    let mut answer = String::new();
+    std::io::stdin().read_line(&mut answer).map_err(|error| CliError::new(Kind::Failed, error))?;
+    Ok(matches!(answer.trim().to_lowercase().as_str(), "yes" | "y"))
+}
+
+#[derive(Serialize)]
+struct LoadObject<'a> {
+    schema: &'static str,
+    exit_code: u8,
+    verdict: &'static str,
+    unit: &'static str,
+    phase: &'static str,
+    product: Option<&'a str>,
+    version_before: Option<String>,
+    version_after: Option<String>,
+    records: usize,
+    records_total: usize,
+    address: Option<u32>,
+    seconds: f64,
+    what: &'a str,
+    heard: &'a str,
+    next: &'a str,
+    defects: Vec<DefectObject<'a>>,
+}
+
+#[derive(Serialize)]
+struct ProgressObject {
+    schema: &'static str,
+    phase: &'static str,
+    record: usize,
+    records: usize,
+    address: u32,
+    bytes: usize,
+    bytes_total: usize,
+    rate: f64,
+    eta_s: Option<f64>,
+    held_s: Option<f64>,
+}
+
+/// Says how it went, and what to do next.
+fn conclude(report: &LoadReport, lost: Option<CliError>, image: &Report, output: &mut Output) -> Result<(), CliError> {
+    let kind = exit_kind(report, lost.is_some());
+    let next = next_step(report);
+    if output.json {
+        output.object(&LoadObject {
+            schema: "axcon.load/1",
+            exit_code: kind.map_or(0, Kind::exit_code),
+            verdict: verdict_name(report.verdict),
+            unit: unit_name(report.unit),
+            phase: phase_name(report.phase),
+            product: report.product.as_deref(),
+            version_before: report.version_before.map(|version| version.to_string()),
+            version_after: report.version_after.map(|version| version.to_string()),
+            records: report.records,
+            records_total: report.records_total,
+            address: report.address,
+            seconds: (report.duration.as_secs_f64() * 1000.0).round() / 1000.0,
+            what: &report.what,
+            heard: &report.heard,
+            next,
+            defects: image_cli::defect_objects(image),
+        })?;
+        return kind.map_or(Ok(()), |kind| Err(CliError::reported(kind)));
+    }
+    let Some(kind) = kind else {
+        let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));
+        let seconds = report.duration.as_secs_f64();
+        return output
+            .data(format!("done: {}{before}; {} records in {seconds:.1} s\n", report.what, report.records).as_bytes());
+    };
+    let mut error = CliError::message(kind, report.what.clone());
+    if report.records > 0 && report.verdict != Verdict::WrongApplication {
+        let address = report.address.map_or_else(String::new, |address| format!(", address {address:#06x}"));
+        error = error.hint(format!("sent: {} of {} records{address}", report.records, report.records_total));
+    }
+    if !report.heard.is_empty() {
+        error = error.hint(format!("last heard: \"{}\"", report.heard));
+    }
+    if let Some(lost) = lost {
+        error = error.hint(format!("the port: {lost}"));
+    }
+    if report.verdict == Verdict::NoAnswer {
+        error = no_answer_hints(error);
+    }
+    Err(error.hint(next))
+}
+
+/// The exit code's kind; `None` is success.
+fn exit_kind(report: &LoadReport, link_lost: bool) -> Option<Kind> {
+    Some(match report.verdict {
+        Verdict::Done => return None,
+        Verdict::Refused if report.product.is_none() => Kind::Usage,
+        Verdict::Refused => Kind::ImageRefused,
+        Verdict::UnitRefused => Kind::UnitRefused,
+        Verdict::NoAnswer => Kind::NoAnswer,
+        Verdict::Failed if link_lost && report.records == 0 => Kind::PortGone,
+        Verdict::Failed => match report.unit {
+            UnitNow::Loader => Kind::UploadFailedLoader,
+            UnitNow::Unknown => Kind::UploadFailedUnknown,
+            UnitNow::Application => Kind::WrongApplication,
+        },
+        Verdict::WrongApplication => Kind::WrongApplication,
+        Verdict::Interrupted => Kind::Interrupted,
+    })
+}
+
+/// What the operator should do now.
+pub fn next_step(report: &LoadReport) -> &'static str {
+    match (report.verdict, report.unit) {
+        (Verdict::Done, _) => "nothing: the unit runs what was sent",
+        (Verdict::Refused, _) if report.product.is_none() => {
+            "look at the label of the unit and say its product: --product AXTC4CO"
+        }
+        (Verdict::Refused, _) => "take the image that is made for this unit",
+        (Verdict::UnitRefused, UnitNow::Application) => {
+            "the unit runs as before: check the password (upper and lower case matter) and try again"
+        }
+        (Verdict::NoAnswer, _) => "nothing has been changed",
+        (_, UnitNow::Loader) if report.records == 0 => {
+            "the unit waits in its loader, its old software intact: upload, or switch it off and on"
+        }
+        (_, UnitNow::Loader) => "the unit waits in its loader, without software: run the same command again",
+        (Verdict::WrongApplication, _) => "compare the version above with the file, and upload the right one",
+        (_, UnitNow::Application) => "the unit runs its software: nothing has been changed, try again",
+        (_, UnitNow::Unknown) => {
+            "switch the unit off and on, then run the same command again: it tells what the unit is"
+        }
+    }
+}
+
+fn verdict_name(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Done => "done",
+        Verdict::Refused => "refused",
+        Verdict::UnitRefused => "unit-refused",
+        Verdict::NoAnswer | Verdict::Failed => "failed",
+        Verdict::WrongApplication => "wrong-application",
+        Verdict::Interrupted => "interrupted",
+    }
+}
+
+fn unit_name(unit: UnitNow) -> &'static str {
+    match unit {
+        UnitNow::Application => "application",
+        UnitNow::Loader => "loader",
+        UnitNow::Unknown => "unknown",
+    }
+}
+
+fn phase_name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Check => "check",
+        Phase::EnterLoader => "enter-loader",
+        Phase::Erase => "erase",
+        Phase::Transfer => "transfer",
+        Phase::Finish => "finish",
+        Phase::Verify => "verify",
+    }
+}
+
+/// Shows progress: JSON lines, a bar on a terminal, or a line for each phase.
+struct Meter {
+    json: bool,
+    bar: bool,
+    phase: Option<Phase>,
+}
+
+/// Characters of the bar.
+const BAR: usize = 30;
+
+impl Meter {
+    fn new(json: bool) -> Self {
+        Meter { json, bar: !json && std::io::stderr().is_terminal(), phase: None }
+    }
+
+    fn show(&mut self, progress: &Progress, output: &mut Output) -> Result<(), CliError> {
+        let seconds = progress.elapsed.as_secs_f64();
+        let rate = if seconds > 0.0 { progress.bytes as f64 / seconds } else { 0.0 };
+        let rest = (progress.bytes_total - progress.bytes.min(progress.bytes_total)) as f64;
+        let eta = (rate > 0.0).then(|| rest / rate);
+        if self.json {
+            return output.object(&ProgressObject {
+                schema: "axcon.progress/1",
+                phase: phase_name(progress.phase),
+                record: progress.records,
+                records: progress.records_total,
+                address: progress.address,
+                bytes: progress.bytes,
+                bytes_total: progress.bytes_total,
+                rate: rate.round(),
+                eta_s: eta.map(|eta| (eta * 10.0).round() / 10.0),
+                held_s: progress.held.map(|held| held.as_secs_f64()),
+            });
+        }
+        if self.bar {
+            let share =
+                if progress.bytes_total == 0 { 0.0 } else { progress.bytes as f64 / progress.bytes_total as f64 };
+            let filled = (share * BAR as f64) as usize;
+            let eta = eta.map_or_else(String::new, |eta| format!(", {eta:.0} s left"));
+            let held = progress.held.filter(|held| *held >= Duration::from_secs(1));
+            let held = held.map_or_else(String::new, |held| format!(", held by XOFF for {:.0} s", held.as_secs_f64()));
+            let line = format!(
+                "\r{:<12} [{}{}] {:>3.0} %  {}/{} records{eta}{held}\x1b[K",
+                phase_name(progress.phase),
+                "#".repeat(filled),
+                " ".repeat(BAR - filled),
+                share * 100.0,
+                progress.records,
+                progress.records_total
+            );
+            let _ = output.err.write_all(line.as_bytes()).and_then(|()| output.err.flush());
+        } else if self.phase != Some(progress.phase) {
+            output.remark(&format!("{} ...", phase_name(progress.phase)));
+        }
+        self.phase = Some(progress.phase);
+        Ok(())
+    }
+
+    fn end(&self, output: &mut Output) {
+        if self.bar && self.phase.is_some() {
+            output.remark("");
+        }
+    }
+}

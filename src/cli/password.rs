@@ -1,0 +1,76 @@
+//! Where the password comes from: a file, the environment, or a prompt without echo. Never the command line.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::error::{CliError, Kind};
+use crate::secret::Secret;
+
+/// The environment's name for it.
+const VARIABLE: &str = "AXCON_PASSWORD";
+
+/// Bytes of a password file at most: whatever is longer is another file.
+const LONGEST: usize = 256;
+
+/// The password, if a file or the environment has it.
+///
+/// # Errors
+/// If the file cannot be read or does not hold one line with a password.
+pub fn find(file: Option<&Path>) -> Result<Option<Secret>, CliError> {
+    if let Some(path) = file {
+        return read(path).map(Some);
+    }
+    match std::env::var_os(VARIABLE) {
+        Some(password) if !password.is_empty() => {
+            let password = password.into_string().map_err(|_| {
+                CliError::message(Kind::Usage, format!("{VARIABLE} holds characters that no keyboard line can"))
+            })?;
+            accept(password.into_bytes(), VARIABLE).map(Some)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Asks for it.
+///
+/// # Errors
+/// If the terminal cannot be used, or nothing is typed.
+pub fn ask() -> Result<Secret, CliError> {
+    let password = rpassword::prompt_password("Password: ").map_err(|error| {
+        CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot ask for the password"))
+    })?;
+    accept(password.into_bytes(), "the answer")
+}
+
+fn read(path: &Path) -> Result<Secret, CliError> {
+    let shown = super::image::shown(path);
+    let failed = |error: std::io::Error| {
+        CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the password file {shown}")))
+    };
+    let mut text = Vec::new();
+    File::open(path).and_then(|file| file.take(LONGEST as u64 + 1).read_to_end(&mut text)).map_err(failed)?;
+    if text.len() > LONGEST {
+        let message = format!("the password file {shown} is longer than {LONGEST} bytes; is it the right one?");
+        return Err(CliError::message(Kind::Usage, message));
+    }
+    // An editor ends the line; the password has no line end.
+    while text.last().is_some_and(|last| matches!(last, b'\n' | b'\r')) {
+        text.pop();
+    }
+    accept(text, &format!("the password file {shown}"))
+}
+
+fn accept(password: Vec<u8>, place: &str) -> Result<Secret, CliError> {
+    let password = Secret::new(password);
+    if password.is_empty() {
+        return Err(CliError::message(Kind::Usage, format!("{place} is empty")));
+    }
+    if password.reveal().iter().any(u8::is_ascii_control) {
+        return Err(CliError::message(
+            Kind::Usage,
+            format!("{place} holds more than one line, or a control character"),
+        ));
+    }
+    Ok(password)
+}

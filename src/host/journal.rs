@@ -1,0 +1,151 @@
+//! Uploads that have begun and not ended well, in the user's state directory.
+//!
+//! A loader that waits for a file does not say which product it belongs to. Whoever asked for it knew: so the product is
+//! noted, with the port, before the loader is entered, and the note is removed when the new software runs. A program
+//! that is killed in between leaves the note, and the next upload on that port needs no more than being asked for.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+/// The notes.
+#[derive(Clone, Debug)]
+pub struct Journal {
+    file: PathBuf,
+}
+
+/// One upload that has begun.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Note {
+    /// The unit's product, as it was known before its loader was entered.
+    pub product: String,
+    /// The image's file.
+    pub image: String,
+    /// When, in seconds since 1970.
+    pub unix_seconds: i64,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+struct Notes {
+    schema: String,
+    uploads: BTreeMap<String, Note>,
+}
+
+const SCHEMA: &str = "axcon.journal/1";
+
+/// Notes kept at most; the oldest go first. One for each port that was ever left in the middle.
+const MOST_NOTES: usize = 200;
+
+/// Bytes of a journal that are read at most: far more than the notes take.
+const LARGEST: u64 = 1 << 20;
+
+impl Journal {
+    /// The user's journal; `None` where there is no home directory.
+    pub fn of_user() -> Option<Self> {
+        super::recorder::state_folder().map(|folder| Journal { file: folder.join("uploads.json") })
+    }
+
+    /// A journal in this file.
+    pub fn at(file: PathBuf) -> Self {
+        Journal { file }
+    }
+
+    /// What is noted for a port.
+    pub fn note(&self, port: &str) -> Option<Note> {
+        self.read().uploads.remove(port)
+    }
+
+    /// Notes that an upload is about to begin.
+    ///
+    /// # Errors
+    /// If the journal cannot be written.
+    pub fn begin(&self, port: &str, note: Note) -> io::Result<()> {
+        let mut notes = self.read();
+        notes.uploads.insert(port.to_owned(), note);
+        while notes.uploads.len() > MOST_NOTES {
+            let oldest = notes.uploads.iter().min_by_key(|(_, note)| note.unix_seconds).map(|(port, _)| port.clone());
+            oldest.and_then(|oldest| notes.uploads.remove(&oldest));
+        }
+        self.write(notes)
+    }
+
+    /// Forgets a port: its unit runs.
+    ///
+    /// # Errors
+    /// If the journal cannot be written.
+    pub fn end(&self, port: &str) -> io::Result<()> {
+        let mut notes = self.read();
+        if notes.uploads.remove(port).is_some() { self.write(notes) } else { Ok(()) }
+    }
+
+    /// A journal that cannot be read holds nothing: the user is asked for the product then, and no harm is done.
+    fn read(&self) -> Notes {
+        let small = fs::metadata(&self.file).is_ok_and(|metadata| metadata.len() <= LARGEST);
+        let text = if small { fs::read(&self.file).unwrap_or_default() } else { Vec::new() };
+        serde_json::from_slice(&text).unwrap_or_default()
+    }
+
+    /// Replaces the file as a whole: old or new, never torn.
+    fn write(&self, mut notes: Notes) -> io::Result<()> {
+        SCHEMA.clone_into(&mut notes.schema);
+        let folder = self.file.parent().unwrap_or(Path::new("."));
+        fs::create_dir_all(folder)?;
+        let fresh = folder.join(format!("uploads.json.{}.tmp", std::process::id()));
+        let mut file = fs::File::create(&fresh)?;
+        let written = serde_json::to_writer_pretty(&mut file, &notes)
+            .map_err(io::Error::from)
+            .and_then(|()| file.write_all(b"\n"))
+            .and_then(|()| file.sync_all())
+            .and_then(|()| fs::rename(&fresh, &self.file));
+        if written.is_err() {
+            let _ = fs::remove_file(&fresh);
+        }
+        written
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn note(unix_seconds: i64) -> Note {
+        Note { product: "AXTC4CO".into(), image: "a.S".into(), unix_seconds }
+    }
+
+    #[test]
+    fn a_note_lasts_until_the_upload_has_ended() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let journal = Journal::at(folder.path().join("below/uploads.json"));
+        assert_eq!(journal.note("u0"), None);
+        journal.begin("u0", note(1)).expect("written");
+        journal.begin("u1", note(2)).expect("written");
+        assert_eq!(journal.note("u0"), Some(note(1)));
+        journal.end("u0").expect("written");
+        assert_eq!((journal.note("u0"), journal.note("u1")), (None, Some(note(2))));
+    }
+
+    #[test]
+    fn the_oldest_notes_go_first() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let journal = Journal::at(folder.path().join("uploads.json"));
+        for number in 0..=MOST_NOTES {
+            journal.begin(&format!("u{number}"), note(number as i64)).expect("written");
+        }
+        assert_eq!(journal.note("u0"), None);
+        assert_eq!(journal.note("u1"), Some(note(1)));
+    }
+
+    #[test]
+    fn a_journal_that_makes_no_sense_holds_nothing_and_is_written_anew() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("uploads.json");
+        fs::write(&file, b"\xff{]").expect("written");
+        let journal = Journal::at(file);
+        assert_eq!(journal.note("u0"), None);
+        journal.begin("u0", note(1)).expect("written");
+        assert_eq!(journal.note("u0"), Some(note(1)));
+    }
+}
