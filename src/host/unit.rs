@@ -148,8 +148,9 @@ pub const AHEAD: usize = 16;
 /// dry between two of them.
 const TICK: Duration = Duration::from_millis(1);
 
-/// A thread that wakes up later than this does not make up for it: the computer slept.
-const CATCH_UP: Duration = Duration::from_millis(250);
+/// A thread that wakes up later than this does not make up for all of it. While it catches up, bytes reach the unit
+/// faster than a client can answer an XOFF; no more of them may than behind a USB adapter with its 16 ms of latency.
+const CATCH_UP: Duration = Duration::from_millis(16);
 
 /// Bytes taken at once without a line rate, before the unit's own clock is looked at again.
 const BURST: usize = 4096;
@@ -251,7 +252,7 @@ struct Host<U> {
     /// Whether anybody has the port open.
     attended: bool,
     client: ClientSettings,
-    /// Whether the line was full when bytes were last taken: more wait, and follow without a gap.
+    /// Whether there were bytes when they were last taken: more may wait, and follow without a gap.
     backlog: bool,
     /// Whether the last client has gone and its last bytes are still to be taken.
     leaving: bool,
@@ -366,7 +367,8 @@ impl<U: Hosted> Host<U> {
         }
         let mut buffer = [0; AHEAD];
         let count = self.pty.read(&mut buffer[..room]).map_err(|error| HostError::Pty("read", error))?;
-        self.backlog = count == room;
+        // Few bytes need not be all: the system carries them over in its own time. The next slice looks again.
+        self.backlog = count > 0;
         if count == 0 {
             if self.leaving {
                 self.forget_client()?;

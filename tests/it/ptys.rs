@@ -186,7 +186,10 @@ fn a_port_without_permission_names_the_group_that_has_it() {
         // Root passes every permission, so the program has to be somebody else, and has to lie where he may go.
         copy = tempfile::Builder::new().permissions(fs::Permissions::from_mode(0o755)).tempdir().expect("a folder");
         let program = copy.path().join("axcon");
-        fs::copy(env!("CARGO_BIN_EXE_axcon"), &program).expect("copied");
+        // By another process: a program that is open for writing cannot be started, and a test next door that starts
+        // one just then would keep it open.
+        let cp = std::process::Command::new("cp").arg(env!("CARGO_BIN_EXE_axcon")).arg(&program).status();
+        assert!(cp.expect("cp runs").success());
         command = world.command_of(&program, &["terminal", "--no-record", "--port", text(pty.path())]);
         command.uid(NOBODY).gid(NOBODY).current_dir("/");
     }
@@ -312,14 +315,13 @@ fn without_a_line_rate_bytes_come_as_they_are_at_any_setting() {
 
 #[test]
 fn a_client_at_another_rate_sends_and_gets_garbage() {
-    let fake = Fake { greeting: b"hello", ..echo() };
+    let fake = echo();
     let notes = fake.notes.clone();
-    let hosting = Hosting { power: Power::AtFirstClient, ..Hosting::default() };
-    let unit = HostedUnit::start(fake, hosting).expect("hosted");
+    let unit = host(fake);
     let (connection, received) = connect(unit.serial(), 9_600);
     connection.send(*b"menu").expect("sent");
     let garbage = receive(&received, 4);
-    assert!(garbage.iter().any(|byte| *byte >= 0x80), "{garbage:02x?}");
+    assert!(garbage.iter().all(|byte| *byte >= 0x80), "{garbage:02x?}");
     wait_until("all bytes", || notes.lock().expect("no panic").got.len() == 4);
     assert!(notes.lock().expect("no panic").got.iter().all(|(_, byte)| *byte >= 0x80));
 }
@@ -370,9 +372,9 @@ fn a_client_that_obeys_xoff_is_held_with_what_waits_in_the_pseudo_terminal() {
 
 #[test]
 fn a_client_that_does_not_obey_xoff_overruns_the_unit() {
-    // At the line's rate 690 characters come in that time.
+    // At the line's rate 690 characters come in that time, if the client is never late.
     let slipped = bytes_that_slip_past_an_xoff(serialport::FlowControl::None);
-    assert!((600..=700).contains(&slipped), "{slipped} bytes");
+    assert!((10 * AHEAD..=700).contains(&slipped), "{slipped} bytes");
 }
 
 #[test]
@@ -429,7 +431,7 @@ fn the_terminal_shows_what_is_harmless_and_logs_what_came() {
 #[test]
 fn the_terminal_obeys_xoff() {
     let world = World::new();
-    let fake = Fake { hold: Some((100, Duration::from_millis(100))), ..Fake::default() };
+    let fake = Fake { hold: Some((100, Duration::from_millis(500))), ..Fake::default() };
     let notes = fake.notes.clone();
     let unit = host(fake);
     let ran = world.run(&["terminal", "--no-record", "--port", text(unit.serial())], &[b'x'; 3_000]);
@@ -437,8 +439,9 @@ fn the_terminal_obeys_xoff() {
     assert_eq!(ran.out, "", "XON and XOFF are not text");
     let notes = notes.lock().expect("no panic");
     assert_eq!(notes.got.len(), 3_000);
-    // What is on the line, and one piece more that left before the XOFF was read.
-    assert!(notes.while_holding <= 200, "{} bytes", notes.while_holding);
+    // What is on the line, and what left before the XOFF was read: milliseconds, or more on a busy machine. All the
+    // rest would come meanwhile if nobody obeyed.
+    assert!(notes.while_holding <= 2_000, "{} bytes", notes.while_holding);
 }
 
 #[test]
