@@ -525,3 +525,270 @@ impl Scan {
 fn lines_in_words(lines: u64) -> String {
     if lines == 1 { "one line".into() } else { format!("{lines} lines") }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::make::{self, FEWEST_WORDS, Recipe, make};
+    use super::super::{CheckedImage, FlashMap, Severity};
+    use super::*;
+    use crate::version::Version;
+
+    fn target() -> Target {
+        Target {
+            product: "AXTEST".into(),
+            flash: FlashMap { address_unit: AddressUnit::Word, program_words: 0x10000, page_words: 256 },
+            file_name: "AXTEST_V{version}.elf.S".into(),
+        }
+    }
+
+    fn sample(flaw: Option<DefectId>) -> Vec<u8> {
+        let recipe = Recipe { target: &target(), version: Version::new(1, 2, 0), words: FEWEST_WORDS, flaw };
+        make(&recipe).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn report_with(file: &[u8], name: Option<&str>, expected: Option<&str>, allow: &[DefectId]) -> Report {
+        check(file, name, &[target()], expected, allow).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn report(file: &[u8]) -> Report {
+        report_with(file, None, None, &[])
+    }
+
+    fn found(report: &Report) -> Vec<(&'static str, u64, u32)> {
+        report.defects.iter().map(|defect| (defect.id.name(), defect.line, defect.column)).collect()
+    }
+
+    /// A file of a few records, written here by hand: the checks of structure, without an identity.
+    const HEAD: &str = "S0110000000050524F4752414D264441544196\n";
+
+    #[test]
+    fn small_files_and_all_that_is_wrong_with_them() {
+        let one = "S307000000001122C5\n";
+        let two = "S30700000001334480\n";
+        let end = "S70500000000FA\n";
+        let table: [(String, &[(&str, u64, u32)]); 24] = [
+            (format!("{HEAD}{one}{two}{end}"), &[("no-identity", 1, 1)]),
+            (String::new(), &[("empty-file", 1, 1)]),
+            ("\r\n \n".into(), &[("empty-file", 1, 1)]),
+            ("hello\n".into(), &[("not-s-record", 1, 1)]),
+            (":10010000214601360121470136007EFE09D2190140\n".into(), &[("not-s-record", 1, 1)]),
+            ("\u{7F}ELF\u{1}".into(), &[("not-s-record", 1, 1)]),
+            (format!("{one}{end}"), &[("no-identity", 1, 1), ("missing-header", 1, 1)]),
+            (HEAD.into(), &[("missing-terminator", 1, 1), ("no-data", 1, 1)]),
+            (format!("{HEAD}{end}"), &[("no-data", 2, 1)]),
+            (format!("{HEAD}{one}"), &[("no-identity", 1, 1), ("missing-terminator", 2, 1)]),
+            (
+                format!("{HEAD}S3070000000011226EE5\n{end}"),
+                &[("bad-checksum", 2, 17), ("trailing-characters", 2, 19), ("no-identity", 1, 1)],
+            ),
+            (format!("{HEAD}\n{one}{end}\n"), &[("no-identity", 1, 1), ("blank-line", 2, 1)]),
+            (format!("\u{FEFF}{HEAD}{one}{end}"), &[("byte-order-mark", 1, 1), ("no-identity", 1, 1)]),
+            (format!("{HEAD}{}{end}", one.replace("1122", "11ä2")), &[("bad-character", 2, 15)]),
+            (format!("{HEAD}{}{end}", one.replace("1122", "1\0\u{7F}2")), &[("bad-character", 2, 14)]),
+            (format!("{HEAD}{one}{one}{end}"), &[("no-identity", 1, 1), ("overlap", 3, 5)]),
+            (format!("{HEAD}{two}{one}{end}"), &[("no-identity", 1, 1), ("descending", 3, 5)]),
+            (format!("{HEAD}{two}{end}"), &[("no-identity", 1, 1), ("gap", 2, 5), ("entry-outside", 3, 5)]),
+            (format!("{HEAD}{one}S5030001FB\n{end}"), &[("no-identity", 1, 1), ("count-record", 3, 1)]),
+            (
+                format!("{HEAD}{one}S5030002FA\n{end}"),
+                &[("no-identity", 1, 1), ("count-record", 3, 1), ("wrong-count", 3, 5)],
+            ),
+            (format!("{HEAD}{one}{end}{end}{one}"), &[("no-identity", 1, 1), ("after-terminator", 4, 1)]),
+            (format!("{HEAD}{one}S9030000FC\n"), &[("no-identity", 1, 1), ("refused-type", 3, 1)]),
+            (format!("{HEAD}{one}S30300EE\n{end}"), &[("bad-length", 3, 3)]),
+            (format!("S001FE\n{one}{end}"), &[("bad-length", 1, 3)]),
+        ];
+        for (file, expected) in table {
+            let (mut found, mut expected) = (found(&report(file.as_bytes())), expected.to_vec());
+            found.sort_unstable();
+            expected.sort_unstable();
+            assert_eq!(found, expected, "{file:?}");
+        }
+    }
+
+    #[test]
+    fn every_flaw_that_can_be_made_is_found_and_no_other_error() {
+        for flaw in make::flaws() {
+            let report = report(&sample(Some(flaw)));
+            assert!(report.defects.iter().any(|defect| defect.id == flaw), "{flaw}: {:?}", report.defects);
+            let others = report.defects.iter().filter(|other| other.id != flaw && other.severity == Severity::Error);
+            assert_eq!(others.count(), 0, "{flaw}: {:?}", report.defects);
+            assert_eq!(report.image().is_some(), flaw.severity() == Severity::Warning, "{flaw}");
+        }
+    }
+
+    #[test]
+    fn what_is_expected_is_compared() {
+        let file = sample(None);
+        let other = Target { product: "AXOTHER".into(), file_name: "AXOTHER_V{version}.elf.S".into(), ..target() };
+        let targets = [target(), other];
+        let with = |name, expected| check(&file[..], name, &targets, expected, &[]).map(|report| found(&report)).ok();
+        assert_eq!(with(Some("/a/b/AXTEST_V1.2.0.elf.S"), Some("axtest")), Some(vec![]));
+        assert_eq!(with(Some("AXTEST_V1.2.1.elf.S"), None), Some(vec![("file-name", 10, 1)]));
+        assert_eq!(with(Some("AXOTHER_V1.2.0.elf.S"), None), Some(vec![("file-name", 10, 1)]));
+        assert_eq!(with(None, Some("AXOTHER")), Some(vec![("wrong-product", 10, 1)]));
+        let nameless = report_with(&sample(Some(DefectId::NoIdentity)), None, Some("AXTEST"), &[]);
+        assert_eq!(nameless.errors, 1, "when a product is expected, silence is an error: {:?}", nameless.defects);
+    }
+
+    #[test]
+    fn an_allowed_error_is_listed_and_recorded_and_others_still_count() {
+        let file = sample(Some(DefectId::BadChecksum));
+        let report = report_with(&file, None, None, &[DefectId::BadChecksum, DefectId::Overlap]);
+        assert!(report.is_ok() && report.defects[0].allowed);
+        assert_eq!(report.image().map(|image| image.overridden().to_vec()), Some(vec![DefectId::BadChecksum]));
+        assert!(!report_with(&file, None, None, &[DefectId::Overlap]).is_ok());
+        let lost = report_with(&sample(Some(DefectId::BadCharacter)), None, None, &[DefectId::BadCharacter]);
+        assert!(!lost.is_ok(), "what cannot be read cannot be sent");
+    }
+
+    #[test]
+    fn odd_data_is_filled_up_when_it_is_allowed() {
+        let report = report_with(&sample(Some(DefectId::OddLength)), None, None, &[DefectId::OddLength]);
+        let last = report.image().and_then(|image| image.image().blocks.last().cloned());
+        assert_eq!(last.map(|block| (block.data.len(), block.data.last().copied())), Some((32, Some(0xFF))));
+    }
+
+    #[test]
+    fn all_line_ends_give_the_same_image() {
+        let file = sample(None);
+        let text = String::from_utf8_lossy(&file).into_owned();
+        let image = report(&file).image();
+        assert!(image.is_some());
+        for end in ["\r", "\n"] {
+            let report = report(text.replace("\r\n", end).as_bytes());
+            assert_eq!((report.defects.len(), report.image()), (0, image.clone()), "{end:?}");
+        }
+        assert_eq!(report(text.to_lowercase().as_bytes()).image(), image);
+    }
+
+    #[test]
+    fn the_srec_crate_reads_the_same_data() {
+        let file = sample(None);
+        let text = String::from_utf8_lossy(&file).into_owned();
+        let theirs: Vec<(u32, Vec<u8>)> = srec::read_records(&text)
+            .filter_map(|record| match record {
+                Ok(srec::Record::S3(data)) => Some((data.address.0, data.data)),
+                _ => None,
+            })
+            .collect();
+        let image = report(&file).image();
+        let ours =
+            image.iter().flat_map(|image| &image.image().blocks).map(|block| (block.address, block.data.clone()));
+        assert_eq!(ours.collect::<Vec<_>>(), theirs);
+    }
+
+    #[test]
+    fn junk_gives_a_bounded_report() {
+        let mut file = b"S0030000FC\n".to_vec();
+        file.extend(b"?\n".repeat(50_000));
+        let report = report(&file);
+        assert_eq!(report.errors, 50_002 - 1, "every line and the missing terminator");
+        assert_eq!(report.defects.len() as u64, super::super::defect::MOST_LISTED + report.warnings);
+    }
+
+    #[test]
+    fn more_than_any_flash_holds_is_not_kept() {
+        let mut file = HEAD.as_bytes().to_vec();
+        for address in (0..0x50_0000u32).step_by(125) {
+            Record { kind: Kind::Data32, address, data: &[0x5A; 250] }.write(&mut file);
+            file.push(b'\r');
+            if file.len() > 2_000_000 {
+                break;
+            }
+        }
+        file.extend(b"S70500000000FA\r");
+        let report = report(&file);
+        assert!(report.content.bytes.len() <= MOST_BYTES);
+        assert_eq!(report.defects.iter().filter(|defect| defect.id == DefectId::TooLarge).count(), 1);
+        assert!(report.image().is_none());
+    }
+
+    /// Gives one to `most` bytes at a time.
+    struct Dribble<'a> {
+        bytes: &'a [u8],
+        most: usize,
+    }
+
+    impl Read for Dribble<'_> {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            let size = (1 + self.bytes.len() % self.most).min(buffer.len());
+            self.bytes.read(&mut buffer[..size])
+        }
+    }
+
+    fn every_flaw() -> Vec<Option<DefectId>> {
+        make::flaws().map(Some).chain([None]).collect()
+    }
+
+    /// Samples with one of these flaws, then damaged anywhere.
+    fn damaged(flaws: Vec<Option<DefectId>>) -> impl Strategy<Value = Vec<u8>> {
+        let damage = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..3), 0..6);
+        (prop::sample::select(flaws), damage).prop_map(|(flaw, damage)| {
+            let mut file = sample(flaw);
+            for (at, byte, deed) in damage {
+                let at = at.index(file.len() + 1);
+                match deed {
+                    0 => file.insert(at, byte),
+                    1 if at < file.len() => file[at] = byte,
+                    2 if at < file.len() => drop(file.remove(at)),
+                    _ => {}
+                }
+            }
+            file
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(96))]
+
+        #[test]
+        fn no_chunking_and_no_buffer_changes_a_report(file in damaged(every_flaw()), most in 1usize..600, buffer in 0usize..300) {
+            let whole = report(&file);
+            let lines = Lines::with_buffer(Dribble { bytes: &file, most }, lines::SMALLEST_BUFFER + buffer);
+            let pieces = check_lines(lines, None, &[target()], None, &[]);
+            let pieces = pieces.map_err(|error| TestCaseError::fail(error.to_string()))?;
+            prop_assert_eq!(&whole.defects, &pieces.defects);
+            prop_assert_eq!(&whole.facts, &pieces.facts);
+            prop_assert_eq!(whole.image(), pieces.image());
+        }
+
+        #[test]
+        fn damage_never_passes_as_another_program(file in damaged(vec![None])) {
+            let sorted = |image: CheckedImage| {
+                let mut blocks: Vec<(u32, Vec<u8>)> =
+                    image.image().blocks.iter().map(|block| (block.address, block.data.clone())).collect();
+                blocks.sort();
+                blocks
+            };
+            if let Some(image) = report(&file).image() && image.identity().is_some() {
+                prop_assert_eq!(Some(sorted(image)), report(&sample(None)).image().map(sorted));
+            }
+        }
+
+        #[test]
+        fn junk_never_panics(junk in prop::collection::vec(any::<u8>(), 0..6000), record_like in any::<bool>()) {
+            let mut file = if record_like { b"S0030000FC\rS3".to_vec() } else { Vec::new() };
+            file.extend(junk);
+            let report = report(&file);
+            prop_assert!(!report.is_ok());
+            for defect in &report.defects {
+                prop_assert!(!defect.message.chars().any(char::is_control), "{:?}", defect);
+                prop_assert!(defect.line >= 1 && defect.column >= 1);
+            }
+        }
+
+        #[test]
+        fn lines_of_records_never_panic(records in prop::collection::vec((prop::sample::select(&Kind::ALL[..]), any::<u32>(), 0usize..40), 0..40)) {
+            let mut file = b"S0030000FC\n".to_vec();
+            for (kind, address, length) in records {
+                let data = vec![0xA5; length.min(kind.most_data())];
+                Record { kind, address: address >> (32 - kind.address_bytes() * 8), data: &data }.write(&mut file);
+                file.push(b'\n');
+            }
+            prop_assert!(report_with(&file, Some("x"), None, &DefectId::ALL).facts.records > 0);
+        }
+    }
+}

@@ -165,6 +165,7 @@ fn program(content: &Content) -> Vec<u8> {
             place.copy_from_slice(data);
         }
     }
+    program.resize(program.len().next_multiple_of(content.unit.bytes() as usize), 0xFF);
     program
 }
 
@@ -230,7 +231,7 @@ fn overlaps(content: &Content, by_address: &[Piece], findings: &mut Findings) {
             if this.start < end {
                 let (line, other) = (piece.line.max(before.line), piece.line.min(before.line));
                 findings.note(DefectId::Overlap, line, 5, || {
-                    format!("{} are written by line {other} already", shown(this.start, this.end.min(end)))
+                    format!("{}: written by line {other} already", shown(this.start, this.end.min(end)))
                 });
             }
             if this.end <= end {
@@ -251,7 +252,7 @@ fn data_memory(content: &Content, findings: &mut Findings) {
     runs(content, flagged, |line, run| {
         findings.note(DefectId::DataMemory, line, 5, || {
             format!(
-                "{} are marked as data memory; some loaders do not know the mark and write into the program",
+                "{}: marked as data memory; loaders that do not know the mark write into the program",
                 shown(run.start, run.end)
             )
         });
@@ -268,8 +269,7 @@ fn out_of_range(content: &Content, target: &Judged, flash_end: u64, findings: &m
         findings.note(DefectId::OutOfRange, line, 5, || {
             let start = run.start.max(flash_end);
             format!(
-                "{} lie outside {whose} program flash, which ends at {}; a loader would skip them or fold them to {} \
-                 without a word",
+                "{}: outside {whose} program flash (to {}); a loader skips that or folds it to {}, silently",
                 shown(start, run.end),
                 address(flash_end - 1),
                 address(start % flash_end),
@@ -306,7 +306,7 @@ fn gaps(content: &Content, by_address: &[Piece], flash_end: u64, findings: &mut 
         }
         if span.start > next {
             findings.note(DefectId::Gap, piece.line, 5, || {
-                format!("no record writes {}; they may keep what an older program left", shown(next, span.start))
+                format!("no record writes {}; what an older program left there may stay", shown(next, span.start))
             });
         }
         next = next.max(span.end);
@@ -315,23 +315,15 @@ fn gaps(content: &Content, by_address: &[Piece], flash_end: u64, findings: &mut 
 
 fn wrong_unit(unit: AddressUnit, target: &Judged) -> String {
     let whose = target.product.as_deref().unwrap_or("unit");
-    match unit {
-        AddressUnit::Byte => format!(
-            "addresses count bytes, those of the {whose} words; the program would be torn apart. A general S-record \
-             tool may have converted the file"
-        ),
-        AddressUnit::Word => {
-            format!("addresses count words, those of the {whose} bytes; the program would be torn apart")
-        }
-    }
+    let (seen, wanted) = match unit {
+        AddressUnit::Byte => ("bytes", "words"),
+        AddressUnit::Word => ("words", "bytes"),
+    };
+    format!("addresses count {seen}, the {whose}'s count {wanted}; did a general tool convert the file?")
 }
 
 fn shown(start: u64, end: u64) -> String {
-    if end == start + 1 {
-        format!("addresses {}", address(start))
-    } else {
-        format!("addresses {} to {}", address(start), address(end - 1))
-    }
+    if end == start + 1 { address(start) } else { format!("{} to {}", address(start), address(end - 1)) }
 }
 
 /// An address as text, short where it is small.
