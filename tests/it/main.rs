@@ -1,5 +1,6 @@
 //! Everything that needs more than one module, in one binary.
 
+mod images;
 #[cfg(unix)]
 mod ptys;
 mod support;

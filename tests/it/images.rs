@@ -1,0 +1,225 @@
+//! The sample files, the documentation and the program agree; and `axcon image` as a user meets it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use axcon::image::{DefectId, Severity, make};
+
+fn axcon(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_axcon"));
+    command.args(arguments).env_remove("AXCON_PORT").output().expect("the program runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn json(bytes: &[u8]) -> serde_json::Value {
+    serde_json::from_slice(bytes).unwrap_or_else(|error| panic!("{error}: {}", text(bytes)))
+}
+
+fn in_tree(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+fn in_tree_text(path: &str) -> String {
+    in_tree(path).display().to_string()
+}
+
+/// The bad files, by defect, with the line at which each is found.
+const BAD: [(&str, u64); 40] = [
+    ("empty-file", 1),
+    ("not-s-record", 1),
+    ("byte-order-mark", 1),
+    ("long-line", 15),
+    ("not-a-record", 15),
+    ("unknown-type", 15),
+    ("bad-character", 15),
+    ("short-record", 15),
+    ("bad-length", 15),
+    ("bad-checksum", 15),
+    ("trailing-characters", 15),
+    ("trailing-blanks", 15),
+    ("refused-type", 22),
+    ("empty-record", 15),
+    ("blank-line", 15),
+    ("lower-case", 15),
+    ("mixed-line-ends", 15),
+    ("no-line-end", 22),
+    ("missing-header", 1),
+    ("data-before-header", 1),
+    ("duplicate-header", 15),
+    ("header-form", 1),
+    ("missing-terminator", 21),
+    ("after-terminator", 23),
+    ("count-record", 22),
+    ("wrong-count", 22),
+    ("no-data", 2),
+    ("odd-length", 21),
+    ("address-wrap", 22),
+    ("descending", 16),
+    ("overlap", 16),
+    ("address-unit", 3),
+    ("out-of-range", 22),
+    ("data-memory", 22),
+    ("gap", 15),
+    ("entry-outside", 22),
+    ("no-identity", 10),
+    ("identity-malformed", 10),
+    ("identity-crc", 10),
+    ("unknown-product", 10),
+];
+
+#[test]
+fn the_program_makes_every_sample_file_anew() {
+    for version in ["1.1.0", "1.2.0"] {
+        let made = axcon(&["image", "make", "--product", "AXTC4CO", "--version", version, "--out", "-"]);
+        let kept = fs::read(in_tree(&format!("firmware_images/AXTC4CO_V{version}.elf.S"))).expect("a sample");
+        assert!(made.stdout == kept, "AXTC4CO V{version} is not what the program makes: {}", text(&made.stderr));
+    }
+    let mut kept: BTreeMap<String, Vec<u8>> = fs::read_dir(in_tree("firmware_images/bad"))
+        .expect("the folder of bad files")
+        .map(|entry| entry.expect("an entry").path())
+        .map(|path| {
+            (path.file_name().expect("a name").to_string_lossy().into_owned(), fs::read(&path).expect("a file"))
+        })
+        .collect();
+    let recipe = ["image", "make", "--product", "AXTC4CO", "--version", "1.2.0", "--words", "320", "--out", "-"];
+    for flaw in make::flaws() {
+        let made = axcon(&[&recipe[..], &["--defect", flaw.name()]].concat());
+        assert!(made.status.success(), "{flaw}: {}", text(&made.stderr));
+        let kept = kept.remove(&format!("{flaw}.elf.S"));
+        assert!(kept.as_ref() == Some(&made.stdout), "bad/{flaw}.elf.S is not what the program makes");
+    }
+    assert_eq!(kept.into_keys().collect::<Vec<_>>(), Vec::<String>::new(), "files nothing makes");
+}
+
+#[test]
+fn each_bad_file_shows_its_defect_in_its_line_and_no_other_error() {
+    for (name, line) in BAD {
+        let id: DefectId = name.parse().expect("a defect");
+        let checked = axcon(&["image", "check", "--json", &in_tree_text(&format!("firmware_images/bad/{name}.elf.S"))]);
+        let refused = id.severity() == Severity::Error;
+        assert_eq!(checked.status.code(), Some(if refused { 5 } else { 0 }), "{name}");
+        let report = json(&checked.stdout);
+        assert_eq!((&report["schema"], &report["ok"]), (&"axcon.image/1".into(), &(!refused).into()), "{name}");
+        let defects = report["defects"].as_array().expect("a list");
+        let own: Vec<_> = defects.iter().filter(|defect| defect["id"] == name).collect();
+        assert_eq!(own.len(), 1, "{name}: {defects:?}");
+        assert_eq!(own[0]["line"], line, "{name}");
+        let others = defects.iter().filter(|defect| defect["id"] != name && defect["severity"] == "error");
+        assert_eq!(others.count(), 0, "{name}: {defects:?}");
+    }
+    let named: Vec<&str> = BAD.iter().map(|(name, _)| *name).collect();
+    assert_eq!(named, make::flaws().map(DefectId::name).collect::<Vec<_>>());
+}
+
+#[test]
+fn the_documentation_lists_every_defect_with_its_severity() {
+    let document = fs::read_to_string(in_tree("docs/images.md")).expect("the document");
+    let section = document.split("## Defects").nth(1).expect("the section");
+    let listed: Vec<(String, String)> = section
+        .lines()
+        .filter_map(|line| {
+            let mut cells = line.strip_prefix("| `")?.split('|').map(str::trim);
+            Some((cells.next()?.trim_end_matches('`').to_owned(), cells.next()?.to_owned()))
+        })
+        .collect();
+    let severity = |id: DefectId| match id {
+        DefectId::NoIdentity => "warning (error with `--product`)".to_owned(),
+        _ if id.severity() == Severity::Error && !id.can_be_allowed() => "error*".to_owned(),
+        _ => id.severity().name().to_owned(),
+    };
+    let known: Vec<(String, String)> =
+        DefectId::ALL.into_iter().map(|id| (id.name().to_owned(), severity(id))).collect();
+    assert_eq!(listed, known);
+}
+
+#[test]
+fn a_sound_image_is_told_in_words_and_as_data() {
+    let file = in_tree_text("firmware_images/AXTC4CO_V1.2.0.elf.S");
+    let checked = axcon(&["image", "check", "--product", "axtc4co", &file]);
+    assert_eq!(checked.status.code(), Some(0));
+    assert_eq!(text(&checked.stdout), format!("{file}: AXTC4CO V1.2.0, 3,074 records: may be sent, no defects\n"));
+
+    let told = text(&axcon(&["image", "info", &file]).stdout);
+    let rows: Vec<&str> = told.lines().skip(1).collect();
+    assert_eq!(
+        rows,
+        [
+            "Format        S-record, 3,074 records, line ends CR LF",
+            "Header        PROGRAM&DATA",
+            "Product       AXTC4CO",
+            "Version       1.2.0, built 2025-03-01 08:14:47",
+            "Addresses     count words",
+            "Program       0x0000 to 0xBFFF, 75 % of the AXTC4CO's flash",
+            "Entry point   0x00A0",
+            "Data          98,304 bytes",
+            "To send       242,742 characters, 21.1 s at 115200 baud",
+            "Defects       none",
+        ]
+    );
+
+    let report = json(&axcon(&["image", "check", "--json", &file]).stdout);
+    let expected = serde_json::json!({
+        "schema": "axcon.image/1", "format": "srec", "ok": true, "product": "AXTC4CO", "version": "1.2.0",
+        "records": 3074, "address_unit": "word", "ranges": [{"start": 0, "end": 49152}], "defects": [],
+    });
+    for (member, value) in expected.as_object().expect("an object") {
+        assert_eq!(&report[member], value, "{member}");
+    }
+}
+
+#[test]
+fn a_refused_image_is_one_line_for_each_defect_and_a_verdict() {
+    let file = in_tree_text("firmware_images/bad/bad-checksum.elf.S");
+    let refused = axcon(&["image", "check", &file]);
+    assert_eq!(refused.status.code(), Some(5));
+    assert_eq!(
+        text(&refused.stdout),
+        format!(
+            "{file}:15:77: error bad-checksum: the record's bytes give checksum 9F, it says 90\n\
+             {file}: AXTC4CO V1.2.0, 22 records: must not be sent, 1 error\n"
+        )
+    );
+    let allowed = axcon(&["image", "check", "--allow", "bad-checksum", &file]);
+    assert_eq!(allowed.status.code(), Some(0));
+    assert!(text(&allowed.stdout).contains(":15:77: allowed bad-checksum: "), "{}", text(&allowed.stdout));
+    assert!(text(&allowed.stdout).ends_with(": may be sent, 1 allowed error\n"), "{}", text(&allowed.stdout));
+    assert_eq!(axcon(&["image", "check", "--allow", "bad-character", &file]).status.code(), Some(2));
+    assert_eq!(axcon(&["image", "check", "--product", "NOSUCH", &file]).status.code(), Some(2));
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_refused_with_a_hint() {
+    let folder = in_tree_text("firmware_images");
+    let missing = in_tree_text("firmware_images/NOSUCH.elf.S");
+    for (file, what) in [(folder, "is a directory"), (missing, "cannot read the image")] {
+        for command in ["check", "info"] {
+            let refused = axcon(&["image", command, &file, "--json"]);
+            assert_eq!(refused.status.code(), Some(5), "{file}");
+            let error = json(&refused.stderr);
+            assert_eq!(error["kind"], "image-refused");
+            assert!(error["message"].as_str().is_some_and(|message| message.contains(what)), "{error}");
+            assert!(error["hints"].as_array().is_some_and(|hints| !hints.is_empty()), "{error}");
+        }
+    }
+}
+
+#[test]
+fn make_does_not_overwrite_unasked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("x.elf.S").display().to_string();
+    let make = ["image", "make", "--product", "AXTC4CO", "--version", "V1.0.0", "--words", "320", "--out", &file];
+    assert_eq!(axcon(&make).status.code(), Some(0));
+    let refused = axcon(&make);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("--yes"), "{}", text(&refused.stderr));
+    assert_eq!(axcon(&[&make[..], &["--yes"]].concat()).status.code(), Some(0));
+    assert_eq!(
+        axcon(&["image", "make", "--product", "AXTC4CO", "--version", "1.0.0", "--words", "9"]).status.code(),
+        Some(2)
+    );
+}
