@@ -263,12 +263,8 @@ fn facts_text(report: &Report, file: &str) -> String {
         row("Addresses", &format!("count {}s", unit.name()));
     }
     for (at, range) in facts.ranges.iter().take(RANGES_SHOWN).enumerate() {
-        let flash = facts.flash_end.filter(|&end| range.end <= end && at == 0).map_or(String::new(), |end| {
-            let whose = facts.judged_for.as_deref().map_or("the largest".into(), |product| format!("the {product}'s"));
-            format!(", {} % of {whose} flash", (range.end - range.start) * 100 / end)
-        });
         let name = if at == 0 { "Program" } else { "" };
-        row(name, &format!("0x{:04X} to 0x{:04X}{flash}", range.start, range.end - 1));
+        row(name, &format!("0x{:04X} to 0x{:04X}", range.start, range.end - 1));
     }
     if facts.ranges.len() > RANGES_SHOWN {
         row("", &format!("and {} more ranges", facts.ranges.len() - RANGES_SHOWN));
@@ -278,7 +274,7 @@ fn facts_text(report: &Report, file: &str) -> String {
     }
     if facts.data_bytes > 0 {
         let seconds = facts.characters as f64 / CHARACTERS_PER_SECOND;
-        row("Data", &format!("{} bytes", grouped(facts.data_bytes)));
+        row("Data", &format!("{} bytes{}", grouped(facts.data_bytes), share(report)));
         row("To send", &format!("{} characters, {seconds:.1} s at 115200 baud", grouped(facts.characters)));
     }
     let counts = [counted(report.errors, "error"), counted(report.warnings, "warning")];
@@ -289,6 +285,17 @@ fn facts_text(report: &Report, file: &str) -> String {
         row("Defects", &format!("{}; `axcon image check` lists them", counts.join(", ")));
     }
     text
+}
+
+/// How much of the flash the data takes.
+fn share(report: &Report) -> String {
+    let facts = &report.facts;
+    let Some(flash) = facts.flash_bytes.filter(|&flash| facts.data_bytes <= flash) else { return String::new() };
+    let whose = facts.judged_for.as_ref().map_or("largest known".into(), |product| format!("{product}'s"));
+    match facts.data_bytes * 100 / flash {
+        0 => format!(", less than 1 % of the {whose} flash"),
+        percent => format!(", {percent} % of the {whose} flash"),
+    }
 }
 
 /// What the file holds, in a few words.

@@ -556,7 +556,10 @@ mod tests {
         report_with(file, None, None, &[])
     }
 
-    fn found(report: &Report) -> Vec<(&'static str, u64, u32)> {
+    /// Name, line, column.
+    type Found = (&'static str, u64, u32);
+
+    fn found(report: &Report) -> Vec<Found> {
         report.defects.iter().map(|defect| (defect.id.name(), defect.line, defect.column)).collect()
     }
 
@@ -568,7 +571,7 @@ mod tests {
         let one = "S307000000001122C5\n";
         let two = "S30700000001334480\n";
         let end = "S70500000000FA\n";
-        let table: [(String, &[(&str, u64, u32)]); 24] = [
+        let table: [(String, &[Found]); 24] = [
             (format!("{HEAD}{one}{two}{end}"), &[("no-identity", 1, 1)]),
             (String::new(), &[("empty-file", 1, 1)]),
             ("\r\n \n".into(), &[("empty-file", 1, 1)]),

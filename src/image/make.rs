@@ -92,6 +92,7 @@ pub fn make(recipe: &Recipe<'_>) -> Result<Vec<u8>, MakeError> {
 fn program(recipe: &Recipe<'_>) -> Vec<u8> {
     let Recipe { target, version, words, flaw } = *recipe;
     let mut rng = Rng::new(PROGRAMS).fork(&target.product).fork(&version.to_string());
+    let mut clock = rng.fork("build time");
     let mut program = Vec::with_capacity(words as usize * 2);
     // A vector is a jump and where to; the block and the code follow.
     for vector in 0..identity::WORD_ADDRESS {
@@ -124,7 +125,7 @@ fn program(recipe: &Recipe<'_>) -> Vec<u8> {
             1 + version.minor % 12,
             1 + version.patch % 28
         ),
-        build_time: format!("{:02}:{:02}:{:02}", 8 + rng.below(10), rng.below(60), rng.below(60)),
+        build_time: format!("{:02}:{:02}:{:02}", 8 + clock.below(10), clock.below(60), clock.below(60)),
         program_words: 0,
         crc: 0,
     };

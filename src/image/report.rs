@@ -83,8 +83,8 @@ pub struct Facts {
     pub identity: Option<Identity>,
     /// Name of the known product the image was judged for.
     pub judged_for: Option<String>,
-    /// Addresses of that product's program flash.
-    pub flash_end: Option<u64>,
+    /// Bytes of program flash it was judged for.
+    pub flash_bytes: Option<u64>,
     /// Characters on the wire if the records are sent as they are, each with one character as its line end.
     pub characters: u64,
 }

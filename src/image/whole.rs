@@ -41,7 +41,7 @@ impl Whole<'_> {
         }
         facts.identity = identity;
         facts.judged_for = target.product.clone();
-        facts.flash_end = target.flash.map(|flash| flash.end());
+        facts.flash_bytes = target.flash.map(|flash| u64::from(flash.program_words) * 2);
 
         let by_address = by_address(content);
         facts.ranges = ranges(content, &by_address);
