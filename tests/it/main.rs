@@ -1,5 +1,7 @@
 //! Everything that needs more than one module, in one binary.
 
+#[cfg(unix)]
+mod commands;
 mod emulator;
 mod images;
 #[cfg(unix)]
