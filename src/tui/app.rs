@@ -48,7 +48,6 @@ pub struct Options {
 }
 
 /// The console.
-#[derive(Debug)]
 pub struct App {
     options: Options,
     theme: Theme,
@@ -176,7 +175,6 @@ impl App {
         let area = frame.area();
         let columns = usize::from(area.width);
         let row = |y: u16| Rect { y, height: 1, ..area };
-        let is_terminal = self.front == ScreenId::Terminal && self.help.is_none();
         let front = self.help.is_none().then_some(self.front);
         let theme = self.theme;
         lines::draw(frame, row(0), [frame::header(&self.view, theme, columns)]);
@@ -187,7 +185,12 @@ impl App {
         self.draw_screen(body, frame);
         lines::draw(frame, row(area.height - 3), [frame::notice(&self.view, theme, columns)]);
         lines::draw(frame, row(area.height - 2), [frame::menu(theme)]);
-        let keys = frame::keys(theme, self.front.bindings(), is_terminal, self.terminal.is_after_prefix());
+        let keys = match self.front {
+            _ if self.help.is_some() => frame::help_keys(theme),
+            ScreenId::Terminal => frame::terminal_keys(theme, self.front.bindings(), self.terminal.is_after_prefix()),
+            ScreenId::Load => frame::keys(theme, self.load.footer(&self.view)),
+            ScreenId::Connect | ScreenId::Overview => frame::keys(theme, self.front.bindings()),
+        };
         lines::draw(frame, row(area.height - 1), [keys]);
         if let Some(popup) = &self.popup {
             popup::draw(popup, &self.view, theme, frame::body(area), frame);
@@ -532,7 +535,9 @@ impl App {
         if matches!(self.view.link.state, LinkState::Open { .. }) {
             self.scrollback.note(now, "link lost".into());
             self.view.link.state = LinkState::Lost(failure);
-            // A job goes on until its deadline: the session then says what it believes of the unit.
+            if let Some(session) = &mut self.session {
+                session.link_lost(now);
+            }
             self.popup = None;
         }
     }

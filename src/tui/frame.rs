@@ -18,8 +18,10 @@ pub const LEAST: (u16, u16) = (80, 24);
 const ABOVE: u16 = 2;
 /// Rows below it.
 const BELOW: u16 = 3;
-/// The recording's name gets this many columns or is left out.
-const LEAST_RECORDING: usize = 12;
+/// What stands before the recording's name.
+const RECORDING: &str = "rec ";
+/// With fewer columns than this the recording's name says nothing.
+const LEAST_RECORDING: usize = 20;
 
 /// Where the screen itself is drawn.
 pub fn body(area: Rect) -> Rect {
@@ -44,7 +46,7 @@ pub fn too_small(frame: &mut Frame) -> bool {
     true
 }
 
-/// Product, version, node, link and recording, in one line.
+/// Product, version, node and link, in one line.
 pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
     let facts = &view.facts;
     let product = facts.product.as_ref().map(|known| visible::text(&known.value));
@@ -75,17 +77,10 @@ pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
     let room = columns.saturating_sub(fixed);
     parts.extend(name.map(|name| format::keep_end(&name, room.saturating_sub(3).max(8))));
     parts.push(link.to_owned());
-    let used = parts.iter().map(|part| format::width(part) + 3).sum::<usize>();
-    if let Some(recording) = &view.link.recording {
-        let room = columns.saturating_sub(used + format::width("recording ") + 1);
-        if room >= LEAST_RECORDING {
-            parts.push(format!("recording {}", format::keep_end(&visible::text(recording), room)));
-        }
-    }
     Line::styled(format::left(&format!(" {}", parts.join(" │ ")), columns), theme.bar())
 }
 
-/// The tabs, and what is being done.
+/// The tabs; on the right what is being done, or else where the recording goes.
 pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) -> Line<'static> {
     let mut line = Line::raw(" ");
     for (number, screen) in (1..).zip(ScreenId::ALL) {
@@ -107,9 +102,17 @@ pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) 
         Some(Job::RestoreDefaults) => "restoring defaults",
         Some(Job::Load) => "loading",
     };
-    let missing = columns.saturating_sub(line.width() + format::width(activity) + 1);
-    line.push_span(Span::raw(" ".repeat(missing)));
-    line.push_span(Span::styled(activity, theme.warning()));
+    let room = columns.saturating_sub(line.width() + 1);
+    let right = match &view.link.recording {
+        _ if !activity.is_empty() => Span::styled(activity, theme.warning()),
+        Some(path) if room > LEAST_RECORDING => {
+            let path = format::keep_end(&visible::text(path), room - RECORDING.len());
+            Span::styled(format!("{RECORDING}{path}"), theme.quiet())
+        }
+        Some(_) | None => Span::raw(""),
+    };
+    line.push_span(Span::raw(" ".repeat(room.saturating_sub(right.width()))));
+    line.push_span(right);
     line
 }
 
@@ -148,27 +151,38 @@ pub fn menu(theme: Theme) -> Line<'static> {
 }
 
 /// The screen's keys and those that work everywhere.
-pub fn keys(theme: Theme, bindings: &[Binding], is_terminal: bool, after_prefix: bool) -> Line<'static> {
+pub fn keys(theme: Theme, bindings: &[Binding]) -> Line<'static> {
     let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
-    if is_terminal {
-        let word = match after_prefix {
-            true => Span::styled("next key is for axcon: ", theme.warning()),
-            false => Span::raw("keys go to the unit, but after "),
-        };
-        line.push_span(word);
-        if !after_prefix {
-            line.push_span(Span::styled("Ctrl-] ", theme.key()));
-        }
-        let after: Vec<_> = bindings.iter().filter(|binding| is_letter(binding)).collect();
-        for binding in after {
-            line.spans.extend(hint(theme, binding));
-        }
-        line.push_span(Span::styled("1-4", theme.key()));
-        line.push_span(Span::raw(" screen  "));
-        line.spans.extend(hints(theme, &[EVERYWHERE]));
-        return line;
-    }
     line.spans.extend(hints(theme, &[bindings, EVERYWHERE]));
+    line
+}
+
+/// The keys of the terminal screen: those behind the prefix.
+pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'static> {
+    let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
+    if after_prefix {
+        line.push_span(Span::styled("next key is for axcon: ", theme.warning()));
+    } else {
+        line.push_span(Span::raw("keys to the unit; "));
+        line.push_span(Span::styled("Ctrl-]", theme.key()));
+        line.push_span(Span::raw(" then "));
+    }
+    for binding in bindings.iter().filter(|binding| is_letter(binding)) {
+        line.spans.extend(hint(theme, binding));
+    }
+    line.push_span(Span::styled("1-4", theme.key()));
+    line.push_span(Span::raw(" screen  "));
+    line.spans.extend(hints(theme, &[EVERYWHERE]));
+    line
+}
+
+/// The keys of the help page.
+pub fn help_keys(theme: Theme) -> Line<'static> {
+    let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
+    for (key, meaning) in [("↑↓", "scroll"), ("1-4", "screen"), ("any other key", "back")] {
+        line.push_span(Span::styled(key, theme.key()));
+        line.push_span(Span::raw(format!(" {meaning}  ")));
+    }
     line
 }
 

@@ -101,13 +101,13 @@ pub const MENU: &[Binding] = &[
         &[Press::Plain(KeyCode::Char('m'))],
         MenuCmd::Menu,
         "menu",
-        "ask the unit who it is: it prints its main menu and network variables",
+        "ask who is there: the unit prints menu and network variables",
     ),
     menu(
         &[Press::Plain(KeyCode::Char('v'))],
         MenuCmd::View,
         "view",
-        "view the object dictionary, printed by the unit; halts scanning and CAN",
+        "view the object dictionary; halts scanning and CAN meanwhile",
     ),
     menu(
         &[Press::Plain(KeyCode::Char('d'))],

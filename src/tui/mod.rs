@@ -20,3 +20,6 @@ mod widgets;
 
 pub use app::{App, Options};
 pub use input::{Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, PortEntry};
+
+#[cfg(test)]
+mod pictures;

@@ -142,6 +142,9 @@ impl Scrollback {
     }
 
     fn sent(&mut self, at: Instant, byte: u8) {
+        if matches!(byte, 0x11 | 0x13) {
+            return;
+        }
         self.write(at, Direction::ToUnit, byte);
         if byte == b'\r' || byte == b'\n' {
             self.to_unit.line = None;

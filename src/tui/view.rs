@@ -265,15 +265,11 @@ impl View {
     fn finished(&mut self, outcome: &Outcome) {
         self.job = None;
         match outcome {
-            Outcome::Identified => match &self.facts.product {
-                Some(product) => {
-                    let version = self.facts.version.as_ref();
-                    let version = version.map(|version| format!(" {}", version.value)).unwrap_or_default();
-                    let text = format!("The unit is an {}{version}.", product.value);
-                    self.tell(Tone::Good, text);
-                }
-                None => self.tell(Tone::Quiet, "The unit talks, but has not said what it is. A power cycle makes it."),
-            },
+            Outcome::Identified => self.identified(),
+            Outcome::StreamRuns { was_on: true } => {
+                self.tell(Tone::Good, "The stream was on already and now sends what you asked for.");
+            }
+            Outcome::StreamRuns { was_on: false } => self.tell(Tone::Good, done(Job::StreamOn)),
             Outcome::Done(job) => self.tell(Tone::Good, done(*job)),
             Outcome::NoAnswer { job, awaited, .. } => {
                 self.tell(Tone::Bad, format!("No answer: waited for {awaited}, {}.", doing(*job)));
@@ -288,6 +284,21 @@ impl View {
                 self.load.product_unknown =
                     report.verdict == crate::session::Verdict::Refused && report.product.is_none();
                 self.load.report = Some((**report).clone());
+            }
+        }
+    }
+
+    fn identified(&mut self) {
+        let version = self.facts.version.as_ref().map(|known| format!(" {}", known.value)).unwrap_or_default();
+        match (self.facts.state, &self.facts.product) {
+            (UnitState::Silent, _) => self.tell(Tone::Bad, "Nobody has answered: check power, cable and port."),
+            (UnitState::Loader, _) => self.tell(Tone::Quiet, "The unit waits in its loader for a file: L loads one."),
+            (UnitState::Unknown | UnitState::Application, Some(product)) => {
+                let text = format!("The unit is an {}{version}.", product.value);
+                self.tell(Tone::Good, text);
+            }
+            (UnitState::Unknown | UnitState::Application, None) => {
+                self.tell(Tone::Quiet, "The unit talks, but has not said what it is; after a power cycle it does.");
             }
         }
     }

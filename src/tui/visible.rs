@@ -53,6 +53,16 @@ pub fn text(foreign: &str) -> String {
     shown
 }
 
+/// The same, beginning with a capital: errors of the system begin in lower case, since they follow other words.
+pub fn sentence(foreign: &str) -> String {
+    let text = text(foreign);
+    let mut characters = text.chars();
+    match characters.next() {
+        Some(first) => first.to_uppercase().chain(characters).collect(),
+        None => text,
+    }
+}
+
 /// Unicode has a picture for each control character.
 fn sign(byte: u8) -> Option<char> {
     match byte {

@@ -23,7 +23,7 @@ pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Fr
         Popup::Asking(question) => ask(question, view, theme, inner),
         Popup::Waiting(what) => ("One moment".to_owned(), paragraphs(&[what], inner), Vec::new()),
         Popup::Failed { title, failure } => {
-            let mut rows = paragraphs(&[&visible::text(&failure.text)], inner);
+            let mut rows = paragraphs(&[&visible::sentence(&failure.text)], inner);
             for hint in &failure.hints {
                 rows.push(Line::default());
                 let broken = format::wrap(&visible::text(hint), inner.saturating_sub(2));
@@ -99,7 +99,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             },
             vec![("Enter", "check it"), ("Esc", "back")],
         ),
-        Question::Stream { source, millis, complaint } => (
+        Question::Stream { source, millis, complaint, .. } => (
             "Switch the data stream on",
             {
                 let choice = |mine: Source, text: &'static str| match mine == *source {

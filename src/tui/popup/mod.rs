@@ -52,6 +52,8 @@ pub enum Question {
         source: Source,
         /// Repetition time in milliseconds.
         millis: TextField,
+        /// It is still the suggested one: a digit replaces it.
+        is_suggested: bool,
         /// What is wrong with it.
         complaint: Option<&'static str>,
     },
@@ -136,8 +138,8 @@ impl Popup {
 
 impl Question {
     /// Asks for a link.
-    pub fn link(suggested: String) -> Question {
-        Question::Link(TextField::new(suggested))
+    pub fn link() -> Question {
+        Question::Link(TextField::default())
     }
 
     /// Asks for an image.
@@ -147,7 +149,12 @@ impl Question {
 
     /// Asks what the stream shall send.
     pub fn stream() -> Question {
-        Question::Stream { source: Source::FieldValue, millis: TextField::new("1000"), complaint: None }
+        Question::Stream {
+            source: Source::FieldValue,
+            millis: TextField::new("1000"),
+            is_suggested: true,
+            complaint: None,
+        }
     }
 
     /// Asks for what an upload still needs.
@@ -188,7 +195,7 @@ impl Question {
             Question::Image { typed, directory } => {
                 Answer::Act(Action::CheckImage(directory.join(typed.text().trim())))
             }
-            Question::Stream { source, millis, complaint } => match millis.text().parse() {
+            Question::Stream { source, millis, complaint, .. } => match millis.text().parse() {
                 Ok(number @ SHORTEST_PERIOD_MS..=LONGEST_PERIOD_MS) => {
                     let period = Duration::from_millis(number);
                     Answer::Act(Action::Command(Command::StreamOn { source: *source, period }))
@@ -236,9 +243,10 @@ impl Question {
                 *complaint = None;
                 field.push(character);
             }
-            Question::Stream { source, millis, complaint } => match character.to_ascii_lowercase() {
+            Question::Stream { source, millis, is_suggested, complaint } => match character.to_ascii_lowercase() {
                 'f' => *source = Source::FieldValue,
                 'p' => *source = Source::ProcessValue,
+                '0'..='9' if std::mem::take(is_suggested) => *millis = TextField::new(character),
                 '0'..='9' if millis.text().len() < LONGEST_PERIOD_MS.to_string().len() => {
                     *complaint = None;
                     millis.push(character);
@@ -263,35 +271,44 @@ impl Question {
 
     fn pop(&mut self) {
         match self {
-            Question::Link(field)
-            | Question::Image { typed: field, .. }
-            | Question::Stream { millis: field, .. }
-            | Question::Defaults { typed: field, .. }
-            | Question::Label { typed: field, .. } => field.pop(),
             Question::Password { field, .. } => field.pop(),
-            Question::View
-            | Question::CancelLoad
-            | Question::Paste(_)
-            | Question::Disconnect
-            | Question::Quit
-            | Question::QuitViewing => {}
+            _ => {
+                if let Some(field) = self.field() {
+                    field.pop();
+                }
+            }
         }
     }
 
     fn clear(&mut self) {
         match self {
+            Question::Password { field, .. } => field.clear(),
+            _ => {
+                if let Some(field) = self.field() {
+                    field.clear();
+                }
+            }
+        }
+    }
+
+    /// The plain field, if the question has one.
+    fn field(&mut self) -> Option<&mut TextField> {
+        match self {
+            Question::Stream { millis, is_suggested, .. } => {
+                *is_suggested = false;
+                Some(millis)
+            }
             Question::Link(field)
             | Question::Image { typed: field, .. }
-            | Question::Stream { millis: field, .. }
             | Question::Defaults { typed: field, .. }
-            | Question::Label { typed: field, .. } => field.clear(),
-            Question::Password { field, .. } => field.clear(),
-            Question::View
+            | Question::Label { typed: field, .. } => Some(field),
+            Question::Password { .. }
+            | Question::View
             | Question::CancelLoad
             | Question::Paste(_)
             | Question::Disconnect
             | Question::Quit
-            | Question::QuitViewing => {}
+            | Question::QuitViewing => None,
         }
     }
 }

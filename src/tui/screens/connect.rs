@@ -37,12 +37,7 @@ pub const BINDINGS: &[Binding] = &[
         short: "refresh",
         long: "look for ports again",
     },
-    Binding {
-        keys: &[Press::Plain(KeyCode::Char('x'))],
-        cmd: Cmd::Disconnect,
-        short: "disconnect",
-        long: "close the link",
-    },
+    Binding { keys: &[Press::Plain(KeyCode::Char('x'))], cmd: Cmd::Disconnect, short: "close", long: "close the link" },
 ];
 
 /// Rows below the list that explain the chosen entry.
@@ -74,15 +69,18 @@ enum Entry<'a> {
 }
 
 impl Connect {
-    /// A list is on its way.
+    /// A list is on its way. The one there is stays until then.
     pub fn listing(&mut self) {
-        self.ports = Ports::Listing;
+        if let Ports::Failed(_) = self.ports {
+            self.ports = Ports::Listing;
+        }
     }
 
     /// The list has come.
     pub fn listed(&mut self, ports: Result<Vec<PortEntry>, String>) {
         // The cursor stays on the entry it was on, wherever that is now.
-        let chosen = self.link_of(self.cursor);
+        let was_listed = matches!(self.ports, Ports::Listed(_));
+        let chosen = self.link_of(self.cursor).filter(|_| was_listed || self.cursor > 0);
         self.ports = ports.map_or_else(Ports::Failed, Ports::Listed);
         let kept = chosen.and_then(|link| (0..self.entries().len()).find(|&n| self.link_of(n).as_ref() == Some(&link)));
         self.cursor = kept.unwrap_or(0);
@@ -99,10 +97,10 @@ impl Connect {
             Cmd::Accept => {
                 return Some(match self.link_of(self.cursor) {
                     Some(link) => Action::Open(link),
-                    None => Action::Ask(Question::link(String::new())),
+                    None => Action::Ask(Question::link()),
                 });
             }
-            Cmd::Type => return Some(Action::Ask(Question::link(self.link_of(self.cursor).unwrap_or_default()))),
+            Cmd::Type => return Some(Action::Ask(Question::link())),
             Cmd::Refresh => return Some(Action::ListPorts),
             Cmd::Disconnect => {
                 return match view.link.state {

@@ -55,6 +55,23 @@ pub const BINDINGS: &[Binding] = &[
     },
 ];
 
+const ENTER: &[Press] = &[Press::Plain(KeyCode::Enter)];
+const ESC: &[Press] = &[Press::Plain(KeyCode::Esc)];
+const FINDINGS: Binding = footer(&[Press::Plain(KeyCode::Down)], Cmd::Down, "findings");
+const AGAIN: Binding = footer(&[Press::Plain(KeyCode::Char('r'))], Cmd::Refresh, "read again");
+const OTHER: Binding = footer(ESC, Cmd::Back, "other file");
+
+/// What the footer shows at each stage; the keys themselves are those of [`BINDINGS`].
+const CHECKING_KEYS: &[Binding] = &[OTHER];
+const REPORT_KEYS: &[Binding] = &[FINDINGS, OTHER, AGAIN];
+const READY_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), FINDINGS, OTHER, AGAIN];
+const RUNNING_KEYS: &[Binding] = &[footer(ESC, Cmd::Back, "cancel")];
+const VERDICT_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "close the report")];
+
+const fn footer(keys: &'static [Press], cmd: Cmd, short: &'static str) -> Binding {
+    Binding { keys, cmd, short, long: "" }
+}
+
 /// Characters a second at 115200 baud, ten bits each.
 const CHARACTERS_PER_SECOND: usize = 11_520;
 /// Defects shown at once on a small screen before the plan takes its place.
@@ -188,6 +205,22 @@ impl Load {
                 }
                 None
             }
+        }
+    }
+
+    /// The keys that mean something now, for the footer.
+    pub fn footer(&self, view: &View) -> &'static [Binding] {
+        if view.job == Some(Job::Load) {
+            return RUNNING_KEYS;
+        }
+        if view.load.report.is_some() {
+            return VERDICT_KEYS;
+        }
+        match &self.stage {
+            Stage::Picking => BINDINGS,
+            Stage::Checking(_) => CHECKING_KEYS,
+            Stage::Report { facts, .. } if objections(facts, view).is_empty() => READY_KEYS,
+            Stage::Report { .. } => REPORT_KEYS,
         }
     }
 
@@ -342,19 +375,19 @@ pub fn advice(report: &LoadReport) -> &'static str {
 fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
     let mut against = Vec::new();
     if !facts.ok || facts.checked.is_none() {
-        against.push("The file has errors: it must not be sent.".to_owned());
+        against.push("the file has errors and must not be sent.".to_owned());
     }
     if !view.can_send() {
-        against.push("No unit is connected: press 1.".to_owned());
+        against.push("no unit is connected. Press 1 to choose a link.".to_owned());
     }
     if let (Some(unit), Some(image)) = (&view.facts.product, &facts.product)
         && !unit.value.eq_ignore_ascii_case(image)
     {
         let (image, unit) = (visible::text(image), visible::text(&unit.value));
-        against.push(format!("The file is for an {image}, the unit is an {unit}."));
+        against.push(format!("the file is for an {image}, the unit is an {unit}."));
     }
     if view.job.is_some() {
-        against.push("Something else is being done with the unit: wait for it to end.".to_owned());
+        against.push("something else is being done with the unit. Wait for it to end.".to_owned());
     }
     against
 }
@@ -494,6 +527,10 @@ fn expected_version(facts: &ImageFacts) -> String {
 }
 
 fn change(view: &View, facts: &ImageFacts) -> &'static str {
+    let unit = view.facts.product.as_ref().map(|known| known.value.to_ascii_lowercase());
+    if unit.is_none() || unit != facts.product.as_ref().map(|product| product.to_ascii_lowercase()) {
+        return "cannot be compared";
+    }
     match (view.facts.version.as_ref().map(|known| known.value), facts.version) {
         (Some(now), Some(then)) if then > now => "newer",
         (Some(now), Some(then)) if then < now => "older: a downgrade",
@@ -591,7 +628,7 @@ fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line<'static>> 
     let (sent, total) = (format::grouped(report.records), format::grouped(report.records_total));
     paragraph("Sent", &format!("{sent} of {total} records in {}", format::minutes(report.duration)));
     if let Some(address) = report.address.filter(|_| report.verdict != Verdict::Done) {
-        paragraph("Last address", &format!("{address:#08x}"));
+        paragraph("Stopped at", &format!("{address:#08x}"));
     }
     if !report.heard.is_empty() {
         paragraph("Heard", &report.heard);

@@ -100,7 +100,9 @@ impl Overview {
         let newest = stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
         let Some(source) = stream.source else {
             let mut shown = vec![lines::rule(theme, columns, "Values", "")];
-            shown.extend(without_values(scene).into_iter().map(|line| Line::raw(format!("  {line}"))));
+            let room = usize::from(columns).saturating_sub(4);
+            let broken = without_values(scene).into_iter().flat_map(|text| format::wrap(text, room));
+            shown.extend(broken.map(|line| Line::raw(format!("  {line}"))));
             shown.push(Line::default());
             return shown;
         };
@@ -157,6 +159,11 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         UnitState::Application => Span::styled("application runs", theme.good()),
         UnitState::Loader => Span::styled("in its loader, waits for a file", theme.warning()),
     };
+    let other_text = match facts.unrecognised_lines {
+        0 => "none".to_owned(),
+        1 => "1 line, see the terminal".into(),
+        count => format!("{} lines, see the terminal", format::grouped(count)),
+    };
     let left = [
         ("Product", known(&facts.product, |product| visible::text(product))),
         ("Version", known(&facts.version, |version| version.to_string())),
@@ -167,7 +174,7 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         ("State", state),
         ("CANopen", known(&facts.nmt_state, |state| visible::text(state))),
         ("Stream", Span::raw(stream)),
-        ("Diagnostics", Span::raw(if facts.diagnostics { "on" } else { "off" })),
+        ("Other text", Span::raw(other_text)),
     ];
     let half = usize::from(columns) / 2 - 2;
     let mut shown = vec![lines::rule(theme, columns, "Unit", &title)];

@@ -27,7 +27,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Ctrl(']')],
         cmd: Cmd::Prefix,
         short: "",
-        long: "the next key is for axcon and not for the unit; twice: send Ctrl-] itself",
+        long: "the next key is for axcon; twice: send Ctrl-] itself",
     },
     Binding { keys: &[Press::Plain(KeyCode::PageUp)], cmd: Cmd::PageUp, short: "scroll", long: "a page up" },
     Binding { keys: &[Press::Plain(KeyCode::PageDown)], cmd: Cmd::PageDown, short: "", long: "a page down" },
