@@ -167,6 +167,11 @@ impl App {
         self.dirty |= self.scrollback.follow(record);
     }
 
+    /// Every byte of the connection, secrets already out of it: what a recording follows after each input.
+    pub fn record(&self) -> &Record {
+        self.session.as_ref().map_or(&self.no_record, Session::record)
+    }
+
     /// Draws the picture.
     pub fn draw(&self, frame: &mut Frame) {
         if frame::too_small(frame) {
@@ -564,9 +569,5 @@ impl App {
         }
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         self.dirty |= self.scrollback.follow(record);
-    }
-
-    fn record(&self) -> &Record {
-        self.session.as_ref().map_or(&self.no_record, Session::record)
     }
 }

@@ -322,6 +322,11 @@ pictures! {
         stage.press(KeyCode::Down);
         stage
     };
+    overview_of_a_broken_channel: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.press(KeyCode::Down).press(KeyCode::Down).press(KeyCode::Down);
+        stage
+    };
     overview_late: |size| {
         let mut stage = Stage::streaming(size);
         stage.wait(10_000);

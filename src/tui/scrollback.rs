@@ -6,14 +6,17 @@
 
 use std::collections::VecDeque;
 
-use super::visible;
 use crate::record::{Direction, Record};
 use crate::time::Instant;
+use crate::wire::visible::{Controls, Visible};
+use crate::wire::{XOFF, XON};
 
 /// Lines kept: several minutes of a fast stream, some hours of ordinary talk.
 pub const KEPT_LINES: usize = 10_000;
-/// Characters of a line at most; a unit that never ends its line gets it ended here.
+/// Bytes of a line's text at most; a unit that never ends its line gets it ended here.
 pub const LONGEST_LINE: usize = 400;
+/// Columns between two tab stops.
+const TAB: usize = 8;
 
 /// One line of text.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,7 +50,7 @@ pub struct Scrollback {
 }
 
 /// Where the line of one direction stands.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Debug)]
 struct Writer {
     /// Bytes of this direction already seen.
     seen: u64,
@@ -55,6 +58,14 @@ struct Writer {
     line: Option<u64>,
     /// The last byte ended a line as CR: an LF behind it belongs to it.
     after_return: bool,
+    /// Makes characters of the bytes.
+    visible: Visible,
+}
+
+impl Default for Writer {
+    fn default() -> Self {
+        Writer { seen: 0, line: None, after_return: false, visible: Visible::new(Controls::Layout) }
+    }
 }
 
 impl Scrollback {
@@ -131,32 +142,56 @@ impl Scrollback {
             b'\n' if follows_return => {}
             b'\r' | b'\n' => {
                 self.line(at, Direction::FromUnit);
-                self.from_unit.line = None;
+                self.end_line(at, Direction::FromUnit);
                 // What is typed after this line belongs below it.
                 self.to_unit.line = None;
             }
             // Flow control may stand anywhere, also between CR and LF: it is no text.
-            0x11 | 0x13 => self.from_unit.after_return = follows_return,
+            XON | XOFF => self.from_unit.after_return = follows_return,
             _ => self.write(at, Direction::FromUnit, byte),
         }
     }
 
     fn sent(&mut self, at: Instant, byte: u8) {
-        if matches!(byte, 0x11 | 0x13) {
-            return;
-        }
-        self.write(at, Direction::ToUnit, byte);
-        if byte == b'\r' || byte == b'\n' {
-            self.to_unit.line = None;
+        match byte {
+            XON | XOFF => {}
+            b'\r' | b'\n' => {
+                self.append(at, Direction::ToUnit, if byte == b'\r' { "^M" } else { "^J" });
+                self.end_line(at, Direction::ToUnit);
+            }
+            _ => self.write(at, Direction::ToUnit, byte),
         }
     }
 
     fn write(&mut self, at: Instant, direction: Direction, byte: u8) {
-        let line = self.line(at, direction);
-        visible::push_byte(&mut line.text, byte);
-        if line.text.chars().count() >= LONGEST_LINE {
-            self.writer_mut(direction).line = None;
+        let mut text = String::new();
+        self.writer_mut(direction).visible.push(&[byte], &mut text);
+        self.append(at, direction, &text);
+        if self.line(at, direction).text.len() >= LONGEST_LINE {
+            self.end_line(at, direction);
         }
+    }
+
+    fn append(&mut self, at: Instant, direction: Direction, text: &str) {
+        let line = self.line(at, direction);
+        for character in text.chars() {
+            match character {
+                '\t' => line.text.extend(std::iter::repeat_n(' ', TAB - line.text.chars().count() % TAB)),
+                // A backspace is shown: what it would rub out may be what one is looking for.
+                '\x08' => line.text.push_str("^H"),
+                _ => line.text.push(character),
+            }
+        }
+    }
+
+    /// Ends the line under construction, with whatever was begun and will not be completed.
+    fn end_line(&mut self, at: Instant, direction: Direction) {
+        let mut text = String::new();
+        self.writer_mut(direction).visible.finish(&mut text);
+        if !text.is_empty() {
+            self.append(at, direction, &text);
+        }
+        self.writer_mut(direction).line = None;
     }
 
     /// The line under construction, begun if there is none.
@@ -262,7 +297,20 @@ mod tests {
             talk.us(key).unit(key);
         }
         talk.us(b"\r").unit(b"\r\nDone.\r\n").us(b"m");
-        assert_eq!(talk.text(), ["< Restore defaults? Yes", "> Yes␍", "< Done.", "> m"]);
+        assert_eq!(talk.text(), ["< Restore defaults? Yes", "> Yes^M", "< Done.", "> m"]);
+    }
+
+    #[test]
+    fn every_byte_leaves_a_visible_trace_and_none_a_control_code() {
+        let mut talk = Talk::new();
+        talk.unit(b"\x1b[2J\x07 \x9b a\tb \xe2\x80\xa6\x08 \xe2\r\n");
+        assert_eq!(talk.text(), ["< ^[[2J^G ‹9b› a b …^H ‹e2›".replace("a b", "a    b")]);
+        for byte in (0..=255u8).filter(|byte| !b"\r\n\x11\x13".contains(byte)) {
+            let mut talk = Talk::new();
+            talk.unit(&[byte, b'\r']);
+            let text = talk.text().concat();
+            assert!(text.chars().count() > 2 && !text.chars().any(char::is_control), "{byte:#04x}: {text:?}");
+        }
     }
 
     #[test]

@@ -321,14 +321,23 @@ fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
         return;
     };
     let points: Vec<(f64, f64)> = known.iter().map(|&(at, value)| (at.since(first).as_secs_f64(), value)).collect();
+    // One curve for each stretch without a gap: nothing is drawn where nothing was measured.
+    let place = |&(at, value): &(Instant, Option<f64>)| value.map(|value| (at.since(first).as_secs_f64(), value));
+    let history: Vec<_> = channel.history.iter().map(place).collect();
+    let stretches: Vec<Vec<(f64, f64)>> = history
+        .split(Option::is_none)
+        .map(|stretch| stretch.iter().flatten().copied().collect())
+        .filter(|stretch: &Vec<_>| !stretch.is_empty())
+        .collect();
     let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.1), h.max(p.1)));
     let spare = (1.0 - (high - low)).max((high - low) * 0.1) / 2.0;
     let bounds = [low - spare, high + spare];
     let label = |value: f64| format!("{value:>9.1}");
     let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
-    let curve =
-        Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(theme.curve()).data(&points);
-    let chart = Chart::new(vec![curve])
+    let curve = |points| {
+        Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(theme.curve()).data(points)
+    };
+    let chart = Chart::new(stretches.iter().map(|stretch| curve(stretch)).collect())
         .x_axis(
             Axis::default()
                 .bounds([0.0, last.since(first).as_secs_f64().max(1.0)])

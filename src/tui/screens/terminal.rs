@@ -238,11 +238,7 @@ fn text_line(scene: Scene, line: &TextLine, columns: usize, with_times: bool) ->
     };
     let indent = format::width(&time) + format::width(mark);
     let room = columns.saturating_sub(indent).max(1);
-    let characters: Vec<char> = line.text.chars().collect();
-    let pieces: Vec<String> = match characters.is_empty() {
-        true => vec![String::new()],
-        false => characters.chunks(room).map(|piece| piece.iter().collect()).collect(),
-    };
+    let pieces = format::pieces(&line.text, room);
     let first = |piece: &String| {
         vec![
             Span::styled(time.clone(), theme.quiet()),

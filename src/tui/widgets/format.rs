@@ -96,6 +96,24 @@ pub fn left(text: &str, columns: usize) -> String {
     text + &" ".repeat(missing)
 }
 
+/// Breaks a text wherever its columns are full; what it says is not for reading on, but as it came.
+pub fn pieces(text: &str, columns: usize) -> Vec<String> {
+    let mut pieces = vec![String::new()];
+    let mut used = 0;
+    for character in text.chars() {
+        let needed = width(character.encode_utf8(&mut [0; 4]));
+        if used + needed > columns.max(1) {
+            pieces.push(String::new());
+            used = 0;
+        }
+        used += needed;
+        if let Some(piece) = pieces.last_mut() {
+            piece.push(character);
+        }
+    }
+    pieces
+}
+
 /// Breaks a text between words into lines of at most `columns`; a longer word is broken where it must be.
 pub fn wrap(text: &str, columns: usize) -> Vec<String> {
     let columns = columns.max(1);
