@@ -304,7 +304,7 @@ mod tests {
     fn every_byte_leaves_a_visible_trace_and_none_a_control_code() {
         let mut talk = Talk::new();
         talk.unit(b"\x1b[2J\x07 \x9b a\tb \xe2\x80\xa6\x08 \xe2\r\n");
-        assert_eq!(talk.text(), ["< ^[[2J^G ‹9b› a b …^H ‹e2›".replace("a b", "a    b")]);
+        assert_eq!(talk.text(), ["< ^[[2J^G ‹9b› a  b …^H ‹e2›"]);
         for byte in (0..=255u8).filter(|byte| !b"\r\n\x11\x13".contains(byte)) {
             let mut talk = Talk::new();
             talk.unit(&[byte, b'\r']);

@@ -1,12 +1,11 @@
 //! What the screens may read: everything known, folded from the session's events.
 
 use std::collections::VecDeque;
-use std::time::Duration;
 
 use super::input::Failure;
 use crate::device::Product;
 use crate::session::{Event, Facts, Job, LoadReport, Outcome, Progress, UnitState};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::wire::stream::{Layout, Reading, Row, Source};
 
 /// Samples kept of each channel: an hour at one row a second, and more than a wide screen can show.

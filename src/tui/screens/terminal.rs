@@ -318,7 +318,7 @@ fn hex(record: &Record, place: &HexPlace, most: usize) -> Vec<HexRow> {
     rows
 }
 
-fn hex_line(theme: Theme, row: &HexRow, times: Option<std::time::Duration>) -> Line<'static> {
+fn hex_line(theme: Theme, row: &HexRow, times: Option<crate::time::Duration>) -> Line<'static> {
     let skipped = (row.first - row.start) as usize;
     let mut numbers = String::new();
     let mut text = " ".repeat(skipped);

@@ -1,10 +1,8 @@
 //! Numbers, times and names as a person reads them.
 
-use std::time::Duration;
-
 use ratatui::text::Span;
 
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// `242,846`.
 pub fn grouped(number: impl TryInto<u64>) -> String {
