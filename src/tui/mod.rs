@@ -1,1 +1,25 @@
 //! The console on the screen.
+//!
+//! [`App`] is a third machine around the session: it takes keys as well as bytes and time, and gives a picture as well
+//! as bytes and a deadline. It has no threads, clocks, files or environment: what it wants of the world it returns as
+//! an [`Effect`], and the answer comes back as an [`Input`]. So a test presses keys and looks at pictures, and a replay
+//! is the same machine fed from a file. `docs/tui.md` describes the screens and what the loop around `App` has to do.
+
+mod action;
+mod app;
+mod frame;
+mod input;
+mod keymap;
+mod popup;
+mod screens;
+mod scrollback;
+mod theme;
+mod view;
+mod visible;
+mod widgets;
+
+pub use app::{App, Options};
+pub use input::{Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, PortEntry};
+
+#[cfg(test)]
+mod pictures;

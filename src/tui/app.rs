@@ -1,0 +1,573 @@
+//! The console: keys, bytes and time in; a picture, effects and a deadline out.
+//!
+//! One way through: an input changes the session or a screen, the session's news are folded into the view, what it
+//! wants sent becomes effects, and the picture is drawn from the view when the loop around finds it worth drawing.
+
+use std::path::PathBuf;
+
+use ratatui::Frame;
+use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind};
+use ratatui::layout::Rect;
+
+use super::action::Action;
+use super::frame;
+use super::input::{Effect, Failure, Input, LinkInfo};
+use super::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd};
+use super::popup::{self, Answer, Popup, Question};
+use super::screens::connect::Connect;
+use super::screens::help::Help;
+use super::screens::load::Load;
+use super::screens::overview::Overview;
+use super::screens::terminal::{Meaning, Terminal};
+use super::screens::{Scene, ScreenId};
+use super::scrollback::Scrollback;
+use super::theme::Theme;
+use super::view::{Link, LinkState, Tone, View};
+use super::widgets::lines;
+use crate::endpoint::Endpoint;
+use crate::record::Record;
+use crate::session::{Command, Event, Facts, Job, LoadOrder, Session};
+use crate::time::{Duration, Instant};
+
+/// How often the picture moves while an upload runs, so that its times go on when the unit is silent.
+const UPLOAD_TICK: Duration = Duration::from_millis(500);
+
+/// What the console is started with.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The link to open at once; without one the list of ports is shown.
+    pub link: Option<String>,
+    /// Where the file picker starts.
+    pub directory: PathBuf,
+    /// Whether to use colours (`NO_COLOR`).
+    pub colour: bool,
+    /// Local time of day at [`Instant::ZERO`].
+    pub start_of_day: Duration,
+    /// Columns and rows of the terminal at the start.
+    pub size: (u16, u16),
+}
+
+/// The console.
+pub struct App {
+    options: Options,
+    theme: Theme,
+    size: (u16, u16),
+    now: Instant,
+    dirty: bool,
+    session: Option<Session>,
+    /// What is drawn from before there is a session.
+    no_record: Record,
+    no_facts: Facts,
+    view: View,
+    scrollback: Scrollback,
+    front: ScreenId,
+    popup: Option<Popup>,
+    help: Option<Help>,
+    connect: Connect,
+    overview: Overview,
+    terminal: Terminal,
+    load: Load,
+}
+
+impl App {
+    /// A console that has seen nothing yet. [`App::start`] comes next.
+    pub fn new(options: Options) -> Self {
+        App {
+            theme: Theme::new(options.colour),
+            size: options.size,
+            now: Instant::ZERO,
+            dirty: true,
+            session: None,
+            no_record: Record::new(),
+            no_facts: Facts::default(),
+            view: View::default(),
+            scrollback: Scrollback::default(),
+            front: ScreenId::Connect,
+            popup: None,
+            help: None,
+            connect: Connect::default(),
+            overview: Overview::default(),
+            terminal: Terminal::default(),
+            load: Load::new(options.directory.clone()),
+            options,
+        }
+    }
+
+    /// The first effects: the ports are listed, the given link is opened.
+    pub fn start(&mut self) -> Vec<Effect> {
+        let mut effects = vec![Effect::ListPorts];
+        if let Some(link) = self.options.link.clone() {
+            self.perform(Action::Open(link), &mut effects);
+        }
+        effects
+    }
+
+    /// Takes one input; the effects are to be performed in their order.
+    pub fn handle(&mut self, now: Instant, input: Input) -> Vec<Effect> {
+        self.now = self.now.max(now);
+        let mut effects = Vec::new();
+        match input {
+            Input::Terminal(event) => self.terminal_event(event, &mut effects),
+            Input::Bytes(bytes) => {
+                if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
+                    session.handle_bytes(now, &bytes);
+                }
+            }
+            Input::Timeout => self.timeout(now),
+            Input::PortsListed(ports) => {
+                self.connect.listed(ports);
+                self.dirty = true;
+            }
+            Input::LinkOpened(info) => self.link_opened(now, info, &mut effects),
+            Input::LinkFailed(failure) => self.link_failed(failure),
+            Input::LinkGone(failure) => self.link_gone(now, failure),
+            Input::FilesListed { directory, entries } => {
+                self.load.listed(directory, entries);
+                self.dirty = true;
+            }
+            Input::ImageChecked(facts) => {
+                self.load.checked(facts);
+                self.dirty = true;
+            }
+            Input::Signal => effects.push(Effect::Quit),
+        }
+        self.drain(&mut effects);
+        effects
+    }
+
+    /// When [`Input::Timeout`] is wanted next. `None`: only an input from outside can bring anything new.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        let is_open = matches!(self.view.link.state, LinkState::Open { .. });
+        let session = self.session.as_ref().and_then(Session::poll_timeout);
+        let tick = (self.view.job == Some(Job::Load)).then(|| self.now + UPLOAD_TICK);
+        let late = self.view.poll_timeout().filter(|_| is_open);
+        [session, tick, late].into_iter().flatten().min()
+    }
+
+    /// Whether the picture has changed since it was last drawn.
+    pub fn is_dirty(&self) -> bool {
+        self.dirty
+    }
+
+    /// Says that the picture has been drawn.
+    pub fn drawn(&mut self) {
+        self.dirty = false;
+    }
+
+    /// Folds one event of the session into what the screens show; `facts` are the session's at that moment.
+    pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
+        self.now = self.now.max(now);
+        self.view.fold(now, event, facts);
+        // A raw line alone changes the terminal, and whatever else shows it.
+        self.dirty = true;
+    }
+
+    /// Shows what went over the line.
+    pub fn follow(&mut self, record: &Record) {
+        self.dirty |= self.scrollback.follow(record);
+    }
+
+    /// Every byte of the connection, secrets already out of it: what a recording follows after each input.
+    pub fn record(&self) -> &Record {
+        self.session.as_ref().map_or(&self.no_record, Session::record)
+    }
+
+    /// Draws the picture.
+    pub fn draw(&self, frame: &mut Frame) {
+        if frame::too_small(frame) {
+            return;
+        }
+        let area = frame.area();
+        let columns = usize::from(area.width);
+        let row = |y: u16| Rect { y, height: 1, ..area };
+        let front = self.help.is_none().then_some(self.front);
+        let theme = self.theme;
+        lines::draw(frame, row(0), [frame::header(&self.view, theme, columns)]);
+        lines::draw(frame, row(1), [frame::tabs(&self.view, front, theme, columns)]);
+        let lost = frame::lost(&self.view, theme, columns);
+        let (banner, body) = lines::split(frame::body(area), lost.len() as u16);
+        lines::draw(frame, banner, lost);
+        self.draw_screen(body, frame);
+        lines::draw(frame, row(area.height - 3), [frame::notice(&self.view, theme, columns)]);
+        lines::draw(frame, row(area.height - 2), [frame::menu(theme)]);
+        let keys = match self.front {
+            _ if self.help.is_some() => frame::help_keys(theme),
+            ScreenId::Terminal => frame::terminal_keys(theme, self.front.bindings(), self.terminal.is_after_prefix()),
+            ScreenId::Load => frame::keys(theme, self.load.footer(&self.view)),
+            ScreenId::Connect | ScreenId::Overview => frame::keys(theme, self.front.bindings()),
+        };
+        lines::draw(frame, row(area.height - 1), [keys]);
+        if let Some(popup) = &self.popup {
+            popup::draw(popup, &self.view, theme, frame::body(area), frame);
+        }
+    }
+
+    fn draw_screen(&self, area: Rect, frame: &mut Frame) {
+        if let Some(help) = &self.help {
+            return help.draw(self.theme, self.front, area, frame);
+        }
+        let scene = Scene {
+            view: &self.view,
+            record: self.record(),
+            scrollback: &self.scrollback,
+            theme: self.theme,
+            now: self.now,
+            start_of_day: self.options.start_of_day,
+        };
+        match self.front {
+            ScreenId::Connect => self.connect.draw(scene, area, frame),
+            ScreenId::Overview => self.overview.draw(scene, area, frame),
+            ScreenId::Terminal => self.terminal.draw(scene, area, frame),
+            ScreenId::Load => self.load.draw(scene, area, frame),
+        }
+    }
+
+    fn terminal_event(&mut self, event: TerminalEvent, effects: &mut Vec<Effect>) {
+        match event {
+            // Windows reports the release of a key as well.
+            TerminalEvent::Key(key) if key.kind != KeyEventKind::Release => {
+                self.dirty = true;
+                self.key(key, effects);
+            }
+            TerminalEvent::Paste(text) => {
+                self.dirty = true;
+                self.paste(&text);
+            }
+            TerminalEvent::Resize(columns, rows) => {
+                self.dirty = true;
+                self.size = (columns, rows);
+            }
+            TerminalEvent::Key(_) | TerminalEvent::FocusGained | TerminalEvent::FocusLost | TerminalEvent::Mouse(_) => {
+            }
+        }
+    }
+
+    fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+        if let Some(popup) = &mut self.popup {
+            let is_waiting = matches!(popup, Popup::Waiting(_));
+            match popup.on(key) {
+                // A link that takes long to open must not hold the user.
+                Answer::Stay if is_waiting && keymap::find(&[EVERYWHERE], key) == Some(Cmd::Quit) => {
+                    effects.push(Effect::Quit);
+                }
+                Answer::Stay => {}
+                Answer::Close => self.popup = None,
+                Answer::Act(action) => {
+                    self.popup = None;
+                    self.perform(action, effects);
+                }
+            }
+            return;
+        }
+        if let Some(help) = &mut self.help {
+            let page = isize::from(i16::try_from(self.size.1).unwrap_or(i16::MAX)) / 2;
+            match key.code {
+                KeyCode::Up => return help.scroll(-1),
+                KeyCode::Down => return help.scroll(1),
+                KeyCode::PageUp => return help.scroll(-page),
+                KeyCode::PageDown => return help.scroll(page),
+                _ => {}
+            }
+            self.help = None;
+            // Another screen's key goes there; every other key only closes the page.
+            match keymap::find(&[EVERYWHERE], key) {
+                Some(cmd @ (Cmd::Go(_) | Cmd::Next | Cmd::Previous)) => return self.on(cmd, effects),
+                _ => return,
+            }
+        }
+        if self.front == ScreenId::Terminal {
+            match self.terminal.meaning(key) {
+                Meaning::Keys(bytes) => return self.perform(Action::Command(Command::Keys(bytes)), effects),
+                Meaning::Nothing => return,
+                Meaning::Console => {}
+            }
+        }
+        if let Some(cmd) = keymap::find(&[self.front.bindings(), MENU, EVERYWHERE], key) {
+            self.on(cmd, effects);
+        }
+    }
+
+    fn paste(&mut self, text: &str) {
+        if let Some(popup) = &mut self.popup {
+            return popup.paste(text);
+        }
+        if self.front != ScreenId::Terminal || self.help.is_some() {
+            return;
+        }
+        // Enter is CR on this line (manual, chapter 4); the unit knows ASCII only.
+        let joined = text.replace("\r\n", "\r").replace('\n', "\r");
+        let bytes: Vec<u8> = joined.bytes().filter(|byte| matches!(byte, b' '..=b'~' | b'\r' | b'\t')).collect();
+        if !bytes.is_empty() {
+            self.popup = Some(Popup::Asking(Question::Paste(bytes)));
+        }
+    }
+
+    fn on(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
+        match cmd {
+            Cmd::Menu(menu) => self.menu(menu, effects),
+            Cmd::Go(screen) => self.perform(Action::Go(screen), effects),
+            Cmd::Next => self.perform(Action::Go(self.front.step(1)), effects),
+            Cmd::Previous => self.perform(Action::Go(self.front.step(ScreenId::ALL.len() - 1)), effects),
+            Cmd::Help => self.help = Some(Help::default()),
+            Cmd::Quit if self.view.job.is_some() => self.ask(Question::Quit),
+            Cmd::Quit if self.view.viewing => self.ask(Question::QuitViewing),
+            Cmd::Quit => effects.push(Effect::Quit),
+            Cmd::Reconnect => {
+                if matches!(self.view.link.state, LinkState::Lost(_)) {
+                    self.perform(Action::Reconnect, effects);
+                }
+            }
+            Cmd::Up
+            | Cmd::Down
+            | Cmd::PageUp
+            | Cmd::PageDown
+            | Cmd::First
+            | Cmd::Last
+            | Cmd::Accept
+            | Cmd::Back
+            | Cmd::Refresh
+            | Cmd::Type
+            | Cmd::Disconnect
+            | Cmd::Hex
+            | Cmd::Times
+            | Cmd::Restart
+            | Cmd::Prefix => self.screen(cmd, effects),
+        }
+    }
+
+    fn screen(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
+        let page = usize::from(frame::body(Rect::new(0, 0, self.size.0, self.size.1)).height);
+        let record = self.session.as_ref().map_or(&self.no_record, Session::record);
+        let action = match self.front {
+            ScreenId::Connect => self.connect.on(cmd, &self.view),
+            ScreenId::Overview => self.overview.on(cmd, self.view.stream.channels.len()),
+            ScreenId::Terminal => self.terminal.on(cmd, &self.scrollback, record, page),
+            ScreenId::Load => self.load.on(cmd, &self.view, page),
+        };
+        if let Some(action) = action {
+            self.perform(action, effects);
+        }
+    }
+
+    /// A key of the unit's menu.
+    fn menu(&mut self, menu: MenuCmd, effects: &mut Vec<Effect>) {
+        if menu == MenuCmd::Load {
+            // Files can be looked at without a unit.
+            return self.perform(Action::Go(ScreenId::Load), effects);
+        }
+        if !self.can_send() {
+            return;
+        }
+        match menu {
+            MenuCmd::Menu => self.perform(Action::Command(Command::Identify), effects),
+            MenuCmd::View => self.ask(Question::View),
+            MenuCmd::Defaults => {
+                self.ask(Question::Defaults { typed: Default::default(), complaint: None });
+            }
+            MenuCmd::Stream if self.view.facts.stream.is_some() => {
+                self.perform(Action::Command(Command::StreamOff), effects);
+            }
+            MenuCmd::Stream => self.ask(Question::stream()),
+            MenuCmd::Diagnostics => {
+                if self.command(Command::Keys(b"s".to_vec())) {
+                    self.front = ScreenId::Terminal;
+                    self.terminal.follow();
+                    self.view.tell(Tone::Quiet, "S is sent. The unit prints its diagnostics here; S again stops it.");
+                }
+            }
+            MenuCmd::Load => {}
+        }
+    }
+
+    fn perform(&mut self, action: Action, effects: &mut Vec<Effect>) {
+        self.dirty = true;
+        match action {
+            Action::Go(screen) => {
+                self.front = screen;
+                if screen == ScreenId::Load
+                    && let Some(action) = self.load.entered()
+                {
+                    self.perform(action, effects);
+                }
+            }
+            Action::Open(_) if self.view.job.is_some() => self.ask(Question::Disconnect),
+            Action::Open(link) => self.open(link, effects),
+            Action::Reconnect => {
+                if let Some(link) = self.view.link.name.clone() {
+                    self.open(link, effects);
+                }
+            }
+            Action::Disconnect => self.disconnect(effects),
+            Action::ListPorts => {
+                self.connect.listing();
+                effects.push(Effect::ListPorts);
+            }
+            Action::ListFiles(directory) => effects.push(Effect::ListFiles(directory)),
+            Action::CheckImage(path) => {
+                self.load.check(path.clone());
+                effects.push(Effect::CheckImage(path));
+            }
+            Action::Ask(question) => self.ask(question),
+            Action::Command(command) => {
+                if self.can_send() {
+                    self.command(command);
+                }
+            }
+            Action::ViewDictionary => {
+                if self.command(Command::Keys(b"v".to_vec())) {
+                    self.view.viewing = true;
+                    self.front = ScreenId::Terminal;
+                    self.terminal.follow();
+                    self.view
+                        .tell(Tone::Quiet, "V is sent. Enter shows the next object, X leaves and lets scanning go on.");
+                }
+            }
+            Action::StartLoad { password, product } => {
+                if let Some(image) = self.load.image().and_then(|facts| facts.checked.clone()) {
+                    self.command(Command::Load(Box::new(LoadOrder { image, password, product })));
+                }
+            }
+            Action::DismissReport => self.view.load.report = None,
+            Action::RestartExtremes => self.view.restart_extremes(),
+            Action::Quit => effects.push(Effect::Quit),
+            Action::LeaveViewAndQuit => {
+                self.command(Command::Keys(b"x".to_vec()));
+                self.drain(effects);
+                effects.push(Effect::Quit);
+            }
+        }
+    }
+
+    /// Gives a command to the session. Says whether it was taken; if not, the user knows why.
+    fn command(&mut self, command: Command) -> bool {
+        let Some(session) = &mut self.session else { return false };
+        let job = match &command {
+            Command::Keys(_) | Command::Cancel => None,
+            Command::Identify => Some(Job::Identify),
+            Command::StreamOn { .. } => Some(Job::StreamOn),
+            Command::StreamOff => Some(Job::StreamOff),
+            Command::RestoreDefaults => Some(Job::RestoreDefaults),
+            Command::Load(_) => Some(Job::Load),
+        };
+        let leaves_view = matches!(&command, Command::Keys(keys) if keys.iter().any(|key| b"xX".contains(key)));
+        match session.command(self.now, command) {
+            Ok(()) => {
+                if let Some(job) = job {
+                    self.view.job = Some(job);
+                    self.view.notice = None;
+                }
+                if job == Some(Job::Load) {
+                    self.view.load = Default::default();
+                    self.front = ScreenId::Load;
+                }
+                self.view.viewing &= !leaves_view;
+                true
+            }
+            Err(refusal) => {
+                self.view.tell(Tone::Bad, format!("Not sent: {refusal}."));
+                false
+            }
+        }
+    }
+
+    /// Whether something can be sent; if not, the user is told why.
+    fn can_send(&mut self) -> bool {
+        let why = match &self.view.link.state {
+            LinkState::Open { read_only: false } => return true,
+            LinkState::Open { read_only: true } => "Not sent: this link is read only.",
+            LinkState::Opening | LinkState::Closed => "Not sent: no unit is connected. Press 1 to choose a link.",
+            LinkState::Lost(_) => "Not sent: the link is lost. Press C to connect again.",
+        };
+        self.view.tell(Tone::Bad, why);
+        false
+    }
+
+    fn ask(&mut self, question: Question) {
+        self.popup = Some(Popup::Asking(question));
+    }
+
+    fn open(&mut self, link: String, effects: &mut Vec<Effect>) {
+        if matches!(self.view.link.state, LinkState::Open { .. }) {
+            effects.push(Effect::CloseLink);
+        }
+        self.session = None;
+        self.popup = Some(Popup::Waiting(format!("Opening {}.", super::visible::text(&link))));
+        self.view.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
+        effects.push(Effect::OpenLink(link));
+    }
+
+    fn disconnect(&mut self, effects: &mut Vec<Effect>) {
+        effects.push(Effect::CloseLink);
+        self.scrollback.note(self.now, "link closed".into());
+        self.session = None;
+        self.view.begin_link(Link::default());
+        self.view.tell(Tone::Quiet, "The link is closed.");
+    }
+
+    fn link_opened(&mut self, now: Instant, info: LinkInfo, effects: &mut Vec<Effect>) {
+        self.dirty = true;
+        if self.view.link.state != LinkState::Opening {
+            // Nobody waits for it any more.
+            effects.push(Effect::CloseLink);
+            return;
+        }
+        self.popup = None;
+        self.scrollback.begin(now, format!("connected to {}", super::visible::text(&info.link)));
+        self.session = Some(Session::new(info.baud));
+        self.view.begin_link(Link {
+            name: Some(info.link),
+            baud: info.baud,
+            recording: info.recording,
+            state: LinkState::Open { read_only: info.read_only },
+        });
+        self.front = ScreenId::Overview;
+        if !info.read_only {
+            self.command(Command::Identify);
+        }
+    }
+
+    fn link_failed(&mut self, failure: Failure) {
+        self.dirty = true;
+        if self.view.link.state == LinkState::Opening {
+            self.session = None;
+            self.view.begin_link(Link::default());
+            self.popup = Some(Popup::Failed { title: "Not connected", failure });
+        }
+    }
+
+    fn link_gone(&mut self, now: Instant, failure: Failure) {
+        self.dirty = true;
+        if matches!(self.view.link.state, LinkState::Open { .. }) {
+            self.scrollback.note(now, "link lost".into());
+            self.view.link.state = LinkState::Lost(failure);
+            if let Some(session) = &mut self.session {
+                session.link_lost(now);
+            }
+            self.popup = None;
+        }
+    }
+
+    fn timeout(&mut self, now: Instant) {
+        if let Some(session) = &mut self.session {
+            session.handle_timeout(now);
+        }
+        self.dirty |= self.view.timeout(now) || self.view.job == Some(Job::Load);
+    }
+
+    /// Everything the session has to say and to send.
+    fn drain(&mut self, effects: &mut Vec<Effect>) {
+        let is_open = matches!(self.view.link.state, LinkState::Open { .. });
+        while let Some(transmit) = self.session.as_mut().and_then(Session::poll_transmit) {
+            if is_open {
+                effects.push(Effect::Transmit(transmit));
+            }
+        }
+        while let Some(event) = self.session.as_mut().and_then(Session::poll_event) {
+            let facts = self.session.as_ref().map_or(&self.no_facts, Session::facts);
+            self.view.fold(self.now, &event, facts);
+            self.dirty = true;
+        }
+        let record = self.session.as_ref().map_or(&self.no_record, Session::record);
+        self.dirty |= self.scrollback.follow(record);
+    }
+}

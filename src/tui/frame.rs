@@ -1,0 +1,210 @@
+//! What stands around every screen: header, tabs, the latest word, the unit's menu, the screen's keys.
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+
+use super::keymap::{Binding, EVERYWHERE, MENU};
+use super::screens::ScreenId;
+use super::theme::Theme;
+use super::view::{LinkState, Tone, View};
+use super::visible;
+use super::widgets::{format, lines};
+use crate::session::{Job, UnitState};
+
+/// Smallest terminal the pictures are made for.
+pub const LEAST: (u16, u16) = (80, 24);
+/// Rows above the screen.
+const ABOVE: u16 = 2;
+/// Rows below it.
+const BELOW: u16 = 3;
+/// What stands before the recording's name.
+const RECORDING: &str = "rec ";
+/// With fewer columns than this the recording's name says nothing.
+const LEAST_RECORDING: usize = 20;
+
+/// Where the screen itself is drawn.
+pub fn body(area: Rect) -> Rect {
+    let height = area.height.saturating_sub(ABOVE + BELOW);
+    Rect { y: area.y + ABOVE.min(area.height), height, ..area }
+}
+
+/// Says that the terminal is too small, if it is.
+pub fn too_small(frame: &mut Frame) -> bool {
+    let area = frame.area();
+    if area.width >= LEAST.0 && area.height >= LEAST.1 {
+        return false;
+    }
+    let text = format!(
+        "axcon needs {} x {} characters, this terminal has {} x {}. Make it larger: everything goes on meanwhile.",
+        LEAST.0, LEAST.1, area.width, area.height
+    );
+    let rows = format::wrap(&text, usize::from(area.width));
+    let top = area.height.saturating_sub(rows.len() as u16) / 2;
+    let (_, below) = lines::split(area, top);
+    lines::draw(frame, below, rows.into_iter().map(|row| Line::raw(row).centered()));
+    true
+}
+
+/// Product, version, node and link, in one line.
+pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
+    let facts = &view.facts;
+    let product = facts.product.as_ref().map(|known| visible::text(&known.value));
+    let version = facts.version.as_ref().map(|known| known.value.to_string());
+    let unit = match (product, facts.state) {
+        (Some(product), _) => version.map_or_else(|| product.clone(), |version| format!("{product} {version}")),
+        (None, UnitState::Silent) => "no unit".into(),
+        (None, UnitState::Unknown | UnitState::Application | UnitState::Loader) => "unknown unit".into(),
+    };
+    let state = match facts.state {
+        UnitState::Loader => Some("in loader"),
+        _ if view.viewing => Some("halted by V"),
+        UnitState::Silent | UnitState::Unknown | UnitState::Application => None,
+    };
+    let link = match &view.link.state {
+        LinkState::Closed => "not connected",
+        LinkState::Opening => "opening",
+        LinkState::Open { read_only: false } => "connected",
+        LinkState::Open { read_only: true } => "read only",
+        LinkState::Lost(_) => "link lost",
+    };
+    let node = facts.node_id.as_ref().map(|known| format!("node {}", known.value));
+    let name = view.link.name.as_deref().map(visible::text);
+    let mut parts = vec!["axcon".to_owned(), unit];
+    parts.extend(state.map(str::to_owned));
+    parts.extend(node);
+    let fixed = parts.iter().map(|part| format::width(part) + 3).sum::<usize>() + format::width(link) + 2;
+    let room = columns.saturating_sub(fixed);
+    parts.extend(name.map(|name| format::keep_end(&name, room.saturating_sub(3).max(8))));
+    parts.push(link.to_owned());
+    Line::styled(format::left(&format!(" {}", parts.join(" │ ")), columns), theme.bar())
+}
+
+/// The tabs; on the right what is being done, or else where the recording goes.
+pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) -> Line<'static> {
+    let mut line = Line::raw(" ");
+    for (number, screen) in (1..).zip(ScreenId::ALL) {
+        let text = format!(" {number} {} ", screen.title());
+        line.push_span(match front == Some(screen) {
+            true => Span::styled(text, theme.bar()),
+            false => Span::raw(text),
+        });
+        line.push_span(Span::raw(" "));
+    }
+    if front.is_none() {
+        line.push_span(Span::styled(" Help ", theme.bar()));
+    }
+    let activity = match view.job {
+        None if view.load.held_since.is_some() => "held by XOFF",
+        None => "",
+        Some(Job::Identify) => "asking the unit",
+        Some(Job::StreamOn | Job::StreamOff) => "setting the stream",
+        Some(Job::RestoreDefaults) => "restoring defaults",
+        Some(Job::Load) => "loading",
+    };
+    let room = columns.saturating_sub(line.width() + 1);
+    let right = match &view.link.recording {
+        _ if !activity.is_empty() => Span::styled(activity, theme.warning()),
+        Some(path) if room > LEAST_RECORDING => {
+            let path = format::keep_end(&visible::text(path), room - RECORDING.len());
+            Span::styled(format!("{RECORDING}{path}"), theme.quiet())
+        }
+        Some(_) | None => Span::raw(""),
+    };
+    line.push_span(Span::raw(" ".repeat(room.saturating_sub(right.width()))));
+    line.push_span(right);
+    line
+}
+
+/// The lost link, for the top of every screen.
+pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
+    let LinkState::Lost(failure) = &view.link.state else { return Vec::new() };
+    let text = format!("Link lost: {}", visible::text(&failure.text));
+    let mut rows = vec![Line::styled(format::left(&format!(" {text}"), columns), theme.alarm())];
+    let then = " What you see is history. C connects again, 1 chooses another link.";
+    rows.push(Line::styled(format::left(then, columns), theme.warning()));
+    rows
+}
+
+/// The latest word, on the rule that closes the screen.
+pub fn notice(view: &View, theme: Theme, columns: usize) -> Line<'static> {
+    let Some(notice) = &view.notice else { return Line::styled("─".repeat(columns), theme.quiet()) };
+    let style = match notice.tone {
+        Tone::Quiet => theme.strong(),
+        Tone::Good => theme.good(),
+        Tone::Bad => theme.bad(),
+    };
+    let text = format!(" {} ", format::keep_start(&visible::text(&notice.text), columns.saturating_sub(6)));
+    let rest = columns.saturating_sub(2 + format::width(&text));
+    Line::from(vec![
+        Span::styled("──", theme.quiet()),
+        Span::styled(text, style),
+        Span::styled("─".repeat(rest), theme.quiet()),
+    ])
+}
+
+/// The unit's menu.
+pub fn menu(theme: Theme) -> Line<'static> {
+    let mut line = Line::from(Span::styled(" Unit  ", theme.quiet()));
+    line.spans.extend(hints(theme, &[MENU]));
+    line
+}
+
+/// The screen's keys and those that work everywhere.
+pub fn keys(theme: Theme, bindings: &[Binding]) -> Line<'static> {
+    let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
+    line.spans.extend(hints(theme, &[bindings, EVERYWHERE]));
+    line
+}
+
+/// The keys of the terminal screen: those behind the prefix.
+pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'static> {
+    let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
+    if after_prefix {
+        line.push_span(Span::styled("next key is for axcon: ", theme.warning()));
+    } else {
+        line.push_span(Span::raw("keys to the unit; "));
+        line.push_span(Span::styled("Ctrl-]", theme.key()));
+        line.push_span(Span::raw(" then "));
+    }
+    for binding in bindings.iter().filter(|binding| is_letter(binding)) {
+        line.spans.extend(hint(theme, binding));
+    }
+    line.push_span(Span::styled("1-4", theme.key()));
+    line.push_span(Span::raw(" screen  "));
+    line.spans.extend(hints(theme, &[EVERYWHERE]));
+    line
+}
+
+/// The keys of the help page.
+pub fn help_keys(theme: Theme) -> Line<'static> {
+    let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
+    for (key, meaning) in [("↑↓", "scroll"), ("1-4", "screen"), ("any other key", "back")] {
+        line.push_span(Span::styled(key, theme.key()));
+        line.push_span(Span::raw(format!(" {meaning}  ")));
+    }
+    line
+}
+
+fn is_letter(binding: &Binding) -> bool {
+    binding.keys.first().is_some_and(|press| press.name().chars().count() == 1 && !"↑↓".contains(&press.name()))
+}
+
+fn hints(theme: Theme, tables: &[&[Binding]]) -> Vec<Span<'static>> {
+    tables
+        .iter()
+        .flat_map(|table| table.iter())
+        .filter(|binding| !binding.short.is_empty())
+        .flat_map(|binding| hint(theme, binding))
+        .collect()
+}
+
+fn hint(theme: Theme, binding: &Binding) -> [Span<'static>; 2] {
+    let key = match binding.keys.first().map(|press| press.name()) {
+        // Up and down belong together; the footer names them once.
+        Some(name) if name == "↓" => "↑↓".to_owned(),
+        Some(name) => name,
+        None => String::new(),
+    };
+    [Span::styled(key, theme.key()), Span::raw(format!(" {}  ", binding.short))]
+}

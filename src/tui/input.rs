@@ -1,0 +1,137 @@
+//! What can happen to the console, and what it wants of the world.
+//!
+//! Each [`Effect`] that asks for something is answered by exactly one [`Input`]; the comments name the pairs.
+
+use std::path::PathBuf;
+
+use ratatui::crossterm::event::Event as TerminalEvent;
+
+use crate::endpoint::Transmit;
+use crate::image::CheckedImage;
+use crate::version::Version;
+
+/// What can happen.
+#[derive(Debug)]
+pub enum Input {
+    /// Keys, paste, resize.
+    Terminal(TerminalEvent),
+    /// The unit has sent bytes.
+    Bytes(Vec<u8>),
+    /// The moment [`App::poll_timeout`](super::App::poll_timeout) named has come. Early is harmless.
+    Timeout,
+    /// Answer to [`Effect::ListPorts`]; an error in one sentence.
+    PortsListed(Result<Vec<PortEntry>, String>),
+    /// Answer to [`Effect::OpenLink`]: bytes may come and go.
+    LinkOpened(LinkInfo),
+    /// Answer to [`Effect::OpenLink`]: it could not be opened.
+    LinkFailed(Failure),
+    /// The open link has ended by itself: adapter pulled out, host gone, write refused. Nothing more will come from it.
+    LinkGone(Failure),
+    /// Answer to [`Effect::ListFiles`].
+    FilesListed {
+        /// The folder, absolute where that could be found out.
+        directory: PathBuf,
+        /// What is in it, in any order, or why it cannot be read.
+        entries: Result<Vec<FileEntry>, String>,
+    },
+    /// Answer to [`Effect::CheckImage`].
+    ImageChecked(Box<ImageFacts>),
+    /// The system wants the program to end: leave without asking.
+    Signal,
+}
+
+/// What the console wants done.
+#[derive(Debug, PartialEq)]
+pub enum Effect {
+    /// Open a link (`/dev/ttyUSB0`, `emu:axtc4co`, `tcp://...`) and start its recording. Answered by
+    /// [`Input::LinkOpened`] or [`Input::LinkFailed`].
+    OpenLink(String),
+    /// Close the open link. Not answered; what still comes from it must not be handed in.
+    CloseLink,
+    /// Put bytes on the link, after those of earlier effects. The recording sees them as their secrecy says.
+    Transmit(Transmit),
+    /// List the serial ports. Answered by [`Input::PortsListed`].
+    ListPorts,
+    /// List a folder. Answered by [`Input::FilesListed`].
+    ListFiles(PathBuf),
+    /// Read and check an image file. Answered by [`Input::ImageChecked`], also when the file cannot be read.
+    CheckImage(PathBuf),
+    /// End the program, after the effects before this one.
+    Quit,
+}
+
+/// One port the system offers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PortEntry {
+    /// What opens it, e.g. `/dev/ttyUSB0`.
+    pub link: String,
+    /// What it is, in a few words: `USB, FTDI FT232R, 0403:6001, serial number AX12345`.
+    pub description: String,
+    /// Who holds it, if somebody does: `picocom, process 4711`.
+    pub busy_by: Option<String>,
+}
+
+/// An open link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LinkInfo {
+    /// What opened it; the console opens it again by this name.
+    pub link: String,
+    /// Baud rate.
+    pub baud: u32,
+    /// Whether a replay or another reason forbids sending.
+    pub read_only: bool,
+    /// Where the recording is written, if one is.
+    pub recording: Option<String>,
+}
+
+/// Something that did not work outside.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// What happened and to what, in one sentence.
+    pub text: String,
+    /// What the user can try, one step each.
+    pub hints: Vec<String>,
+}
+
+/// One entry of a folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileEntry {
+    /// Its name, without the folder.
+    pub name: String,
+    /// Folder or file.
+    pub kind: FileKind,
+    /// Length in bytes; 0 for a folder.
+    pub bytes: u64,
+    /// When it was last changed, as local date and time, where known.
+    pub modified: Option<String>,
+}
+
+/// What an entry of a folder is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileKind {
+    /// A folder, or a link to one.
+    Folder,
+    /// Anything else.
+    File,
+}
+
+/// What reading and checking an image file brought.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageFacts {
+    /// Which file.
+    pub path: PathBuf,
+    /// Whether it may be sent: no error stands.
+    pub ok: bool,
+    /// Product the image says it is for.
+    pub product: Option<String>,
+    /// Version the image says it is.
+    pub version: Option<Version>,
+    /// Records that will be sent, header and terminator included.
+    pub records: usize,
+    /// Characters that will be sent.
+    pub characters: usize,
+    /// Every defect in one line each, errors first: `line 12, column 43: ...`.
+    pub defects: Vec<String>,
+    /// The image itself, if it may be sent.
+    pub checked: Option<CheckedImage>,
+}

@@ -1,0 +1,751 @@
+//! Keys in, picture out.
+//!
+//! What a person reads is held in snapshots, at the smallest size and at a large one; what keys do is said in
+//! sentences. The unit is played by the bytes it would send.
+
+use std::path::PathBuf;
+
+use insta::assert_snapshot;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+
+use super::{App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, PortEntry};
+use crate::endpoint::Transmit;
+use crate::session::{Event, Facts, LoadReport, Outcome, Phase, Progress, UnitNow, Verdict};
+use crate::time::{Duration, Instant};
+use crate::version::Version;
+
+const SMALL: (u16, u16) = (80, 24);
+const LARGE: (u16, u16) = (200, 60);
+/// 12:00:00 is the start of time here.
+const NOON: Duration = Duration::from_secs(12 * 3600);
+
+const BANNER: &[u8] = b"\r\nAxiomatic Technologies Corporation\r\nAXTC4CO 4 Thermocouple Scanner\r\n\
+    Software Version V1.1.0, built 2026-01-31 12:00:00\r\n\r\n";
+const MENU: &[u8] = b"\r\nMain Menu - AXTC4CO V1.1.0\r\n  V - View Object Dictionary\r\n\
+    \x20 D - Default Object Dictionary\r\n  T - Toggle RS-232 Stream On/Off\r\n  S - Show/Stop Diagnostics\r\n\
+    \x20 L - Load New Software\r\nCANopen: Node-ID 127 (0x7F), Baud Rate 125 kbit/s, State Pre-Operational\r\n";
+
+/// The console, a user and a world that does what the test says.
+struct Stage {
+    app: App,
+    size: (u16, u16),
+    now: Instant,
+    effects: Vec<Effect>,
+}
+
+impl Stage {
+    fn new(size: (u16, u16)) -> Self {
+        let options =
+            Options { link: None, directory: PathBuf::from("/work/images"), colour: false, start_of_day: NOON, size };
+        let mut app = App::new(options);
+        let effects = app.start();
+        Stage { app, size, now: Instant::ZERO, effects }
+    }
+
+    /// Connected to a port with a unit that has answered.
+    fn connected(size: (u16, u16)) -> Self {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter);
+        stage.opened("/dev/ttyUSB0");
+        stage.bytes(BANNER).bytes(MENU);
+        stage.wait(3000);
+        stage
+    }
+
+    fn with_ports(size: (u16, u16)) -> Self {
+        let mut stage = Stage::new(size);
+        let port = |link: &str, description: &str, busy_by: Option<&str>| PortEntry {
+            link: link.into(),
+            description: description.into(),
+            busy_by: busy_by.map(str::to_owned),
+        };
+        stage.input(Input::PortsListed(Ok(vec![
+            port("/dev/ttyUSB0", "USB, FTDI FT232R USB UART, 0403:6001, AX12345", None),
+            port("/dev/ttyUSB1", "USB, Prolific PL2303, 067b:2303", Some("picocom, process 4711")),
+            port("/dev/ttyS0", "serial port of this computer", None),
+        ])));
+        stage
+    }
+
+    /// Connected, with the stream on for a while and a loose wire.
+    fn streaming(size: (u16, u16)) -> Self {
+        let mut stage = Stage::connected(size);
+        for second in 0..90u32 {
+            let swing = f64::from(second % 30) * 0.37;
+            let third = if (40..52).contains(&second) || second >= 80 {
+                "OpenCct ".into()
+            } else {
+                format!("{:8.3}", 410.0 + swing)
+            };
+            let row = format!("{:8.3};{:8.3};{:8.3};{third};Disabled\r\n", 23.5, 181.25 + swing, 96.0 - swing);
+            stage.wait(1000).bytes(row.as_bytes());
+        }
+        stage
+    }
+
+    fn opened(&mut self, link: &str) {
+        self.input(Input::LinkOpened(LinkInfo {
+            link: link.into(),
+            baud: 115_200,
+            read_only: false,
+            recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
+        }));
+    }
+
+    fn lost(&mut self) -> &mut Self {
+        self.input(Input::LinkGone(Failure {
+            text: "cannot read from /dev/ttyUSB0: the port has gone".into(),
+            hints: vec!["Plug the adapter in again.".into()],
+        }))
+    }
+
+    /// On the load screen, the folder read.
+    fn picking(mut self) -> Self {
+        self.keys("l");
+        let file = |name: &str, bytes| FileEntry {
+            name: name.into(),
+            kind: FileKind::File,
+            bytes,
+            modified: Some("2026-01-31 12:00".into()),
+        };
+        let folder = |name: &str| FileEntry { name: name.into(), kind: FileKind::Folder, bytes: 0, modified: None };
+        let entries = vec![
+            file("AXTC4CO_V1.2.0.elf.S", 242_846),
+            folder("bad"),
+            file("AXTC4CO_V1.1.0.elf.S", 242_846),
+            file("readme.txt", 99),
+        ];
+        self.input(Input::FilesListed { directory: "/work/images".into(), entries: Ok(entries) });
+        self
+    }
+
+    /// On the load screen, a file checked.
+    fn with_image(self, facts: ImageFacts) -> Self {
+        let mut stage = self.picking();
+        stage.keys("p").keys(&facts.path.to_string_lossy()).press(KeyCode::Enter);
+        stage.input(Input::ImageChecked(Box::new(facts)));
+        stage
+    }
+
+    fn input(&mut self, input: Input) -> &mut Self {
+        let effects = self.app.handle(self.now, input);
+        self.effects.extend(effects);
+        self
+    }
+
+    fn key(&mut self, code: KeyCode, modifiers: KeyModifiers) -> &mut Self {
+        self.input(Input::Terminal(TerminalEvent::Key(KeyEvent::new(code, modifiers))))
+    }
+
+    fn press(&mut self, code: KeyCode) -> &mut Self {
+        self.key(code, KeyModifiers::NONE)
+    }
+
+    fn keys(&mut self, text: &str) -> &mut Self {
+        text.chars().for_each(|character| {
+            self.press(KeyCode::Char(character));
+        });
+        self
+    }
+
+    /// What a terminal sends for Ctrl-].
+    fn prefix(&mut self) -> &mut Self {
+        self.key(KeyCode::Char('5'), KeyModifiers::CONTROL)
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
+        self.input(Input::Bytes(bytes.to_vec()))
+    }
+
+    /// Lets time pass, waking the console when it wants to be.
+    fn wait(&mut self, millis: u64) -> &mut Self {
+        let end = self.now + Duration::from_millis(millis);
+        while let Some(due) = self.app.poll_timeout().filter(|&due| due <= end) {
+            self.now = self.now.max(due);
+            self.input(Input::Timeout);
+        }
+        self.now = end;
+        self
+    }
+
+    fn fold(&mut self, event: Event) -> &mut Self {
+        let facts = Facts::default();
+        self.app.fold(self.now, &event, &facts);
+        self
+    }
+
+    /// What has left for the unit since the last question.
+    fn sent(&mut self) -> Vec<u8> {
+        let sent = self.effects.iter().filter_map(|effect| match effect {
+            Effect::Transmit(Transmit { bytes, .. }) => Some(bytes.clone()),
+            _ => None,
+        });
+        let sent = sent.flatten().collect();
+        self.effects.clear();
+        sent
+    }
+
+    fn asked(&mut self) -> Vec<Effect> {
+        std::mem::take(&mut self.effects)
+    }
+
+    fn draw(&self) -> TestBackend {
+        let mut terminal = Terminal::new(TestBackend::new(self.size.0, self.size.1)).expect("a test backend");
+        terminal.draw(|frame| self.app.draw(frame)).expect("drawing in memory");
+        terminal.backend().clone()
+    }
+
+    fn picture(&self) -> String {
+        let lines = self.draw().to_string();
+        // The backend quotes its lines; the quotes keep blanks at the end in sight and are of no use here.
+        lines.lines().map(|line| line.trim_matches('"').trim_end()).collect::<Vec<_>>().join("\n")
+    }
+
+    fn shows(&self, text: &str) -> bool {
+        self.picture().contains(text)
+    }
+}
+
+fn good_image() -> ImageFacts {
+    ImageFacts {
+        path: "/work/images/AXTC4CO_V1.2.0.elf.S".into(),
+        ok: true,
+        product: Some("AXTC4CO".into()),
+        version: Some(Version::new(1, 2, 0)),
+        records: 3074,
+        characters: 242_846,
+        defects: Vec::new(),
+        checked: None,
+    }
+}
+
+fn bad_image() -> ImageFacts {
+    let defects =
+        (1..=40).map(|n| format!("line {}, column 43: the checksum is A{:X}, it should be 5C", n * 7, n % 16));
+    ImageFacts { path: "/work/images/bad.S".into(), ok: false, defects: defects.collect(), ..good_image() }
+}
+
+fn progress() -> Progress {
+    Progress {
+        phase: Phase::Transfer,
+        records: 1448,
+        records_total: 3074,
+        bytes: 114_392,
+        bytes_total: 242_846,
+        address: 0x5a80,
+        elapsed: Duration::from_secs(10),
+        held: None,
+    }
+}
+
+fn report(verdict: Verdict, unit: UnitNow) -> LoadReport {
+    LoadReport {
+        verdict,
+        phase: Phase::Transfer,
+        unit,
+        product: Some("AXTC4CO".into()),
+        version_before: Some(Version::new(1, 1, 0)),
+        version_after: None,
+        records: 1448,
+        records_total: 3074,
+        address: Some(0x5a80),
+        duration: Duration::from_secs(11),
+        what: "The loader reported error 0004 (wrong checksum) and restarted.".into(),
+        heard: "Error # 0004\u{1b}[2J Restarting.".into(),
+    }
+}
+
+macro_rules! pictures {
+    ($($name:ident: $stage:expr;)*) => {
+        $(
+            #[test]
+            fn $name() {
+                let stage: fn((u16, u16)) -> Stage = $stage;
+                for (size, suffix) in [(SMALL, "small"), (LARGE, "large")] {
+                    assert_snapshot!(format!("{}_{suffix}", stringify!($name)), stage(size).picture());
+                }
+            }
+        )*
+    };
+}
+
+pictures! {
+    connect_while_listing: Stage::new;
+    connect_without_ports: |size| {
+        let mut stage = Stage::new(size);
+        stage.input(Input::PortsListed(Ok(Vec::new())));
+        stage
+    };
+    connect_with_ports: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Down);
+        stage
+    };
+    connect_cannot_list: |size| {
+        let mut stage = Stage::new(size);
+        stage.input(Input::PortsListed(Err("/sys/class/tty: permission denied".into())));
+        stage.press(KeyCode::End);
+        stage
+    };
+    connect_failed: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).input(Input::LinkFailed(Failure {
+            text: "cannot open /dev/ttyUSB0: permission denied (it belongs to group 'dialout')".into(),
+            hints: vec![
+                "Add yourself to the group: sudo usermod -aG dialout $USER, then log in again.".into(),
+                "Or open it once with sudo.".into(),
+            ],
+        }));
+        stage
+    };
+    connect_by_path: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::End).press(KeyCode::Enter).keys("tcp://bench-3:4001");
+        stage
+    };
+    overview_without_link: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.keys("2");
+        stage
+    };
+    overview_silent: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("/dev/ttyUSB0");
+        stage.wait(60_000);
+        stage
+    };
+    overview_stream_off: Stage::connected;
+    overview_streaming: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.press(KeyCode::Down);
+        stage
+    };
+    overview_of_a_broken_channel: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.press(KeyCode::Down).press(KeyCode::Down).press(KeyCode::Down);
+        stage
+    };
+    overview_late: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.wait(10_000);
+        stage
+    };
+    overview_link_lost: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.lost();
+        stage
+    };
+    stream_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("tp70000").press(KeyCode::Enter);
+        stage
+    };
+    defaults_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("dyes").press(KeyCode::Enter);
+        stage
+    };
+    view_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("v");
+        stage
+    };
+    terminal_empty: |size| {
+        let mut stage = Stage::new(size);
+        stage.keys("3");
+        stage
+    };
+    terminal_text: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3m").bytes(MENU).bytes(b"a\tb \x1b[31mred\x07 \xff\r\n");
+        stage
+    };
+    terminal_times: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3").prefix().keys("w");
+        stage
+    };
+    terminal_hex: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3x").prefix().keys("h");
+        stage
+    };
+    terminal_after_prefix: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3").prefix();
+        stage
+    };
+    terminal_link_lost: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3").lost();
+        stage
+    };
+    paste_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3").input(Input::Terminal(TerminalEvent::Paste("one\ntwo\n".into())));
+        stage
+    };
+    load_picker: |size| Stage::connected(size).picking();
+    load_cannot_list: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("l").input(Input::FilesListed {
+            directory: "/root/secret".into(),
+            entries: Err("permission denied".into()),
+        });
+        stage
+    };
+    load_report_good: |size| Stage::connected(size).with_image(good_image());
+    load_report_bad: |size| {
+        let mut stage = Stage::connected(size).with_image(bad_image());
+        stage.press(KeyCode::PageDown);
+        stage
+    };
+    load_report_other_product: |size| {
+        Stage::connected(size).with_image(ImageFacts { product: Some("AXRTD8CO".into()), ..good_image() })
+    };
+    load_running: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Progress(progress()));
+        stage
+    };
+    load_held: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Progress(progress())).fold(Event::Held(true)).wait(2400);
+        stage
+    };
+    load_cancel_question: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Progress(progress())).press(KeyCode::Esc);
+        stage
+    };
+    load_done: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        let report = LoadReport {
+            phase: Phase::Verify,
+            version_after: Some(Version::new(1, 2, 0)),
+            records: 3074,
+            duration: Duration::from_secs(24),
+            what: "The unit runs AXTC4CO 1.2.0: its new banner says so.".into(),
+            heard: "AXTC4CO 4 Thermocouple Scanner Software Version V1.2.0".into(),
+            ..report(Verdict::Done, UnitNow::Application)
+        };
+        stage.fold(Event::Finished(Outcome::Loaded(Box::new(report))));
+        stage
+    };
+    load_failed: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Finished(Outcome::Loaded(Box::new(report(Verdict::Failed, UnitNow::Loader)))));
+        stage
+    };
+    load_link_lost: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Progress(progress())).lost();
+        stage
+    };
+    help_on_overview: |size| {
+        let mut stage = Stage::connected(size);
+        stage.press(KeyCode::F(1));
+        stage
+    };
+    help_on_terminal: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3").press(KeyCode::F(1)).press(KeyCode::PageDown);
+        stage
+    };
+    quit_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("mq");
+        stage
+    };
+}
+
+#[test]
+fn a_small_terminal_gets_one_clear_message() {
+    assert_snapshot!(Stage::streaming((60, 10)).picture());
+}
+
+#[test]
+fn every_screen_survives_every_size() {
+    let scenes: [fn() -> Stage; 9] = [
+        || Stage::with_ports(SMALL),
+        || Stage::streaming(SMALL),
+        || Stage::connected(SMALL).picking(),
+        || Stage::connected(SMALL).with_image(bad_image()),
+        || {
+            let mut stage = Stage::connected(SMALL);
+            stage.fold(Event::Progress(progress())).keys("4");
+            stage
+        },
+        || {
+            let mut stage = Stage::connected(SMALL);
+            stage.keys("4").fold(Event::Finished(Outcome::Loaded(Box::new(report(Verdict::Failed, UnitNow::Unknown)))));
+            stage.lost();
+            stage
+        },
+        || {
+            let mut stage = Stage::streaming(SMALL);
+            stage.keys("3").prefix().keys("h");
+            stage
+        },
+        || {
+            let mut stage = Stage::streaming(SMALL);
+            stage.keys("3");
+            stage
+        },
+        || {
+            let mut stage = Stage::connected(SMALL);
+            stage.press(KeyCode::F(1));
+            stage
+        },
+    ];
+    for scene in scenes {
+        let mut stage = scene();
+        for columns in 0..120 {
+            for rows in 0..40 {
+                stage.size = (columns, rows);
+                stage.draw();
+            }
+        }
+    }
+}
+
+#[test]
+fn every_question_survives_every_size_it_is_drawn_at() {
+    for keys in ["t", "d", "v"] {
+        let mut stage = Stage::connected(SMALL);
+        stage.keys(keys);
+        for columns in 70..100 {
+            for rows in 20..30 {
+                stage.size = (columns, rows);
+                stage.picture();
+            }
+        }
+    }
+}
+
+#[test]
+fn connecting_asks_the_unit_who_it_is() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())]);
+    stage.opened("/dev/ttyUSB0");
+    stage.wait(10_000);
+    let sent = stage.sent();
+    assert!(sent.contains(&b'm'), "{sent:?}");
+    assert!(!sent.iter().any(|byte| b"VvDdTtSsLl".contains(byte)), "nothing but the menu is asked for: {sent:?}");
+}
+
+#[test]
+fn the_link_given_at_the_start_is_opened_at_once() {
+    let mut app = App::new(Options {
+        link: Some("emu:axtc4co".into()),
+        directory: "/".into(),
+        colour: true,
+        start_of_day: NOON,
+        size: SMALL,
+    });
+    assert_eq!(app.start(), [Effect::ListPorts, Effect::OpenLink("emu:axtc4co".into())]);
+}
+
+#[test]
+fn opening_another_link_closes_the_first() {
+    let mut stage = Stage::connected(SMALL);
+    stage.asked();
+    stage.keys("1").press(KeyCode::Down).press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::CloseLink, Effect::OpenLink("/dev/ttyUSB1".into())]);
+}
+
+#[test]
+fn a_lost_link_is_opened_again_by_c_and_the_terminal_keeps_its_lines() {
+    let mut stage = Stage::connected(SMALL);
+    stage.lost().asked();
+    stage.keys("c");
+    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())]);
+    stage.opened("/dev/ttyUSB0");
+    stage.keys("3");
+    assert!(stage.shows("Software Version V1.1.0") && stage.shows("link lost"), "{}", stage.picture());
+}
+
+#[test]
+fn menu_keys_do_what_the_manual_says_in_either_case() {
+    let mut stage = Stage::connected(SMALL);
+    stage.sent();
+    stage.keys("S");
+    assert_eq!(stage.sent(), b"s");
+    assert!(stage.shows("S again stops it"), "the terminal screen shows what the unit prints");
+    let mut stage = Stage::connected(SMALL);
+    stage.sent();
+    stage.keys("v");
+    assert_eq!(stage.sent(), b"", "V halts scanning: it is asked first");
+    stage.press(KeyCode::Enter);
+    assert_eq!(stage.sent(), b"v");
+    assert!(stage.shows("halted by V"));
+    stage.keys("x");
+    assert_eq!(stage.sent(), b"x");
+    assert!(!stage.shows("halted by V"));
+}
+
+#[test]
+fn leaving_with_the_view_open_offers_to_close_it() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("v").press(KeyCode::Enter).prefix().keys("2q");
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    let effects = stage.asked();
+    assert_eq!(effects, [Effect::Transmit(Transmit::open(*b"x")), Effect::Quit]);
+}
+
+#[test]
+fn defaults_are_restored_only_after_yes_written_like_this() {
+    let mut stage = Stage::connected(SMALL);
+    stage.sent();
+    stage.keys("dyes").press(KeyCode::Enter);
+    stage.wait(1000);
+    assert_eq!(stage.sent(), b"");
+    stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("Yes").press(KeyCode::Enter);
+    assert_eq!(stage.sent(), b"d");
+}
+
+#[test]
+fn t_switches_a_running_stream_off_and_asks_before_it_switches_one_on() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.sent();
+    stage.keys("t");
+    assert_eq!(stage.sent(), b"t");
+    let mut stage = Stage::connected(SMALL);
+    stage.sent();
+    stage.keys("t");
+    assert_eq!(stage.sent(), b"");
+    assert!(stage.shows("field value, object 6100h"));
+    stage.press(KeyCode::Esc);
+    assert!(!stage.shows("field value, object 6100h"));
+}
+
+#[test]
+fn letters_typed_into_a_question_are_no_commands() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.asked();
+    stage.keys("pq1?lt");
+    assert_eq!(stage.asked(), []);
+    stage.press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::OpenLink("q1?lt".into())]);
+}
+
+#[test]
+fn on_the_terminal_screen_letters_go_to_the_unit_and_the_prefix_takes_one_back() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").sent();
+    stage.keys("q1").press(KeyCode::Enter).press(KeyCode::Left).press(KeyCode::Up).press(KeyCode::Tab);
+    assert_eq!(stage.sent(), b"q1\r\t");
+    stage.prefix().keys("q");
+    assert_eq!(stage.asked(), [Effect::Quit]);
+    stage.prefix().prefix();
+    assert_eq!(stage.sent(), b"\x1d");
+}
+
+#[test]
+fn pasted_text_goes_to_the_unit_only_after_a_yes() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").sent();
+    stage.input(Input::Terminal(TerminalEvent::Paste("m\n\x1b[D\n".into())));
+    assert_eq!(stage.sent(), b"");
+    stage.keys("y");
+    assert_eq!(stage.sent(), b"m\r[D\r", "the escape character is not passed on");
+}
+
+#[test]
+fn the_terminal_stays_where_it_was_scrolled_to_while_more_comes() {
+    let mut stage = Stage::connected(SMALL);
+    (0..100).for_each(|n| {
+        stage.bytes(format!("line {n}\r\n").as_bytes());
+    });
+    stage.keys("3").press(KeyCode::PageUp);
+    assert!(stage.shows("stopped") && !stage.shows("line 99"));
+    let stopped = stage.picture();
+    let place = stopped.lines().nth(10).map(str::to_owned);
+    stage.bytes(b"more\r\n");
+    assert_eq!(stage.picture().lines().nth(10).map(str::to_owned), place);
+    stage.press(KeyCode::End);
+    assert!(stage.shows("follows") && stage.shows("more"));
+}
+
+#[test]
+fn an_upload_cannot_start_while_anything_stands_against_it() {
+    let cases = [
+        (bad_image(), "the file has errors"),
+        (ImageFacts { product: Some("AXRTD8CO".into()), ..good_image() }, "the file is for an AXRTD8CO"),
+    ];
+    for (facts, why) in cases {
+        let mut stage = Stage::connected(SMALL).with_image(facts);
+        stage.sent();
+        assert!(stage.shows(why), "{}", stage.picture());
+        stage.press(KeyCode::Enter);
+        assert!(!stage.shows("Password"));
+        assert_eq!(stage.sent(), b"");
+    }
+    let mut stage = Stage::with_ports(SMALL).with_image(good_image());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("no unit is connected") && !stage.shows("Password"));
+}
+
+#[test]
+fn an_answer_about_a_file_nobody_waits_for_is_ignored() {
+    let mut stage = Stage::connected(SMALL).picking();
+    stage.input(Input::ImageChecked(Box::new(good_image())));
+    assert!(stage.shows("Choose a file"));
+}
+
+#[test]
+fn folders_are_walked_and_the_way_back_finds_the_folder_again() {
+    let mut stage = Stage::connected(SMALL).picking();
+    stage.asked();
+    stage.press(KeyCode::Down).press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::ListFiles("/work/images/bad".into())]);
+    stage.input(Input::FilesListed { directory: "/work/images/bad".into(), entries: Ok(Vec::new()) });
+    stage.press(KeyCode::Esc);
+    assert_eq!(stage.asked(), [Effect::ListFiles("/work/images".into())]);
+    let bad = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, modified: None };
+    stage.input(Input::FilesListed { directory: "/work/images".into(), entries: Ok(vec![bad]) });
+    assert!(stage.shows("› bad/"));
+}
+
+#[test]
+fn nothing_a_unit_sends_reaches_the_screen_as_a_control_code() {
+    let mut stage = Stage::connected(LARGE);
+    let every: Vec<u8> = (0..=255).collect();
+    stage.bytes(&every).bytes(b"\r\n");
+    for keys in ["2", "3"] {
+        stage.keys(keys);
+        assert!(stage.picture().chars().all(|character| character == '\n' || !character.is_control()));
+    }
+    stage.prefix().keys("h");
+    assert!(stage.picture().chars().all(|character| character == '\n' || !character.is_control()));
+}
+
+#[test]
+fn an_idle_console_wants_nothing_and_draws_nothing() {
+    let mut stage = Stage::connected(SMALL);
+    stage.wait(60_000);
+    stage.app.drawn();
+    assert_eq!(stage.app.poll_timeout(), None);
+    stage.input(Input::Timeout);
+    stage.input(Input::Terminal(TerminalEvent::FocusGained));
+    assert!(!stage.app.is_dirty());
+    let mut release = KeyEvent::new(KeyCode::Char('2'), KeyModifiers::NONE);
+    release.kind = KeyEventKind::Release;
+    stage.input(Input::Terminal(TerminalEvent::Key(release)));
+    assert!(!stage.app.is_dirty(), "the release of a key is not a key");
+    stage.keys("3");
+    assert!(stage.app.is_dirty());
+}
+
+#[test]
+fn a_signal_ends_the_program_without_a_question() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("m").asked();
+    stage.input(Input::Signal);
+    assert_eq!(stage.asked(), [Effect::Quit]);
+}

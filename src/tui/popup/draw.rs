@@ -1,0 +1,267 @@
+//! Pictures of the popups.
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, BorderType, Clear};
+
+use super::{Popup, Question, consequence};
+use crate::tui::theme::Theme;
+use crate::tui::view::View;
+use crate::tui::visible;
+use crate::tui::widgets::{format, lines};
+use crate::wire::stream::Source;
+
+/// Columns of a popup, borders included.
+const COLUMNS: u16 = 66;
+
+/// Draws a popup in the middle of an area.
+pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Frame) {
+    let columns = COLUMNS.min(area.width);
+    let inner = usize::from(columns).saturating_sub(4);
+    let (title, mut rows, hints) = match popup {
+        Popup::Asking(question) => ask(question, view, theme, inner),
+        Popup::Waiting(what) => ("One moment".to_owned(), paragraphs(&[what], inner), Vec::new()),
+        Popup::Failed { title, failure } => {
+            let mut rows = paragraphs(&[&visible::sentence(&failure.text)], inner);
+            for hint in &failure.hints {
+                rows.push(Line::default());
+                let broken = format::wrap(&visible::text(hint), inner.saturating_sub(2));
+                rows.extend(
+                    broken
+                        .into_iter()
+                        .enumerate()
+                        .map(|(number, line)| Line::raw(format!("{} {line}", if number == 0 { "·" } else { " " }))),
+                );
+            }
+            ((*title).to_owned(), rows, vec![("Enter", "close")])
+        }
+    };
+    if !hints.is_empty() {
+        rows.push(Line::default());
+        let mut line = Line::default();
+        for (key, meaning) in hints {
+            line.push_span(Span::styled(key, theme.key()));
+            line.push_span(Span::raw(format!(" {meaning}   ")));
+        }
+        rows.push(line);
+    }
+    let height = (rows.len() as u16 + 4).min(area.height);
+    let window =
+        Rect { x: area.x + (area.width - columns) / 2, y: area.y + (area.height - height) / 2, width: columns, height };
+    let style = match popup {
+        Popup::Failed { .. } => theme.bad(),
+        Popup::Asking(_) | Popup::Waiting(_) => theme.heading(),
+    };
+    let block = Block::bordered()
+        .border_type(BorderType::Rounded)
+        .border_style(theme.quiet())
+        .title(Span::styled(format!(" {title} "), style));
+    frame.render_widget(Clear, window);
+    frame.render_widget(block, window);
+    let inside = Rect {
+        x: window.x + 2.min(window.width),
+        y: window.y + 2.min(window.height),
+        width: window.width.saturating_sub(4),
+        height: window.height.saturating_sub(3),
+    };
+    lines::draw(frame, inside, rows);
+}
+
+type Content = (String, Vec<Line<'static>>, Vec<(&'static str, &'static str)>);
+
+fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Content {
+    let (title, mut rows, hints) = match question {
+        Question::Link(field) => (
+            "Connect to",
+            {
+                let mut rows = paragraphs(
+                    &[
+                        "A serial port (/dev/ttyUSB0, COM3), emu:axtc4co, tcp://HOST:PORT, rfc2217://HOST:PORT or replay:FILE.",
+                    ],
+                    columns,
+                );
+                rows.push(Line::default());
+                rows.push(typed(theme, "", field.text(), columns));
+                rows
+            },
+            vec![("Enter", "connect"), ("Esc", "back")],
+        ),
+        Question::Image { typed: field, directory } => (
+            "Image file",
+            {
+                let directory = visible::text(&directory.to_string_lossy());
+                let mut rows = paragraphs(&["A path, absolute or from this folder:"], columns);
+                rows.push(Line::styled(format::keep_end(&directory, columns), theme.quiet()));
+                rows.push(Line::default());
+                rows.push(typed(theme, "", field.text(), columns));
+                rows
+            },
+            vec![("Enter", "check it"), ("Esc", "back")],
+        ),
+        Question::Stream { source, millis, complaint, .. } => (
+            "Switch the data stream on",
+            {
+                let choice = |mine: Source, text: &'static str| match mine == *source {
+                    true => Line::styled(format!("› {text}"), theme.strong()),
+                    false => Line::raw(format!("  {text}")),
+                };
+                let mut rows = vec![
+                    choice(Source::FieldValue, "F  field value, object 6100h, in °C"),
+                    choice(Source::ProcessValue, "P  process value, object 7130h, in counts"),
+                    Line::default(),
+                    typed(theme, "Every, in ms: ", millis.text(), columns),
+                    Line::default(),
+                ];
+                rows.extend(paragraphs(
+                    &["The unit stores this: the stream comes back after every power cycle until T switches it off."],
+                    columns,
+                ));
+                rows.extend(complain(theme, *complaint));
+                rows
+            },
+            vec![("F P", "choose"), ("Enter", "switch on"), ("Esc", "back")],
+        ),
+        Question::View => (
+            "View the object dictionary",
+            paragraphs(
+                &[
+                    "While its view sub-menu is open, the unit halts temperature scanning and CAN.",
+                    "It prints one object after the other on the terminal screen: Enter shows the next, X leaves the \
+                     sub-menu. The unit has to be pre-operational.",
+                ],
+                columns,
+            ),
+            vec![("Enter", "open it"), ("Esc", "back")],
+        ),
+        Question::Defaults { typed: field, complaint } => (
+            "Restore the default object dictionary",
+            {
+                let mut rows = paragraphs(
+                    &[
+                        "All settings of the object dictionary go back to the factory's. The unit applies them at once: \
+                         it restarts. Node-ID and bit rate stay as LSS has set them.",
+                        "Type Yes to do it.",
+                    ],
+                    columns,
+                );
+                rows.push(Line::default());
+                rows.push(typed(theme, "", field.text(), columns));
+                rows.extend(complain(theme, *complaint));
+                rows
+            },
+            vec![("Enter", "restore"), ("Esc", "back")],
+        ),
+        Question::Label { typed: field, image, complaint } => (
+            "Which product is the unit?",
+            {
+                let image = image.as_deref().map_or("not said".to_owned(), visible::text);
+                let mut rows = paragraphs(
+                    &[
+                        "The unit cannot say what it is: a loader knows only how to take a file. A file for another \
+                         product would make the unit useless until the right one is sent.",
+                        &format!("The file is for: {image}. Type the part number on the unit's label."),
+                    ],
+                    columns,
+                );
+                rows.push(Line::default());
+                rows.push(typed(theme, "", field.text(), columns));
+                rows.extend(complain(theme, *complaint));
+                rows
+            },
+            vec![("Enter", "go on"), ("Esc", "back")],
+        ),
+        Question::Password { field, .. } => (
+            "Password for loading software",
+            {
+                let is_emulated = view.link.name.as_deref().is_some_and(|name| name.starts_with("emu:"));
+                let origin = match is_emulated {
+                    true => "Emulated units take AXIO-2010.",
+                    false => "Your Axiomatic contact has it. Capital and small letters count.",
+                };
+                let mut rows = paragraphs(&[origin, "It is neither shown nor recorded."], columns);
+                rows.push(Line::default());
+                rows.push(typed(theme, "", &field.dots(), columns));
+                rows
+            },
+            vec![("Enter", "start the upload"), ("Esc", "back")],
+        ),
+        Question::CancelLoad => (
+            "Cancel the upload?",
+            paragraphs(&[consequence(view.load.progress.map(|progress| progress.phase))], columns),
+            vec![("Y", "cancel the upload"), ("N", "go on loading")],
+        ),
+        Question::Paste(bytes) => (
+            "Send the pasted text?",
+            {
+                let rows = bytes.iter().filter(|&&byte| byte == b'\r').count() + 1;
+                let lines = if rows == 1 { "one line".to_owned() } else { format!("{rows} lines") };
+                paragraphs(
+                    &[
+                        &format!("{} characters, {lines}, go to the unit as if typed.", format::grouped(bytes.len())),
+                        "Every M, V, D, T, S and L in it is a key of the unit's menu.",
+                    ],
+                    columns,
+                )
+            },
+            vec![("Y", "send"), ("N", "do not send")],
+        ),
+        Question::Disconnect => (
+            "Close the link?",
+            paragraphs(&["A job runs.", job_consequence(view)], columns),
+            vec![("Y", "close the link"), ("N", "stay connected")],
+        ),
+        Question::Quit => (
+            "Leave axcon?",
+            paragraphs(&["A job runs.", job_consequence(view)], columns),
+            vec![("Y", "leave"), ("N", "stay")],
+        ),
+        Question::QuitViewing => (
+            "Leave axcon?",
+            paragraphs(
+                &["The unit's view sub-menu is open. If it stays open, temperature scanning and CAN stay halted."],
+                columns,
+            ),
+            vec![("Enter", "close it and leave"), ("Q", "leave it open"), ("Esc", "stay")],
+        ),
+    };
+    if rows.is_empty() {
+        rows.push(Line::default());
+    }
+    (title.to_owned(), rows, hints)
+}
+
+/// What the running job leaves behind when it is dropped.
+fn job_consequence(view: &View) -> &'static str {
+    match view.job {
+        Some(crate::session::Job::Load) => consequence(view.load.progress.map(|progress| progress.phase)),
+        _ => "The unit may be left waiting for an answer at a prompt.",
+    }
+}
+
+fn paragraphs(texts: &[&str], columns: usize) -> Vec<Line<'static>> {
+    let mut rows = Vec::new();
+    for text in texts {
+        if !rows.is_empty() {
+            rows.push(Line::default());
+        }
+        rows.extend(format::wrap(text, columns).into_iter().map(Line::raw));
+    }
+    rows
+}
+
+/// A field: its end is what one looks at while typing.
+fn typed(theme: Theme, label: &'static str, text: &str, columns: usize) -> Line<'static> {
+    let room = columns.saturating_sub(format::width(label) + 3);
+    let text = format::keep_end(&visible::text(text), room);
+    Line::from(vec![
+        Span::styled(label, theme.quiet()),
+        Span::styled("› ", theme.quiet()),
+        Span::styled(text, theme.strong()),
+        Span::styled(" ", theme.bar()),
+    ])
+}
+
+fn complain(theme: Theme, complaint: Option<&'static str>) -> Vec<Line<'static>> {
+    complaint.map(|text| vec![Line::default(), Line::styled(text, theme.bad())]).unwrap_or_default()
+}

@@ -1,0 +1,331 @@
+//! What stands in front of a screen: a question, a wait, or a failure.
+//!
+//! All text is typed here, so that a letter on a screen is always a command and a letter in a popup never is.
+
+mod draw;
+
+use std::path::{Path, PathBuf};
+
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+
+use super::action::Action;
+use super::input::{Failure, ImageFacts};
+use super::view::View;
+use super::widgets::field::{PasswordField, TextField};
+use crate::session::{Command, Phase};
+use crate::time::Duration;
+use crate::wire::stream::Source;
+
+pub use draw::draw;
+
+/// What stands in front of the screen.
+#[derive(Debug)]
+pub enum Popup {
+    /// The user has to answer.
+    Asking(Question),
+    /// The user has to wait; what for.
+    Waiting(String),
+    /// Something has failed; what, and what to try.
+    Failed {
+        /// In a few words.
+        title: &'static str,
+        /// What happened and what to try.
+        failure: Failure,
+    },
+}
+
+/// A question.
+#[derive(Debug)]
+pub enum Question {
+    /// A link by name.
+    Link(TextField),
+    /// An image file by name, in a folder.
+    Image {
+        /// What has been typed; relative to the folder.
+        typed: TextField,
+        /// The folder.
+        directory: PathBuf,
+    },
+    /// What the stream shall send.
+    Stream {
+        /// Field or process value.
+        source: Source,
+        /// Repetition time in milliseconds.
+        millis: TextField,
+        /// It is still the suggested one: a digit replaces it.
+        is_suggested: bool,
+        /// What is wrong with it.
+        complaint: Option<&'static str>,
+    },
+    /// Shall the unit's view sub-menu be opened?
+    View,
+    /// Shall the defaults be restored?
+    Defaults {
+        /// What has been typed.
+        typed: TextField,
+        /// What is wrong with it.
+        complaint: Option<&'static str>,
+    },
+    /// What the unit's label says.
+    Label {
+        /// What has been typed.
+        typed: TextField,
+        /// What the image is for.
+        image: Option<String>,
+        /// What is wrong with it.
+        complaint: Option<&'static str>,
+    },
+    /// The unit's password.
+    Password {
+        /// What has been typed.
+        field: PasswordField,
+        /// What the label says, if that had to be asked.
+        product: Option<String>,
+    },
+    /// Shall the upload be cancelled?
+    CancelLoad,
+    /// Shall pasted text go to the unit?
+    Paste(Vec<u8>),
+    /// Shall the link be closed though a job runs?
+    Disconnect,
+    /// Shall the program end though a job runs?
+    Quit,
+    /// Shall the program end though the unit's view sub-menu is open?
+    QuitViewing,
+}
+
+/// What a key did to a popup.
+#[derive(Debug)]
+pub enum Answer {
+    /// The popup stays.
+    Stay,
+    /// It goes.
+    Close,
+    /// It goes, and this is wanted.
+    Act(Action),
+}
+
+/// Shortest repetition time of the stream (errata E-105).
+const SHORTEST_PERIOD_MS: u64 = 1;
+/// Longest repetition time of the stream (errata E-105).
+const LONGEST_PERIOD_MS: u64 = 60_000;
+/// What confirms restoring the defaults (AXTC4CO manual, section 4.1.2).
+const YES: &str = "Yes";
+
+impl Popup {
+    /// What a key does.
+    pub fn on(&mut self, key: KeyEvent) -> Answer {
+        match self {
+            Popup::Asking(question) => question.on(key),
+            // The answer is on its way; only it ends the wait.
+            Popup::Waiting(_) => Answer::Stay,
+            Popup::Failed { .. } => match key.code {
+                KeyCode::Enter | KeyCode::Esc | KeyCode::Char(_) => Answer::Close,
+                _ => Answer::Stay,
+            },
+        }
+    }
+
+    /// Pasted text goes into a field as if it had been typed, up to its first line end.
+    pub fn paste(&mut self, text: &str) {
+        if let Popup::Asking(question) = self {
+            for character in text.chars().take_while(|character| !character.is_control()) {
+                question.typed(character);
+            }
+        }
+    }
+}
+
+impl Question {
+    /// Asks for a link.
+    pub fn link() -> Question {
+        Question::Link(TextField::default())
+    }
+
+    /// Asks for an image.
+    pub fn image(directory: &Path) -> Question {
+        Question::Image { typed: TextField::default(), directory: directory.to_path_buf() }
+    }
+
+    /// Asks what the stream shall send.
+    pub fn stream() -> Question {
+        Question::Stream {
+            source: Source::FieldValue,
+            millis: TextField::new("1000"),
+            is_suggested: true,
+            complaint: None,
+        }
+    }
+
+    /// Asks for what an upload still needs.
+    pub fn start_load(view: &View, facts: &ImageFacts) -> Question {
+        if view.needs_label() {
+            return Question::Label { typed: TextField::default(), image: facts.product.clone(), complaint: None };
+        }
+        Question::Password { field: PasswordField::new(), product: None }
+    }
+
+    fn on(&mut self, key: KeyEvent) -> Answer {
+        let with_ctrl = key.modifiers.contains(KeyModifiers::CONTROL);
+        match key.code {
+            KeyCode::Esc => Answer::Close,
+            KeyCode::Char('c') if with_ctrl => Answer::Close,
+            KeyCode::Char('u') if with_ctrl => {
+                self.clear();
+                Answer::Stay
+            }
+            KeyCode::Enter => self.accept(),
+            KeyCode::Backspace => {
+                self.pop();
+                Answer::Stay
+            }
+            KeyCode::Char(character) if !with_ctrl && !key.modifiers.contains(KeyModifiers::ALT) => {
+                self.typed(character)
+            }
+            _ => Answer::Stay,
+        }
+    }
+
+    /// Enter.
+    fn accept(&mut self) -> Answer {
+        match self {
+            Question::Link(field) if field.text().trim().is_empty() => Answer::Stay,
+            Question::Link(field) => Answer::Act(Action::Open(field.text().trim().to_owned())),
+            Question::Image { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
+            Question::Image { typed, directory } => {
+                Answer::Act(Action::CheckImage(directory.join(typed.text().trim())))
+            }
+            Question::Stream { source, millis, complaint, .. } => match millis.text().parse() {
+                Ok(number @ SHORTEST_PERIOD_MS..=LONGEST_PERIOD_MS) => {
+                    let period = Duration::from_millis(number);
+                    Answer::Act(Action::Command(Command::StreamOn { source: *source, period }))
+                }
+                _ => {
+                    *complaint = Some("The unit takes 1 to 60000 ms.");
+                    Answer::Stay
+                }
+            },
+            Question::View => Answer::Act(Action::ViewDictionary),
+            Question::Defaults { typed, .. } if typed.text() == YES => {
+                Answer::Act(Action::Command(Command::RestoreDefaults))
+            }
+            Question::Defaults { complaint, .. } => {
+                *complaint = Some("Only the word Yes, written like this, starts it.");
+                Answer::Stay
+            }
+            Question::Label { typed, image, complaint } => {
+                let label = typed.text().trim().to_owned();
+                if label.is_empty() {
+                    return Answer::Stay;
+                }
+                if image.as_ref().is_some_and(|image| !image.eq_ignore_ascii_case(&label)) {
+                    *complaint = Some("The file is for another product: it must not be sent to this unit.");
+                    return Answer::Stay;
+                }
+                Answer::Act(Action::Ask(Question::Password { field: PasswordField::new(), product: Some(label) }))
+            }
+            Question::Password { field, .. } if field.is_empty() => Answer::Stay,
+            Question::Password { field, product } => {
+                Answer::Act(Action::StartLoad { password: field.secret(), product: product.take() })
+            }
+            Question::CancelLoad => Answer::Act(Action::Command(Command::Cancel)),
+            Question::Paste(bytes) => Answer::Act(Action::Command(Command::Keys(std::mem::take(bytes)))),
+            Question::Disconnect => Answer::Act(Action::Disconnect),
+            Question::Quit => Answer::Act(Action::Quit),
+            Question::QuitViewing => Answer::Act(Action::LeaveViewAndQuit),
+        }
+    }
+
+    fn typed(&mut self, character: char) -> Answer {
+        match self {
+            Question::Link(field) | Question::Image { typed: field, .. } => field.push(character),
+            Question::Defaults { typed: field, complaint } | Question::Label { typed: field, complaint, .. } => {
+                *complaint = None;
+                field.push(character);
+            }
+            Question::Stream { source, millis, is_suggested, complaint } => match character.to_ascii_lowercase() {
+                'f' => *source = Source::FieldValue,
+                'p' => *source = Source::ProcessValue,
+                '0'..='9' if std::mem::take(is_suggested) => *millis = TextField::new(character),
+                '0'..='9' if millis.text().len() < LONGEST_PERIOD_MS.to_string().len() => {
+                    *complaint = None;
+                    millis.push(character);
+                }
+                _ => {}
+            },
+            Question::Password { field, .. } => field.push(character),
+            Question::QuitViewing if character.eq_ignore_ascii_case(&'q') => return Answer::Act(Action::Quit),
+            Question::View
+            | Question::CancelLoad
+            | Question::Paste(_)
+            | Question::Disconnect
+            | Question::Quit
+            | Question::QuitViewing => match character.to_ascii_lowercase() {
+                'y' => return self.accept(),
+                'n' => return Answer::Close,
+                _ => {}
+            },
+        }
+        Answer::Stay
+    }
+
+    fn pop(&mut self) {
+        match self {
+            Question::Password { field, .. } => field.pop(),
+            _ => {
+                if let Some(field) = self.field() {
+                    field.pop();
+                }
+            }
+        }
+    }
+
+    fn clear(&mut self) {
+        match self {
+            Question::Password { field, .. } => field.clear(),
+            _ => {
+                if let Some(field) = self.field() {
+                    field.clear();
+                }
+            }
+        }
+    }
+
+    /// The plain field, if the question has one.
+    fn field(&mut self) -> Option<&mut TextField> {
+        match self {
+            Question::Stream { millis, is_suggested, .. } => {
+                *is_suggested = false;
+                Some(millis)
+            }
+            Question::Link(field)
+            | Question::Image { typed: field, .. }
+            | Question::Defaults { typed: field, .. }
+            | Question::Label { typed: field, .. } => Some(field),
+            Question::Password { .. }
+            | Question::View
+            | Question::CancelLoad
+            | Question::Paste(_)
+            | Question::Disconnect
+            | Question::Quit
+            | Question::QuitViewing => None,
+        }
+    }
+}
+
+/// What cancelling the upload in this phase leaves behind.
+pub fn consequence(phase: Option<Phase>) -> &'static str {
+    match phase {
+        None | Some(Phase::Check) => "Nothing has been changed yet: the unit goes on with what it has.",
+        Some(Phase::EnterLoader) => {
+            "The unit is on its way into its loader. It may wait there until a complete file has been sent."
+        }
+        Some(Phase::Erase | Phase::Transfer | Phase::Finish) => {
+            "The unit's software is incomplete then. It waits in its loader, without scanning and without CAN, until a \
+             complete file has been sent. It is not harmed by that."
+        }
+        Some(Phase::Verify) => {
+            "The file has been sent completely. Only the proof is missing: without it nobody knows what the unit runs."
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! What is known of the unit, its live values and its faults, on one page.
+
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::Rect;
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
+
+use super::{Scene, terminal};
+use crate::session::{Known, Origin, UnitState};
+use crate::time::Instant;
+use crate::tui::action::Action;
+use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::view::{Channel, Fault, FaultKind};
+use crate::tui::visible;
+use crate::tui::widgets::spark::sparkline;
+use crate::tui::widgets::{format, lines};
+use crate::wire::stream::{Reading, Source};
+
+/// Name on the tab.
+pub const TITLE: &str = "Overview";
+
+/// Keys of the screen.
+pub const BINDINGS: &[Binding] = &[
+    Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "channel above" },
+    Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "channel", long: "channel below" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('r'))],
+        cmd: Cmd::Restart,
+        short: "restart min/max",
+        long: "start minimum and maximum anew",
+    },
+];
+
+/// From this width on the raw terminal has room beside the values.
+const BESIDE_COLUMNS: u16 = 140;
+/// From this height on the chosen channel gets a chart.
+const CHART_ROWS: u16 = 32;
+/// Smallest span of a trend, in °C and in counts: less than this is noise.
+const LEAST_SPAN: [f64; 2] = [1.0, 10.0];
+/// Columns of the values before the trend begins.
+const TABLE_COLUMNS: usize = 67;
+
+/// The page.
+#[derive(Debug, Default)]
+pub struct Overview {
+    cursor: usize,
+}
+
+impl Overview {
+    /// What a command does here.
+    pub fn on(&mut self, cmd: Cmd, channels: usize) -> Option<Action> {
+        self.cursor = self.cursor.min(channels.saturating_sub(1));
+        match cmd {
+            Cmd::Up => self.cursor = self.cursor.saturating_sub(1),
+            Cmd::Down => self.cursor = (self.cursor + 1).min(channels.saturating_sub(1)),
+            Cmd::Restart => return Some(Action::RestartExtremes),
+            _ => {}
+        }
+        None
+    }
+
+    /// The picture.
+    pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        if area.width < BESIDE_COLUMNS {
+            return self.draw_page(scene, area, frame);
+        }
+        let left = Rect { width: area.width * 3 / 5, ..area };
+        let right = Rect { x: area.x + left.width + 2, width: area.width - left.width - 2, ..area };
+        self.draw_page(scene, left, frame);
+        let (heading, text) = lines::split(right, 1);
+        lines::draw(frame, heading, [lines::rule(scene.theme, right.width, "On the line", "3 shows all of it")]);
+        lines::draw(frame, text, terminal::newest_lines(scene, text));
+    }
+
+    fn draw_page(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let unit = unit(scene, area.width);
+        let (upper, rest) = lines::split(area, unit.len() as u16);
+        lines::draw(frame, upper, unit);
+        let values = self.values(scene, area.width);
+        let (middle, rest) = lines::split(rest, values.len() as u16);
+        lines::draw(frame, middle, values);
+        let chart_rows = match scene.view.stream.channels.get(self.cursor) {
+            Some(channel) if area.height >= CHART_ROWS => {
+                let rows = rest.height * 3 / 5;
+                let (chart, _) = lines::split(rest, rows);
+                draw_chart(scene, channel, chart, frame);
+                rows
+            }
+            _ => 0,
+        };
+        let (_, lower) = lines::split(rest, chart_rows);
+        lines::draw(frame, lower, faults(scene, lower));
+    }
+
+    fn values(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
+        let (theme, stream) = (scene.theme, &scene.view.stream);
+        let is_on = scene.view.facts.stream.is_some();
+        let newest = stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
+        let Some(source) = stream.source else {
+            let mut shown = vec![lines::rule(theme, columns, "Values", "")];
+            let room = usize::from(columns).saturating_sub(4);
+            let broken = without_values(scene).into_iter().flat_map(|text| format::wrap(text, room));
+            shown.extend(broken.map(|line| Line::raw(format!("  {line}"))));
+            shown.push(Line::default());
+            return shown;
+        };
+        let what = match source {
+            Source::FieldValue => "field value (6100h) in °C",
+            Source::ProcessValue => "process value (7130h) in counts",
+        };
+        let remark = format!("{what}, {} rows, newest {}", format::grouped(stream.rows), newest.unwrap_or_default());
+        let mut shown = vec![lines::rule(theme, columns, "Values", &remark)];
+        let heads = format!("    {:<8}{:>13}   {:<15}{:>11}{:>11}  Trend", "Channel", "Value", "State", "Min", "Max");
+        shown.push(Line::styled(heads, theme.quiet()));
+        let decimals = scene.view.product().map_or_else(
+            || if source == Source::FieldValue { 3 } else { 0 },
+            |product| product.stream.format(source).decimals,
+        );
+        let room = usize::from(columns).saturating_sub(TABLE_COLUMNS + 2);
+        for (number, channel) in stream.channels.iter().enumerate() {
+            shown.push(value_row(scene, channel, number == self.cursor, source, decimals, room));
+        }
+        if !is_on {
+            shown.push(Line::styled(
+                "  The stream is off: these are its last values. T switches it on.",
+                theme.warning(),
+            ));
+        } else if stream.late {
+            shown.push(Line::styled(
+                "  No new row: these values are old. M asks whether the unit still answers.",
+                theme.warning(),
+            ));
+        } else {
+            shown.push(Line::default());
+        }
+        shown
+    }
+}
+
+fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
+    let (theme, facts) = (scene.theme, &scene.view.facts);
+    let title = scene.view.product().map(|product| product.title.clone()).unwrap_or_default();
+    let stream = match (facts.stream, scene.view.stream.period) {
+        (None, _) => "off".to_owned(),
+        (Some(source), period) => {
+            let source = match source {
+                Source::FieldValue => "field value",
+                Source::ProcessValue => "process value",
+            };
+            let every = period.map(|period| format!(", every {}", format::period(period))).unwrap_or_default();
+            format!("{source}{every}")
+        }
+    };
+    let state = match facts.state {
+        UnitState::Silent => Span::styled("silent: nothing heard yet", theme.warning()),
+        UnitState::Unknown => Span::styled("unknown: talks, says nothing known", theme.warning()),
+        UnitState::Application => Span::styled("application runs", theme.good()),
+        UnitState::Loader => Span::styled("in its loader, waits for a file", theme.warning()),
+    };
+    let other_text = match facts.unrecognised_lines {
+        0 => "none".to_owned(),
+        1 => "1 line, see the terminal".into(),
+        count => format!("{} lines, see the terminal", format::grouped(count)),
+    };
+    let left = [
+        ("Product", known(&facts.product, |product| visible::text(product))),
+        ("Version", known(&facts.version, |version| version.to_string())),
+        ("Node-ID", known(&facts.node_id, |id| id.to_string())),
+        ("CAN", known(&facts.can_kbps, |rate| format!("{rate} kbit/s"))),
+    ];
+    let right = [
+        ("State", state),
+        ("CANopen", known(&facts.nmt_state, |state| visible::text(state))),
+        ("Stream", Span::raw(stream)),
+        ("Other text", Span::raw(other_text)),
+    ];
+    let half = usize::from(columns) / 2 - 2;
+    let mut shown = vec![lines::rule(theme, columns, "Unit", &title)];
+    for ((left_label, left_value), (right_label, right_value)) in left.into_iter().zip(right) {
+        let mut line = lines::labelled(theme, left_label, left_value);
+        let missing = half.saturating_sub(line.width());
+        line.push_span(Span::raw(" ".repeat(missing)));
+        line.spans.extend(lines::labelled(theme, right_label, right_value).spans);
+        shown.push(line);
+    }
+    shown.push(Line::default());
+    shown
+}
+
+/// A fact and where it comes from: `127 (menu)`.
+fn known<T>(fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -> Span<'static> {
+    match fact {
+        None => Span::raw("not known"),
+        Some(known) => {
+            let origin = match known.origin {
+                Origin::Banner => "banner",
+                Origin::Menu => "menu",
+                Origin::Text => "text",
+            };
+            Span::raw(format!("{} ({origin})", show(&known.value)))
+        }
+    }
+}
+
+/// What to do to see values.
+fn without_values(scene: Scene) -> Vec<&'static str> {
+    if scene.view.link.name.is_none() {
+        return vec!["Not connected. Press 1 to choose a port or an emulated unit."];
+    }
+    match (scene.view.facts.state, scene.view.facts.stream) {
+        (UnitState::Loader, _) => {
+            vec!["The unit waits in its loader and measures nothing. Press L to load software."]
+        }
+        (_, Some(_)) => vec!["The stream is on. Waiting for its first row."],
+        (UnitState::Silent, None) => vec![
+            "Nothing has been heard from the unit.",
+            "Check power and cable, then press M to ask again, or switch the unit off and on.",
+        ],
+        (UnitState::Unknown | UnitState::Application, None) => {
+            vec!["The stream is off, so the unit sends no values.", "Press T to switch it on."]
+        }
+    }
+}
+
+fn value_row(
+    scene: Scene,
+    channel: &Channel,
+    is_chosen: bool,
+    source: Source,
+    decimals: usize,
+    room: usize,
+) -> Line<'static> {
+    let theme = scene.theme;
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
+    let unit = match source {
+        Source::FieldValue => " °C",
+        Source::ProcessValue => "   ",
+    };
+    let (value, state, style) = match channel.reading {
+        Reading::Value(value) => (format!("{}{unit}", number(Some(value))), "ok", theme.good()),
+        Reading::Disabled => ("-   ".into(), "disabled", theme.quiet()),
+        Reading::Open => ("-   ".into(), "open circuit", theme.bad()),
+        Reading::Short => ("-   ".into(), "short circuit", theme.bad()),
+    };
+    let span = LEAST_SPAN[usize::from(source == Source::ProcessValue)];
+    let newest = channel.history.len().saturating_sub(room);
+    let values: Vec<_> = channel.history.range(newest..).map(|&(_, value)| value).collect();
+    let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, channel.name);
+    let is_old = scene.view.stream.late || scene.view.facts.stream.is_none();
+    let value_style = if is_old { theme.quiet() } else { theme.strong() };
+    Line::from(vec![
+        Span::styled(name, if is_chosen { theme.strong() } else { ratatui::style::Style::new() }),
+        Span::styled(format!("{value:>13}"), value_style),
+        Span::raw("   "),
+        Span::styled(format!("{state:<15}"), style),
+        Span::raw(format!("{:>11}{:>11}  ", number(channel.min), number(channel.max))),
+        Span::styled(sparkline(&values, room, span), theme.curve()),
+    ])
+}
+
+fn faults(scene: Scene, area: Rect) -> Vec<Line<'static>> {
+    let theme = scene.theme;
+    let all = &scene.view.faults;
+    let lasting = all.iter().filter(|fault| fault.until.is_none()).count();
+    let remark = if all.is_empty() { String::new() } else { format!("{lasting} now, {} since connecting", all.len()) };
+    let mut shown = vec![lines::rule(theme, area.width, "Faults", &remark)];
+    if all.is_empty() {
+        let word = if scene.view.stream.rows > 0 {
+            "None seen."
+        } else {
+            "None known: open and short circuits show in the stream."
+        };
+        shown.push(Line::styled(format!("  {word}"), theme.quiet()));
+        return shown;
+    }
+    // Lasting faults first: they are the ones to work on.
+    let lasting = all.iter().filter(|fault| fault.until.is_none());
+    let ended = all.iter().filter(|fault| fault.until.is_some());
+    let room = usize::from(area.height.saturating_sub(1));
+    let hidden = all.len().saturating_sub(room);
+    let fitting = if hidden > 0 { room.saturating_sub(1) } else { room };
+    shown.extend(lasting.chain(ended).take(fitting).map(|fault| fault_row(scene, fault)));
+    if hidden > 0 {
+        shown.push(Line::styled(format!("  and {} more", all.len() - fitting), theme.quiet()));
+    }
+    shown
+}
+
+fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
+    let theme = scene.theme;
+    let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
+    let kind = match fault.kind {
+        FaultKind::Open => "open circuit",
+        FaultKind::Short => "short circuit",
+    };
+    let name = Span::raw(format!("    {:<8}", fault.channel));
+    match fault.until {
+        None => Line::from(vec![
+            name,
+            Span::styled(format!("{kind:<15}"), theme.bad()),
+            Span::raw(format!("since {}: check sensor, wire and connector", time(fault.since))),
+        ]),
+        Some(until) => {
+            let lasted = format::period(until.since(fault.since));
+            let text = format!("{kind:<15}over, {} to {}, lasted {lasted}", time(fault.since), time(until));
+            Line::from(vec![name, Span::styled(text, theme.quiet())])
+        }
+    }
+}
+
+fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
+    let (heading, canvas) = lines::split(area, 1);
+    let theme = scene.theme;
+    let known: Vec<(Instant, f64)> =
+        channel.history.iter().filter_map(|&(at, value)| value.map(|value| (at, value))).collect();
+    lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Trend of {}", channel.name), "")]);
+    let (Some(&(first, _)), Some(&(last, _))) = (known.first(), known.last()) else {
+        lines::draw(frame, canvas, [Line::styled("  No value yet.", theme.quiet())]);
+        return;
+    };
+    let points: Vec<(f64, f64)> = known.iter().map(|&(at, value)| (at.since(first).as_secs_f64(), value)).collect();
+    // One curve for each stretch without a gap: nothing is drawn where nothing was measured.
+    let place = |&(at, value): &(Instant, Option<f64>)| value.map(|value| (at.since(first).as_secs_f64(), value));
+    let history: Vec<_> = channel.history.iter().map(place).collect();
+    let stretches: Vec<Vec<(f64, f64)>> = history
+        .split(Option::is_none)
+        .map(|stretch| stretch.iter().flatten().copied().collect())
+        .filter(|stretch: &Vec<_>| !stretch.is_empty())
+        .collect();
+    let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.1), h.max(p.1)));
+    let spare = (1.0 - (high - low)).max((high - low) * 0.1) / 2.0;
+    let bounds = [low - spare, high + spare];
+    let label = |value: f64| format!("{value:>9.1}");
+    let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
+    let curve = |points| {
+        Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(theme.curve()).data(points)
+    };
+    let chart = Chart::new(stretches.iter().map(|stretch| curve(stretch)).collect())
+        .x_axis(
+            Axis::default()
+                .bounds([0.0, last.since(first).as_secs_f64().max(1.0)])
+                .labels([time(first), time(last)])
+                .style(theme.quiet()),
+        )
+        .y_axis(
+            Axis::default()
+                .bounds(bounds)
+                .labels([label(bounds[0]), label((bounds[0] + bounds[1]) / 2.0), label(bounds[1])])
+                .style(theme.quiet()),
+        );
+    let (canvas, _) = lines::split(canvas, canvas.height.saturating_sub(1));
+    frame.render_widget(chart, canvas);
+}

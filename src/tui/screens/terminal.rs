@@ -1,0 +1,417 @@
+//! The line as it is: what the unit prints, what we send, and every key straight to the unit.
+//!
+//! Only characters, Enter, Backspace, Tab, Esc and Ctrl-letters go to the unit. Arrows and the like never do: terminals
+//! write them as escape sequences, and the last byte of "cursor left" is a `D`, the menu's key for restoring defaults.
+
+use ratatui::Frame;
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+
+use super::Scene;
+use crate::record::{Direction, Record};
+use crate::tui::action::Action;
+use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::scrollback::{Origin, Scrollback, TextLine};
+use crate::tui::theme::Theme;
+use crate::tui::visible;
+use crate::tui::widgets::{format, lines};
+
+/// Name on the tab.
+pub const TITLE: &str = "Terminal";
+
+/// Keys of the screen. All but the scrolling ones and the prefix itself come after the prefix.
+pub const BINDINGS: &[Binding] = &[
+    Binding {
+        keys: &[Press::Ctrl(']')],
+        cmd: Cmd::Prefix,
+        short: "",
+        long: "the next key is for axcon; twice: send Ctrl-] itself",
+    },
+    Binding { keys: &[Press::Plain(KeyCode::PageUp)], cmd: Cmd::PageUp, short: "scroll", long: "a page up" },
+    Binding { keys: &[Press::Plain(KeyCode::PageDown)], cmd: Cmd::PageDown, short: "", long: "a page down" },
+    Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "a line up" },
+    Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "", long: "a line down" },
+    Binding { keys: &[Press::Plain(KeyCode::Home)], cmd: Cmd::First, short: "", long: "to the oldest line" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::End)],
+        cmd: Cmd::Last,
+        short: "follow",
+        long: "to the newest line, and follow",
+    },
+    Binding { keys: &[Press::Plain(KeyCode::Char('h'))], cmd: Cmd::Hex, short: "hex", long: "text or hexadecimal" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('w'))],
+        cmd: Cmd::Times,
+        short: "when",
+        long: "with or without times",
+    },
+];
+
+/// Bytes in a row of the hex view.
+const HEX_BYTES: u64 = 16;
+
+/// The terminal.
+#[derive(Debug, Default)]
+pub struct Terminal {
+    mode: Mode,
+    with_times: bool,
+    after_prefix: bool,
+}
+
+/// What is shown, and from where. Without a position the newest is followed.
+#[derive(Debug, Clone, Copy)]
+enum Mode {
+    /// Lines; the number behind the last line in sight.
+    Text(Option<u64>),
+    /// Bytes; rows hidden below, counted at the given numbers of bytes received and sent.
+    Hex(Option<HexPlace>),
+}
+
+impl Default for Mode {
+    fn default() -> Self {
+        Mode::Text(None)
+    }
+}
+
+/// Where the hex view has been stopped: later bytes are not shown, and so many rows above them neither.
+#[derive(Debug, Clone, Copy)]
+struct HexPlace {
+    received: u64,
+    sent: u64,
+    rows: usize,
+}
+
+/// What a key means here.
+pub enum Meaning {
+    /// It is for the unit.
+    Keys(Vec<u8>),
+    /// It is for the console.
+    Console,
+    /// Nothing.
+    Nothing,
+}
+
+impl Terminal {
+    /// Whose a key is. After the prefix the next key is the console's.
+    pub fn meaning(&mut self, key: KeyEvent) -> Meaning {
+        if std::mem::take(&mut self.after_prefix) {
+            if Press::Ctrl(']').is(key) {
+                return Meaning::Keys(vec![0x1d]);
+            }
+            return Meaning::Console;
+        }
+        if Press::Ctrl(']').is(key) {
+            self.after_prefix = true;
+            return Meaning::Nothing;
+        }
+        match key.code {
+            KeyCode::Char(character) if key.modifiers.contains(KeyModifiers::CONTROL) => {
+                control(character).map_or(Meaning::Nothing, |byte| Meaning::Keys(vec![byte]))
+            }
+            KeyCode::Char(_) if key.modifiers.contains(KeyModifiers::ALT) => Meaning::Nothing,
+            KeyCode::Char(character) if character.is_ascii() => Meaning::Keys(vec![character as u8]),
+            KeyCode::Enter => Meaning::Keys(vec![b'\r']),
+            KeyCode::Backspace => Meaning::Keys(vec![0x08]),
+            KeyCode::Tab => Meaning::Keys(vec![b'\t']),
+            KeyCode::Esc => Meaning::Keys(vec![0x1b]),
+            KeyCode::Char(_) => Meaning::Nothing,
+            _ => Meaning::Console,
+        }
+    }
+
+    /// Whether the next key is the console's.
+    pub fn is_after_prefix(&self) -> bool {
+        self.after_prefix
+    }
+
+    /// Back to the newest line, as after sending something.
+    pub fn follow(&mut self) {
+        self.mode = match self.mode {
+            Mode::Text(_) => Mode::Text(None),
+            Mode::Hex(_) => Mode::Hex(None),
+        };
+    }
+
+    /// What a command does here; `page` is the height of the picture.
+    pub fn on(&mut self, cmd: Cmd, scrollback: &Scrollback, record: &Record, page: usize) -> Option<Action> {
+        let page = page.saturating_sub(2).max(1);
+        match cmd {
+            Cmd::Up => self.scroll(1, scrollback, record),
+            Cmd::Down => self.scroll(-1, scrollback, record),
+            Cmd::PageUp => self.scroll(page as i64, scrollback, record),
+            Cmd::PageDown => self.scroll(-(page as i64), scrollback, record),
+            Cmd::First => self.scroll(i64::MAX, scrollback, record),
+            Cmd::Last => self.follow(),
+            Cmd::Hex => {
+                self.mode = match self.mode {
+                    Mode::Text(_) => Mode::Hex(None),
+                    Mode::Hex(_) => Mode::Text(None),
+                }
+            }
+            Cmd::Times => self.with_times = !self.with_times,
+            _ => {}
+        }
+        None
+    }
+
+    /// The picture.
+    pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let (heading, body) = lines::split(area, 1);
+        let (name, following) = match self.mode {
+            Mode::Text(place) => ("Text", place.is_none()),
+            Mode::Hex(place) => ("Hexadecimal", place.is_none()),
+        };
+        let place = if following { "follows" } else { "stopped, End follows again" };
+        let received = format::grouped(scene.record.received());
+        let sent = format::grouped(scene.record.sent());
+        let remark = format!("{received} bytes received, {sent} sent, {place}");
+        lines::draw(frame, heading, [lines::rule(scene.theme, area.width, name, &remark)]);
+        let rows = match self.mode {
+            Mode::Text(place) => text_rows(scene, body, place, self.with_times),
+            Mode::Hex(place) => hex_rows(scene, body, place, self.with_times),
+        };
+        if rows.is_empty() {
+            let text = match scene.view.link.name {
+                Some(_) => "  Nothing has gone over the line yet. Keys go straight to the unit.",
+                None => "  Not connected.",
+            };
+            return lines::draw(frame, body, [Line::styled(text, scene.theme.quiet())]);
+        }
+        lines::draw(frame, body, rows);
+    }
+
+    /// Moves by lines or rows, positive to the older ones. At the newest one the view follows again.
+    fn scroll(&mut self, up: i64, scrollback: &Scrollback, record: &Record) {
+        let up = up.clamp(-(1 << 40), 1 << 40);
+        self.mode = match self.mode {
+            Mode::Text(place) => {
+                let end = place.unwrap_or(scrollback.end()) as i64;
+                let moved = (end - up).max(scrollback.start() as i64 + 1) as u64;
+                Mode::Text((moved < scrollback.end()).then_some(moved))
+            }
+            Mode::Hex(place) => {
+                let place = place.unwrap_or(HexPlace { received: record.received(), sent: record.sent(), rows: 0 });
+                let most = if up > 0 { hex(record, &place, usize::MAX).len().saturating_sub(1) } else { usize::MAX };
+                let rows = usize::try_from((place.rows as i64 + up).max(0)).unwrap_or(0).min(most);
+                Mode::Hex((rows > 0).then_some(HexPlace { rows, ..place }))
+            }
+        };
+    }
+}
+
+/// The newest lines that fit, for a place beside other things.
+pub fn newest_lines(scene: Scene, area: Rect) -> Vec<Line<'static>> {
+    text_rows(scene, area, None, false)
+}
+
+/// Lines ending at a place, as many as fit, long ones broken.
+fn text_rows(scene: Scene, area: Rect, place: Option<u64>, with_times: bool) -> Vec<Line<'static>> {
+    let scrollback = scene.scrollback;
+    let room = usize::from(area.height);
+    let end = place.map_or(usize::MAX, |end| end.saturating_sub(scrollback.start()) as usize);
+    let shown = end.min(scrollback.lines().len()).max(1).min(scrollback.lines().len());
+    let mut rows: Vec<Line> = Vec::new();
+    for line in scrollback.lines().take(shown).rev() {
+        let broken = text_line(scene, line, usize::from(area.width), with_times);
+        rows.extend(broken.into_iter().rev());
+        if rows.len() >= room {
+            break;
+        }
+    }
+    rows.truncate(room);
+    rows.reverse();
+    rows
+}
+
+fn text_line(scene: Scene, line: &TextLine, columns: usize, with_times: bool) -> Vec<Line<'static>> {
+    let theme = scene.theme;
+    let (mark, style) = match line.origin {
+        Origin::Unit => ("  ", Style::new()),
+        Origin::Us => ("» ", theme.sent()),
+        Origin::Console => ("── ", theme.quiet()),
+    };
+    let time = match with_times {
+        true => format!("{} ", format::time_of_day_millis(scene.start_of_day, line.at)),
+        false => String::new(),
+    };
+    let indent = format::width(&time) + format::width(mark);
+    let room = columns.saturating_sub(indent).max(1);
+    let pieces = format::pieces(&line.text, room);
+    let first = |piece: &String| {
+        vec![
+            Span::styled(time.clone(), theme.quiet()),
+            Span::styled(mark, theme.quiet()),
+            Span::styled(piece.clone(), style),
+        ]
+    };
+    pieces
+        .iter()
+        .enumerate()
+        .map(|(number, piece)| match number {
+            0 => Line::from(first(piece)),
+            _ => Line::from(vec![Span::raw(" ".repeat(indent)), Span::styled(piece.clone(), style)]),
+        })
+        .collect()
+}
+
+/// A row of the hex view.
+struct HexRow {
+    direction: Direction,
+    /// Offset of the first place in the row, a multiple of [`HEX_BYTES`].
+    start: u64,
+    /// Offset of the first byte in it.
+    first: u64,
+    bytes: Vec<u8>,
+    at: crate::time::Instant,
+}
+
+fn hex_rows(scene: Scene, area: Rect, place: Option<HexPlace>, with_times: bool) -> Vec<Line<'static>> {
+    let room = usize::from(area.height);
+    let place = place.unwrap_or(HexPlace { received: scene.record.received(), sent: scene.record.sent(), rows: 0 });
+    let rows = hex(scene.record, &place, room.saturating_add(place.rows));
+    rows.iter()
+        .skip(place.rows)
+        .take(room)
+        .rev()
+        .map(|row| hex_line(scene.theme, row, with_times.then_some(scene.start_of_day)))
+        .collect()
+}
+
+/// Rows of the newest bytes before a place, newest row first, `most` at most.
+fn hex(record: &Record, place: &HexPlace, most: usize) -> Vec<HexRow> {
+    let mut rows: Vec<HexRow> = Vec::new();
+    for entry in record.entries().rev() {
+        let limit = match entry.direction {
+            Direction::FromUnit => place.received,
+            Direction::ToUnit => place.sent,
+        };
+        let mut end = (entry.start + entry.bytes.len() as u64).min(limit);
+        while end > entry.start {
+            let start = ((end - 1) / HEX_BYTES * HEX_BYTES).max(entry.start);
+            let bytes = &entry.bytes[(start - entry.start) as usize..(end - entry.start) as usize];
+            let row_start = start / HEX_BYTES * HEX_BYTES;
+            match rows.last_mut() {
+                // Bytes of one row that came in several pieces.
+                Some(row) if row.direction == entry.direction && row.start == row_start && row.first == end => {
+                    row.first = start;
+                    row.at = entry.at;
+                    row.bytes.splice(0..0, bytes.iter().copied());
+                }
+                _ => {
+                    if rows.len() >= most {
+                        return rows;
+                    }
+                    rows.push(HexRow {
+                        direction: entry.direction,
+                        start: row_start,
+                        first: start,
+                        bytes: bytes.to_vec(),
+                        at: entry.at,
+                    });
+                }
+            }
+            end = start;
+        }
+    }
+    rows
+}
+
+fn hex_line(theme: Theme, row: &HexRow, times: Option<crate::time::Duration>) -> Line<'static> {
+    let skipped = (row.first - row.start) as usize;
+    let mut numbers = String::new();
+    let mut text = " ".repeat(skipped);
+    for place in 0..HEX_BYTES as usize {
+        if place == HEX_BYTES as usize / 2 {
+            numbers.push(' ');
+        }
+        match place.checked_sub(skipped).and_then(|position| row.bytes.get(position)) {
+            Some(byte) => {
+                numbers.push_str(&format!("{byte:02x} "));
+                text.push(visible::column(*byte));
+            }
+            None => numbers.push_str("   "),
+        }
+    }
+    let (mark, style) = match row.direction {
+        Direction::FromUnit => ("  ", Style::new()),
+        Direction::ToUnit => ("» ", theme.sent()),
+    };
+    let time = times.map(|start| format!("{} ", format::time_of_day(start, row.at))).unwrap_or_default();
+    Line::from(vec![
+        Span::styled(time, theme.quiet()),
+        Span::styled(mark, theme.quiet()),
+        Span::styled(format!("{:08x}  ", row.start), theme.quiet()),
+        Span::styled(format!("{numbers} {text}"), style),
+    ])
+}
+
+/// The byte a terminal sends for a character with Ctrl.
+fn control(character: char) -> Option<u8> {
+    match character.to_ascii_uppercase() {
+        letter @ '@'..='_' => Some(letter as u8 - b'@'),
+        ' ' => Some(0),
+        // Names under which the bytes 1Ch to 1Fh arrive.
+        digit @ '4'..='7' => Some(digit as u8 - b'4' + 0x1c),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::endpoint::Secrecy;
+    use crate::time::Instant;
+
+    fn sent(code: KeyCode, modifiers: KeyModifiers) -> Option<Vec<u8>> {
+        match Terminal::default().meaning(KeyEvent::new(code, modifiers)) {
+            Meaning::Keys(bytes) => Some(bytes),
+            Meaning::Console | Meaning::Nothing => None,
+        }
+    }
+
+    #[test]
+    fn characters_go_to_the_unit_and_cursor_keys_never_do() {
+        let plain = |code| sent(code, KeyModifiers::NONE);
+        assert_eq!(plain(KeyCode::Char('D')), Some(b"D".to_vec()));
+        assert_eq!(plain(KeyCode::Enter), Some(b"\r".to_vec()));
+        assert_eq!(plain(KeyCode::Backspace), Some(b"\x08".to_vec()));
+        assert_eq!(sent(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(b"\x03".to_vec()));
+        for code in [KeyCode::Left, KeyCode::Up, KeyCode::PageUp, KeyCode::F(1), KeyCode::Delete, KeyCode::BackTab] {
+            assert_eq!(plain(code), None, "{code:?}");
+        }
+        assert_eq!(plain(KeyCode::Char('é')), None, "the unit knows ASCII only");
+    }
+
+    #[test]
+    fn the_prefix_gives_one_key_to_the_console_and_twice_sends_itself() {
+        let mut terminal = Terminal::default();
+        let prefix = KeyEvent::new(KeyCode::Char('5'), KeyModifiers::CONTROL);
+        let letter = KeyEvent::new(KeyCode::Char('h'), KeyModifiers::NONE);
+        assert!(matches!(terminal.meaning(prefix), Meaning::Nothing));
+        assert!(matches!(terminal.meaning(letter), Meaning::Console));
+        assert!(matches!(terminal.meaning(letter), Meaning::Keys(_)));
+        terminal.meaning(prefix);
+        assert!(matches!(terminal.meaning(prefix), Meaning::Keys(bytes) if bytes == [0x1d]));
+    }
+
+    #[test]
+    fn hex_rows_join_pieces_of_one_direction_and_keep_the_order() {
+        let mut record = Record::new();
+        let mut say = |millis, direction, bytes: &[u8]| {
+            record.push(Instant::from_millis(millis), direction, Secrecy::Open, bytes);
+        };
+        say(1, Direction::FromUnit, b"0123456789");
+        say(2, Direction::FromUnit, b"abcdefgh");
+        say(3, Direction::ToUnit, b"m");
+        say(4, Direction::FromUnit, b"ij");
+        let place = HexPlace { received: record.received(), sent: record.sent(), rows: 0 };
+        let rows: Vec<_> =
+            hex(&record, &place, 9).iter().map(|row| (row.start, String::from_utf8_lossy(&row.bytes).into())).collect();
+        let expected: [(u64, String); 4] =
+            [(16, "ij".into()), (0, "m".into()), (16, "gh".into()), (0, "0123456789abcdef".into())];
+        assert_eq!(rows, expected);
+        assert_eq!(hex(&record, &HexPlace { received: 10, sent: 0, rows: 0 }, 9).len(), 1);
+    }
+}

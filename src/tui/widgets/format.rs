@@ -1,0 +1,176 @@
+//! Numbers, times and names as a person reads them.
+
+use ratatui::text::Span;
+
+use crate::time::{Duration, Instant};
+
+/// `242,846`.
+pub fn grouped(number: impl TryInto<u64>) -> String {
+    let digits = number.try_into().unwrap_or(u64::MAX).to_string();
+    let mut shown = String::new();
+    for (position, digit) in digits.chars().enumerate() {
+        if position > 0 && (digits.len() - position).is_multiple_of(3) {
+            shown.push(',');
+        }
+        shown.push(digit);
+    }
+    shown
+}
+
+/// `0:21`, `12:05`, `1:00:00`.
+pub fn minutes(duration: Duration) -> String {
+    let seconds = duration.as_secs();
+    let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    if hours > 0 { format!("{hours}:{minutes:02}:{seconds:02}") } else { format!("{minutes}:{seconds:02}") }
+}
+
+/// `200 ms`, `1.5 s`, `60 s`.
+pub fn period(duration: Duration) -> String {
+    let millis = duration.as_millis();
+    match millis {
+        0..1000 => format!("{millis} ms"),
+        _ if millis.is_multiple_of(1000) => format!("{} s", millis / 1000),
+        _ => format!("{}.{} s", millis / 1000, millis % 1000 / 100),
+    }
+}
+
+/// The time of day, `start` being that of [`Instant::ZERO`].
+pub fn time_of_day(start: Duration, at: Instant) -> String {
+    let seconds = (start + at.since_start()).as_secs() % 86_400;
+    format!("{:02}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
+}
+
+/// The same with milliseconds.
+pub fn time_of_day_millis(start: Duration, at: Instant) -> String {
+    format!("{}.{:03}", time_of_day(start, at), (start + at.since_start()).subsec_millis())
+}
+
+/// Columns a text takes.
+pub fn width(text: &str) -> usize {
+    Span::raw(text).width()
+}
+
+/// The end of a name, for paths: what tells two of them apart stands there. At most `columns` wide.
+pub fn keep_end(text: &str, columns: usize) -> String {
+    if width(text) <= columns {
+        return text.to_owned();
+    }
+    let mut kept: Vec<char> = Vec::new();
+    let mut used = 1;
+    for character in text.chars().rev() {
+        used += width(character.encode_utf8(&mut [0; 4]));
+        if used > columns {
+            break;
+        }
+        kept.push(character);
+    }
+    if columns == 0 { String::new() } else { std::iter::once('…').chain(kept.into_iter().rev()).collect() }
+}
+
+/// The beginning of a text, at most `columns` wide, `…` behind it if something is missing.
+pub fn keep_start(text: &str, columns: usize) -> String {
+    if width(text) <= columns {
+        return text.to_owned();
+    }
+    let mut kept = String::new();
+    let mut used = 1;
+    for character in text.chars() {
+        used += width(character.encode_utf8(&mut [0; 4]));
+        if used > columns {
+            break;
+        }
+        kept.push(character);
+    }
+    if columns > 0 {
+        kept.push('…');
+    }
+    kept
+}
+
+/// Pads on the right to `columns`, shortening what is too long.
+pub fn left(text: &str, columns: usize) -> String {
+    let text = keep_start(text, columns);
+    let missing = columns.saturating_sub(width(&text));
+    text + &" ".repeat(missing)
+}
+
+/// Breaks a text wherever its columns are full; what it says is not for reading on, but as it came.
+pub fn pieces(text: &str, columns: usize) -> Vec<String> {
+    let mut pieces = vec![String::new()];
+    let mut used = 0;
+    for character in text.chars() {
+        let needed = width(character.encode_utf8(&mut [0; 4]));
+        if used + needed > columns.max(1) {
+            pieces.push(String::new());
+            used = 0;
+        }
+        used += needed;
+        if let Some(piece) = pieces.last_mut() {
+            piece.push(character);
+        }
+    }
+    pieces
+}
+
+/// Breaks a text between words into lines of at most `columns`; a longer word is broken where it must be.
+pub fn wrap(text: &str, columns: usize) -> Vec<String> {
+    let columns = columns.max(1);
+    let mut lines = Vec::new();
+    let mut line = String::new();
+    for word in text.split_whitespace() {
+        let needed = if line.is_empty() { width(word) } else { width(&line) + 1 + width(word) };
+        if needed > columns && !line.is_empty() {
+            lines.push(std::mem::take(&mut line));
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        for character in word.chars() {
+            if width(&line) + width(character.encode_utf8(&mut [0; 4])) > columns && !line.is_empty() {
+                lines.push(std::mem::take(&mut line));
+            }
+            line.push(character);
+        }
+    }
+    if !line.is_empty() || lines.is_empty() {
+        lines.push(line);
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_grouped() {
+        assert_eq!([0, 999, 1000, 242_846, 1_000_000].map(grouped), ["0", "999", "1,000", "242,846", "1,000,000"]);
+    }
+
+    #[test]
+    fn times_read_as_people_say_them() {
+        assert_eq!([21, 725, 3600].map(|s| minutes(Duration::from_secs(s))), ["0:21", "12:05", "1:00:00"]);
+        assert_eq!(
+            [200, 1000, 1500, 60_000].map(|ms| period(Duration::from_millis(ms))),
+            ["200 ms", "1 s", "1.5 s", "60 s"]
+        );
+        let late = Duration::from_secs(86_399);
+        assert_eq!(time_of_day_millis(late, Instant::from_millis(1_250)), "00:00:00.250");
+    }
+
+    #[test]
+    fn what_is_cut_says_so() {
+        assert_eq!(keep_end("/dev/serial/by-id/usb-FTDI", 10), "…/usb-FTDI");
+        assert_eq!(keep_start("Performing First Start", 11), "Performing…");
+        assert_eq!(keep_start("short", 5), "short");
+        assert_eq!(keep_start("short", 0), "");
+        assert_eq!(keep_end("short", 0), "");
+    }
+
+    #[test]
+    fn text_is_broken_between_words_and_long_words_where_they_must() {
+        assert_eq!(wrap("one two three", 7), ["one two", "three"]);
+        assert_eq!(wrap("abcdefgh", 3), ["abc", "def", "gh"]);
+        assert_eq!(wrap("", 3), [""]);
+    }
+}

@@ -1,0 +1,6 @@
+//! Small pieces of the picture that more than one screen uses.
+
+pub mod field;
+pub mod format;
+pub mod lines;
+pub mod spark;
