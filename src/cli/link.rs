@@ -17,18 +17,19 @@ use crate::host::recorder::Plan;
 /// If the name makes no sense, or none was given and there is not exactly one candidate.
 pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
     match &global.port {
-        Some(text) => text.parse().map_err(|error: LinkSpecError| {
-            let refused = CliError::new(Kind::Usage, anyhow::Error::new(error.clone()).context("--port"));
-            match error {
-                LinkSpecError::Unsupported { scheme: "tcp://" } => {
-                    refused.hint("'socat pty,link=/tmp/unit,raw tcp:HOST:PORT' makes a port of it: --port /tmp/unit")
-                }
-                LinkSpecError::Unsupported { .. } | LinkSpecError::UnknownProduct { .. } | LinkSpecError::Empty => {
-                    refused
-                }
-            }
-        }),
+        Some(text) => text.parse().map_err(spec_error),
         None => only_port(ports::list().map_err(|error| CliError::new(Kind::PortNone, error))?),
+    }
+}
+
+/// What a name that is no link means to the user.
+pub fn spec_error(error: LinkSpecError) -> CliError {
+    let refused = CliError::new(Kind::Usage, anyhow::Error::new(error.clone()).context("--port"));
+    match error {
+        LinkSpecError::Unsupported { scheme: "tcp://" } => {
+            refused.hint("'socat pty,link=/tmp/unit,raw tcp:HOST:PORT' makes a port of it: --port /tmp/unit")
+        }
+        LinkSpecError::Unsupported { .. } | LinkSpecError::UnknownProduct { .. } | LinkSpecError::Empty => refused,
     }
 }
 
@@ -42,17 +43,17 @@ pub fn open(spec: &LinkSpec, global: &Global, clock: Clock, inputs: SyncSender<I
 
 /// What the journal of uploads calls the port: the adapter's serial number where it has one, since its name may be
 /// another one next time, or else the path as the user gives it. `None` for units that end with this process.
-pub fn journal_key(global: &Global) -> Option<String> {
-    match spec(global).ok()? {
+pub fn journal_key(spec: &LinkSpec) -> Option<String> {
+    match spec {
         LinkSpec::Emulated(_) => None,
         LinkSpec::Serial(path) => {
-            let resolved = std::fs::canonicalize(&path).unwrap_or_else(|_| path.clone());
+            let resolved = std::fs::canonicalize(path).unwrap_or_else(|_| path.clone());
             let listed = ports::list().unwrap_or_default();
             let adapter = listed.iter().find(|port| std::path::Path::new(&port.path) == resolved);
             let serial_number = adapter.and_then(|port| port.usb.as_ref()).and_then(|usb| usb.serial_number.clone());
             Some(match serial_number {
                 Some(number) => format!("usb:{number}"),
-                None => std::path::absolute(&path).unwrap_or(path).display().to_string(),
+                None => std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
             })
         }
     }

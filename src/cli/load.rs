@@ -74,7 +74,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     }
     let mut talk = Talk::open(global, output)?;
     talk.ask(Command::Identify)?;
-    let journal = Desk::of(&talk, global);
+    let journal = Desk::of(&talk);
     let facts = talk.session().facts().clone();
     plan(&report, &image, &name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
     if args.dry_run {
@@ -117,8 +117,8 @@ struct Desk {
 }
 
 impl Desk {
-    fn of(talk: &Talk, global: &Global) -> Self {
-        let journal = link::journal_key(global).and_then(|key| Some((Journal::of_user()?, key)));
+    fn of(talk: &Talk) -> Self {
+        let journal = link::journal_key(talk.spec()).and_then(|key| Some((Journal::of_user()?, key)));
         let in_loader = talk.session().facts().state == UnitState::Loader;
         let note = journal.as_ref().filter(|_| in_loader).and_then(|(journal, key)| journal.note(key));
         Desk { journal, note }

@@ -1,5 +1,6 @@
 //! The command line: what can be asked for, and where each answer is made.
 
+pub mod console;
 pub mod emulate;
 pub mod error;
 pub mod identify;
@@ -91,7 +92,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
 fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
     let global = &cli.global;
     match cli.command {
-        None => Ok(()),
+        None => console::run(global),
         Some(Command::Ports(args)) => ports::run(args, global, output),
         Some(Command::Identify(args)) => identify::run(args, global, output),
         Some(Command::Stream(args)) => stream::run(args, global, output),

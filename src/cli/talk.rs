@@ -21,6 +21,7 @@ pub struct Talk {
     pump: Pump,
     session: Session,
     port: String,
+    spec: LinkSpec,
     _signals: Signals,
 }
 
@@ -68,6 +69,7 @@ impl Talk {
             pump: Pump::new(connection, inputs, clock, recorder),
             session: Session::new(global.baud),
             port: spec.to_string(),
+            spec,
             _signals: signals,
         })
     }
@@ -169,6 +171,11 @@ impl Talk {
     /// The link as the user named it.
     pub fn port(&self) -> &str {
         &self.port
+    }
+
+    /// The link.
+    pub fn spec(&self) -> &LinkSpec {
+        &self.spec
     }
 
     /// Tells the user what became of the recording, if something did.

@@ -154,7 +154,7 @@ impl Conversation {
                 }
                 Ok(Input::Gone(error)) => return Err(link::link_error(error)),
                 Ok(Input::Signal(_)) => return Err(CliError::reported(Kind::Interrupted)),
-                Ok(Input::Terminal(_)) | Err(RecvTimeoutError::Timeout) => {}
+                Ok(Input::Terminal(_) | Input::Wake) | Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
         }

@@ -1,6 +1,9 @@
 //! The only clock. It is asked once for each input and each wake-up; everything else is told.
 
+use std::time::SystemTime;
+
 use jiff::Timestamp;
+use jiff::tz::TimeZone;
 
 use crate::time::{Duration, Instant};
 
@@ -32,6 +35,21 @@ impl Clock {
         let ago = self.now().since(at);
         Timestamp::now().checked_sub(ago).unwrap_or(Timestamp::UNIX_EPOCH)
     }
+}
+
+impl Clock {
+    /// Local time of day at the start of this clock; UTC where the system does not say its zone.
+    pub fn time_of_day(&self) -> Duration {
+        let local = self.wall(Instant::ZERO).to_zoned(TimeZone::system());
+        let seconds = i64::from(local.hour()) * 3600 + i64::from(local.minute()) * 60 + i64::from(local.second());
+        Duration::from_secs(seconds.unsigned_abs()) + Duration::from_millis(local.millisecond().unsigned_abs().into())
+    }
+}
+
+/// A moment of the file system as local date and time, to the minute.
+pub fn local_date_and_time(moment: SystemTime) -> Option<String> {
+    let timestamp = Timestamp::try_from(moment).ok()?;
+    Some(timestamp.to_zoned(TimeZone::system()).strftime("%Y-%m-%d %H:%M").to_string())
 }
 
 #[cfg(test)]

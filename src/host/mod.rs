@@ -52,6 +52,8 @@ pub enum Input {
     Typed(Vec<u8>),
     /// Standard input has ended.
     TypedEnd,
+    /// A thread of the loop's own has left something for it elsewhere.
+    Wake,
 }
 
 /// Inputs that wait at most: with the reader's 4 KiB each, a quarter of a megabyte, behind which the reader stops

@@ -26,7 +26,7 @@ use super::view::{Link, LinkState, Tone, View};
 use super::widgets::lines;
 use crate::endpoint::Endpoint;
 use crate::record::Record;
-use crate::session::{Command, Event, Facts, Job, LoadOrder, Session};
+use crate::session::{Command, Event, Facts, Job, LoadOrder, Outcome, Session, UnitNow};
 use crate::time::{Duration, Instant};
 
 /// How often the picture moves while an upload runs, so that its times go on when the unit is silent.
@@ -133,6 +133,11 @@ impl App {
         }
         self.drain(&mut effects);
         effects
+    }
+
+    /// Whether keys go to the unit as they are, so that none may mean something outside.
+    pub fn passes_keys(&self) -> bool {
+        self.front == ScreenId::Terminal && self.popup.is_none() && self.help.is_none()
     }
 
     /// When [`Input::Timeout`] is wanted next. `None`: only an input from outside can bring anything new.
@@ -423,9 +428,14 @@ impl App {
                 }
             }
             Action::StartLoad { password, product } => {
-                if let Some(image) = self.load.image().and_then(|facts| facts.checked.clone()) {
-                    self.command(Command::Load(Box::new(LoadOrder { image, password, product })));
+                let Some(facts) = self.load.image() else { return };
+                let Some(image) = facts.checked.clone() else { return };
+                let said = self.view.facts.product.as_ref().map(|known| known.value.clone());
+                if let (Some(link), Some(product)) = (self.view.link.name.clone(), said.or(product.clone())) {
+                    let image = facts.path.display().to_string();
+                    effects.push(Effect::UploadBegins { link, product, image });
                 }
+                self.command(Command::Load(Box::new(LoadOrder { image, password, product })));
             }
             Action::DismissReport => self.view.load.report = None,
             Action::RestartExtremes => self.view.restart_extremes(),
@@ -566,6 +576,11 @@ impl App {
             let facts = self.session.as_ref().map_or(&self.no_facts, Session::facts);
             self.view.fold(self.now, &event, facts);
             self.dirty = true;
+            if let (Event::Finished(Outcome::Loaded(report)), Some(link)) = (&event, &self.view.link.name)
+                && report.unit == UnitNow::Application
+            {
+                effects.push(Effect::UploadEnds { link: link.clone() });
+            }
         }
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         self.dirty |= self.scrollback.follow(record);

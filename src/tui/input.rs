@@ -56,6 +56,20 @@ pub enum Effect {
     ListFiles(PathBuf),
     /// Read and check an image file. Answered by [`Input::ImageChecked`], also when the file cannot be read.
     CheckImage(PathBuf),
+    /// Note that an upload begins on a link, before the loader is entered: a loader does not say which product it is of.
+    UploadBegins {
+        /// The link.
+        link: String,
+        /// The unit's product.
+        product: String,
+        /// The image's file.
+        image: String,
+    },
+    /// The unit on a link runs: forget the note.
+    UploadEnds {
+        /// The link.
+        link: String,
+    },
     /// End the program, after the effects before this one.
     Quit,
 }

@@ -11,6 +11,7 @@ mod frame;
 mod input;
 mod keymap;
 mod popup;
+pub mod run;
 mod screens;
 mod scrollback;
 mod theme;

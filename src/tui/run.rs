@@ -1,0 +1,335 @@
+//! The loop around [`App`]: the one file of the console that touches the system.
+//!
+//! Everything that happens comes on one channel; the app is told, its effects are performed in their order, and the
+//! picture is drawn when something has changed: at once after a key, else at most [`FRAME`] apart. Nothing wakes the
+//! loop without an input or a due timer. Files, ports and folders are looked at in threads of their own, so that a
+//! slow disk does not hold the keys.
+
+use std::collections::VecDeque;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
+use std::thread;
+
+use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
+
+use super::{App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, PortEntry};
+use crate::host;
+use crate::host::clock::Clock;
+use crate::host::link::{Connection, LinkError};
+use crate::host::ports;
+use crate::host::recorder::{Plan, Recorder};
+use crate::host::signal::Signals;
+use crate::host::terminal::{self, Screen};
+use crate::time::{Duration, Instant};
+
+/// Least time between two pictures that no key asked for: thirty a second.
+const FRAME: Duration = Duration::from_millis(33);
+/// Longest wait: bounds the arithmetic, nothing else.
+const LONGEST_WAIT: Duration = Duration::from_secs(3600);
+/// Entries of a folder that are shown at most.
+const MOST_ENTRIES: usize = 10_000;
+
+/// What the loop cannot know itself: how the command line names links, and what helps when they fail.
+pub struct World {
+    /// The link to open at once.
+    pub link: Option<String>,
+    /// Line rate.
+    pub baud: u32,
+    /// Where sessions are recorded.
+    pub recording: Plan,
+    /// Whether to use colours.
+    pub colour: bool,
+    /// Opens a link by its name.
+    pub open: fn(&str, u32, Clock, SyncSender<host::Input>) -> Result<Connection, Failure>,
+    /// Says what a lost link means.
+    pub explain: fn(LinkError) -> Failure,
+    /// Reads and checks an image file.
+    pub check: fn(PathBuf) -> ImageFacts,
+    /// Notes that an upload of this product begins on this link, or (`None`) that the unit on it runs.
+    pub note: fn(&str, Option<(&str, &str)>),
+}
+
+/// How the console ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The user left.
+    Quit,
+    /// A signal ended it.
+    Signal,
+}
+
+/// Runs the console until the user leaves it.
+///
+/// # Errors
+/// If there is no terminal, or it fails.
+pub fn run(world: World) -> io::Result<End> {
+    let clock = Clock::start();
+    let (sender, inputs) = host::channel();
+    let mut screen = Screen::enter()?;
+    let _signals = Signals::start(sender.clone())?;
+    terminal::listen(sender.clone())?;
+    let size = screen.terminal.size()?;
+    let app = App::new(Options {
+        link: world.link.clone(),
+        directory: std::env::current_dir().unwrap_or_else(|_| PathBuf::from(".")),
+        colour: world.colour,
+        start_of_day: clock.time_of_day(),
+        size: (size.width, size.height),
+    });
+    let (answer, answers) = channel();
+    let mut console = Console {
+        app,
+        world,
+        clock,
+        inputs,
+        sender,
+        answer,
+        answers,
+        link: None,
+        recorder: Recorder::nothing(),
+        left: VecDeque::new(),
+    };
+    console.serve(&mut screen)
+}
+
+struct Console {
+    app: App,
+    world: World,
+    clock: Clock,
+    inputs: Receiver<host::Input>,
+    sender: SyncSender<host::Input>,
+    /// Where threads put what they found out; they wake the loop behind it.
+    answer: Sender<Input>,
+    answers: Receiver<Input>,
+    link: Option<Connection>,
+    recorder: Recorder,
+    /// Inputs taken from the channel while a link was closed.
+    left: VecDeque<host::Input>,
+}
+
+impl Console {
+    fn serve(&mut self, screen: &mut Screen) -> io::Result<End> {
+        let mut next_frame = Instant::ZERO;
+        let effects = self.app.start();
+        if self.perform(effects) {
+            return Ok(End::Quit);
+        }
+        loop {
+            let now = self.clock.now();
+            if self.app.is_dirty() && now >= next_frame {
+                screen.terminal.draw(|frame| self.app.draw(frame))?;
+                self.app.drawn();
+                next_frame = now + FRAME;
+            }
+            let due = self.app.is_dirty().then_some(next_frame);
+            let wake = [due, self.app.poll_timeout()].into_iter().flatten().min().unwrap_or(Instant::NEVER);
+            let Some(input) = self.next_input(wake) else {
+                if self.handle(Input::Timeout) {
+                    return Ok(End::Quit);
+                }
+                continue;
+            };
+            let leaves = match input {
+                host::Input::Terminal(event) => {
+                    // What a key changes is seen at once.
+                    next_frame = Instant::ZERO;
+                    if is_suspend(&event) && !self.app.passes_keys() {
+                        suspend(screen)?;
+                        false
+                    } else {
+                        self.handle(Input::Terminal(event))
+                    }
+                }
+                host::Input::Bytes { bytes, .. } => self.handle(Input::Bytes(bytes)),
+                host::Input::Gone(error) => {
+                    let failure = (self.world.explain)(error);
+                    self.lose_link(failure)
+                }
+                host::Input::Signal(_) => {
+                    self.handle(Input::Signal);
+                    return Ok(End::Signal);
+                }
+                host::Input::Wake => {
+                    let mut leaves = false;
+                    while let Ok(answer) = self.answers.try_recv() {
+                        leaves |= self.handle(answer);
+                    }
+                    leaves
+                }
+                host::Input::Typed(_) | host::Input::TypedEnd => false,
+            };
+            if leaves {
+                return Ok(End::Quit);
+            }
+        }
+    }
+
+    /// The next input; `None` when it is time.
+    fn next_input(&mut self, wake: Instant) -> Option<host::Input> {
+        if let Some(input) = self.left.pop_front() {
+            return Some(input);
+        }
+        // An error is the time that is over: the channel cannot be closed, since this struct holds a sender.
+        self.inputs.recv_timeout(self.clock.until(wake).min(LONGEST_WAIT)).ok()
+    }
+
+    /// Tells the app, and does what it wants. Gives `true` when that is to end.
+    fn handle(&mut self, input: Input) -> bool {
+        let effects = self.app.handle(self.clock.now(), input);
+        self.recorder.follow(self.app.record());
+        self.perform(effects)
+    }
+
+    fn perform(&mut self, effects: Vec<Effect>) -> bool {
+        let mut leaves = false;
+        for effect in effects {
+            match effect {
+                Effect::OpenLink(name) => {
+                    self.close_link();
+                    let opened = self.open(&name);
+                    leaves |= self.handle(opened);
+                }
+                Effect::CloseLink => self.close_link(),
+                Effect::Transmit(transmit) => {
+                    if let Some(link) = &self.link
+                        && let Err(error) = link.send(transmit.bytes)
+                    {
+                        let text = format!("{}: {error}", link.port());
+                        leaves |= self.lose_link(Failure { text, hints: Vec::new() });
+                    }
+                }
+                Effect::ListPorts => self.ask(|| Input::PortsListed(list_ports())),
+                Effect::ListFiles(directory) => self.ask(move || list_files(&directory)),
+                Effect::CheckImage(path) => {
+                    let check = self.world.check;
+                    self.ask(move || Input::ImageChecked(Box::new(check(path))));
+                }
+                Effect::UploadBegins { link, product, image } => (self.world.note)(&link, Some((&product, &image))),
+                Effect::UploadEnds { link } => (self.world.note)(&link, None),
+                Effect::Quit => {
+                    self.close_link();
+                    leaves = true;
+                }
+            }
+        }
+        leaves
+    }
+
+    fn open(&mut self, name: &str) -> Input {
+        match (self.world.open)(name, self.world.baud, self.clock, self.sender.clone()) {
+            Ok(connection) => {
+                self.recorder = Recorder::start(&self.world.recording, &connection, self.clock);
+                let recording = self.recorder.path().map(|path| path.display().to_string());
+                let recording = recording.or_else(|| self.recorder.take_warning());
+                self.link = Some(connection);
+                Input::LinkOpened(LinkInfo {
+                    link: name.to_owned(),
+                    baud: self.world.baud,
+                    read_only: false,
+                    recording,
+                })
+            }
+            Err(failure) => Input::LinkFailed(failure),
+        }
+    }
+
+    fn lose_link(&mut self, failure: Failure) -> bool {
+        if self.link.is_none() {
+            return false;
+        }
+        self.close_link();
+        self.handle(Input::LinkGone(failure))
+    }
+
+    /// Closes the link; what it has put on the channel and nobody has taken is forgotten.
+    fn close_link(&mut self) {
+        if self.link.take().is_some() {
+            let waiting = self
+                .inputs
+                .try_iter()
+                .filter(|input| !matches!(input, host::Input::Bytes { .. } | host::Input::Gone(_)));
+            self.left.extend(waiting);
+            self.recorder = Recorder::nothing();
+        }
+    }
+
+    /// Finds something out in a thread, which wakes the loop when it has.
+    fn ask(&self, find_out: impl FnOnce() -> Input + Send + 'static) {
+        let (answer, sender) = (self.answer.clone(), self.sender.clone());
+        let begun = thread::Builder::new().name("answer".into()).spawn(move || {
+            if answer.send(find_out()).is_ok() {
+                let _ = sender.send(host::Input::Wake);
+            }
+        });
+        // Without threads there is no program either: the key thread came first.
+        debug_assert!(begun.is_ok());
+    }
+}
+
+/// Ctrl-Z, as every program of a shell understands it.
+fn is_suspend(event: &TerminalEvent) -> bool {
+    matches!(event, TerminalEvent::Key(key) if key.code == KeyCode::Char('z') && key.modifiers == KeyModifiers::CONTROL)
+}
+
+#[cfg(unix)]
+fn suspend(screen: &mut Screen) -> io::Result<()> {
+    screen.suspend()
+}
+
+#[cfg(not(unix))]
+fn suspend(_screen: &mut Screen) -> io::Result<()> {
+    Ok(())
+}
+
+fn list_ports() -> Result<Vec<PortEntry>, String> {
+    let ports = ports::list().map_err(|error| format!("the serial ports cannot be listed: {error}"))?;
+    Ok(ports
+        .into_iter()
+        .map(|port| PortEntry {
+            busy_by: ports::holder(Path::new(&port.path)).map(|holder| holder.to_string()),
+            description: describe(&port),
+            link: port.path,
+        })
+        .collect())
+}
+
+/// `USB, FTDI FT232R USB UART, 0403:6001, serial number AX12345, ftdi_sio`.
+fn describe(port: &ports::Port) -> String {
+    let mut parts = vec![match port.kind {
+        ports::Kind::Usb => "USB".to_owned(),
+        ports::Kind::Native => "built in".to_owned(),
+        ports::Kind::Pty => "pseudo-terminal".to_owned(),
+        ports::Kind::Bluetooth => "Bluetooth".to_owned(),
+    }];
+    if let Some(usb) = &port.usb {
+        let words: Vec<&str> = [usb.manufacturer.as_deref(), usb.product.as_deref()].into_iter().flatten().collect();
+        parts.extend((!words.is_empty()).then(|| words.join(" ")));
+        parts.push(format!("{:04x}:{:04x}", usb.vid, usb.pid));
+        parts.extend(usb.serial_number.as_ref().map(|number| format!("serial number {number}")));
+    }
+    parts.extend(port.driver.clone());
+    parts.join(", ")
+}
+
+fn list_files(directory: &Path) -> Input {
+    let directory = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
+    let entries = std::fs::read_dir(&directory).map_err(|error| error.to_string()).map(|entries| {
+        entries
+            .flatten()
+            .take(MOST_ENTRIES)
+            .filter_map(|entry| {
+                // Behind a link, what it leads to.
+                let metadata = std::fs::metadata(entry.path()).ok()?;
+                let kind = if metadata.is_dir() { FileKind::Folder } else { FileKind::File };
+                Some(FileEntry {
+                    name: entry.file_name().to_string_lossy().into_owned(),
+                    kind,
+                    bytes: if kind == FileKind::File { metadata.len() } else { 0 },
+                    modified: metadata.modified().ok().and_then(host::clock::local_date_and_time),
+                })
+            })
+            .collect()
+    });
+    Input::FilesListed { directory, entries }
+}
