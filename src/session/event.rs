@@ -9,10 +9,12 @@ use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::stream::{Row, Source};
 
-/// What the user wants of the unit. One job runs at a time; [`Command::Keys`] and [`Command::Cancel`] need no job.
+/// What the user wants of the unit. One job runs at a time, and one more may be given while it is being found out who is
+/// there; [`Command::Keys`] and [`Command::Cancel`] are no jobs.
 #[derive(Clone, Debug)]
 pub enum Command {
-    /// Keys for the unit as they are, from the raw terminal or the menu. Refused while a job runs.
+    /// Keys for the unit as they are, from the raw terminal or the menu. Refused while a job other than
+    /// [`Command::Identify`] runs.
     Keys(Vec<u8>),
     /// Find out what is at the other end.
     Identify,

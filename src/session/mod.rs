@@ -38,6 +38,8 @@ pub struct Session {
     transmitter: Transmitter,
     facts: Facts,
     running: Option<Running>,
+    /// The job that begins when it is known who is there.
+    queued: Option<Running>,
     events: VecDeque<Event>,
     prompt: PromptWatch,
     /// The unit asks for the password, or its answer may echo it: bytes both ways are secret until the line ends.
@@ -80,6 +82,7 @@ impl Session {
             transmitter: Transmitter::new(character_time(baud)),
             facts: Facts::default(),
             running: None,
+            queued: None,
             events: VecDeque::new(),
             prompt: PromptWatch::default(),
             password_open: false,
@@ -95,6 +98,9 @@ impl Session {
         self.now = self.now.max(now);
         let (job, work): (Job, Box<dyn Work + Send>) = match command {
             Command::Cancel => {
+                if let Some(queued) = self.queued.take() {
+                    self.events.push_back(Event::Finished(Outcome::Cancelled(queued.job)));
+                }
                 self.signal(Signal::Cancel);
                 return Ok(());
             }
@@ -116,12 +122,20 @@ impl Session {
                 (Job::Load, Box::new(upload::Upload::new(*order)))
             }
         };
-        if let Some(running) = &self.running {
-            return Err(Refusal::Busy(running.job));
+        let next = Running { job, work };
+        match &self.running {
+            None => {
+                self.running = Some(next);
+                self.signal(Signal::Begin);
+                Ok(())
+            }
+            // Asking who is there takes a moment and changes nothing: whoever is quicker waits for it unawares.
+            Some(Running { job: Job::Identify, .. }) if self.queued.is_none() && job != Job::Identify => {
+                self.queued = Some(next);
+                Ok(())
+            }
+            Some(running) => Err(Refusal::Busy(running.job)),
         }
-        self.running = Some(Running { job, work });
-        self.signal(Signal::Begin);
-        Ok(())
     }
 
     /// The port is gone: the running job ends with what that means, and nothing more is sent.
@@ -168,7 +182,7 @@ impl Session {
     }
 
     fn keys(&mut self, keys: &[u8]) -> Result<(), Refusal> {
-        if let Some(running) = &self.running {
+        if let Some(running) = self.running.as_ref().filter(|running| running.job != Job::Identify) {
             return Err(Refusal::Busy(running.job));
         }
         for piece in keys.split_inclusive(|key| matches!(key, b'\r' | b'l' | b'L')) {
@@ -304,6 +318,7 @@ impl Session {
     /// Tells the running job something, and ends it if it says so.
     fn signal(&mut self, signal: Signal<'_>) {
         let Some(mut running) = self.running.take() else { return };
+        let lost = matches!(signal, Signal::LinkLost);
         let before = self.facts.clone();
         let pending = self.framer.pending();
         let outcome = running.work.handle(
@@ -322,7 +337,11 @@ impl Session {
             self.events.push_back(Event::FactsChanged);
         }
         match outcome {
-            Some(outcome) => self.events.push_back(Event::Finished(outcome)),
+            Some(outcome) => {
+                self.events.push_back(Event::Finished(outcome));
+                self.running = self.queued.take();
+                self.signal(if lost { Signal::LinkLost } else { Signal::Begin });
+            }
             None => self.running = Some(running),
         }
     }

@@ -5,6 +5,8 @@ mod commands;
 mod emulator;
 mod images;
 #[cfg(unix)]
+mod live;
+#[cfg(unix)]
 mod ptys;
 mod support;
 mod talks;

@@ -126,3 +126,23 @@ fn what_is_typed_behind_l_is_secret_however_the_unit_asks_for_it() {
     assert!(!record.contains("AXIO") && record.starts_with("ml*********\r"), "{record}");
     assert!(record.ends_with("So sei es.\r\n"), "{record}");
 }
+
+#[test]
+fn a_job_given_while_the_unit_is_being_asked_who_it_is_begins_behind_that() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    bench.command(Command::Identify);
+    bench.run_for(Duration::from_millis(30));
+    bench.command(Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(200) });
+    let third = bench.session.command(bench.now, Command::StreamOff);
+    assert!(third.is_err(), "one may wait, not two");
+    assert_eq!(bench.outcome(), Outcome::Identified);
+    assert_eq!(bench.outcome(), Outcome::StreamRuns { was_on: false });
+
+    bench.command(Command::Identify);
+    bench.command(Command::StreamOff);
+    bench.command(Command::Cancel);
+    assert_eq!(bench.outcome(), Outcome::Cancelled(Job::StreamOff));
+    assert_eq!(bench.outcome(), Outcome::Identified);
+    assert_eq!(bench.session.facts().stream, Some(Source::FieldValue), "what was cancelled has not begun");
+}

@@ -78,7 +78,6 @@ impl Screen {
     }
 
     /// Gives the terminal another size; the program is told by a signal.
-    #[expect(dead_code, reason = "for the screens to come")]
     pub fn resize(&self, rows: u16, columns: u16) {
         tcsetwinsize(&*self.master, size(rows, columns)).expect("sized");
         let (rows, columns) = (rows.try_into().expect("rows"), columns.try_into().expect("columns"));

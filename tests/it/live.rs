@@ -1,0 +1,114 @@
+//! The console on a terminal of its own, over a real port: what only the real program can show.
+
+use std::fs;
+
+use crate::support::screen::Screen;
+use crate::support::shell::World;
+
+const ESC: &str = "\x1b";
+const NEXT_SCREEN: &str = "\t";
+
+fn console(world: &World, args: &[&str]) -> Screen {
+    let mut all = vec!["--port", "emu:axtc4co"];
+    all.extend(args);
+    Screen::start(world.command(&all), 24, 80)
+}
+
+#[test]
+fn a_newcomer_sees_the_scanner_talk_and_leaves_in_order() {
+    let world = World::new();
+    let mut screen = console(&world, &[]);
+    let overview = screen.wait("application runs");
+    assert!(overview.contains("AXTC4CO") && overview.contains("1.1.0"), "{overview}");
+    assert!(overview.contains("M menu  V view  D defaults  T stream  S diagnostics  L load"), "{overview}");
+    screen.wait("Press T to switch it on.");
+    screen.keys("t");
+    screen.wait("Switch the data stream on");
+    screen.keys("\x7f\x7f\x7f\x7f200\r");
+    let values = screen.wait("every 200 ms");
+    assert!(values.contains("TC4"), "{values}");
+    // The raw text is always there.
+    screen.keys(NEXT_SCREEN);
+    let raw = screen.wait("RS-232 stream is now ON");
+    assert!(raw.contains(';'), "{raw}");
+    screen.keys("\x1dq");
+    let end = screen.wait_end();
+    assert_eq!(end, Some(0));
+    assert!(screen.is_as_the_shell_left_it());
+    let recordings = world.files("state/axcon/recordings");
+    assert_eq!(recordings.len(), 1, "the session is recorded, unasked");
+    let recording = fs::read_to_string(&recordings[0]).expect("a recording");
+    assert!(recording.contains("Technologies"), "{recording}");
+}
+
+#[test]
+fn an_upload_by_keys_ends_with_the_new_banner() {
+    let world = World::new();
+    let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "3000", "--out", "new.S"];
+    assert_eq!(world.run(&args, b"").code, Some(0));
+    // Another rate would be garbage; this one is the wire's, so the image is small.
+    let screen = console(&world, &[]);
+    screen.wait("application runs");
+    screen.keys("l");
+    screen.wait("new.S");
+    screen.keys("p");
+    screen.keys("new.S\r");
+    let plan = screen.wait("Enter asks for the password");
+    assert!(plan.contains("passed") && plan.contains("AXTC4CO 1.2.0 (newer)"), "{plan}");
+    screen.keys("\r");
+    screen.wait("Password for loading software");
+    screen.keys("AXIO-2010\r");
+    let verdict = screen.wait("── Verdict");
+    assert!(verdict.contains("Done") && verdict.contains("after 1.2.0"), "{verdict}");
+    for recording in world.files("state/axcon/recordings") {
+        assert!(!fs::read_to_string(recording).expect("a recording").contains("AXIO"));
+    }
+}
+
+#[test]
+fn a_resize_and_a_terminal_too_small_are_taken_in_stride() {
+    let world = World::new();
+    let screen = console(&world, &[]);
+    screen.wait("application runs");
+    screen.resize(10, 40);
+    screen.wait("80");
+    screen.resize(60, 200);
+    let large = screen.wait("application runs");
+    assert!(large.lines().any(|line| line.chars().count() > 100), "the room is used:\n{large}");
+}
+
+#[test]
+fn every_way_out_gives_the_terminal_back() {
+    for signal in [rustix::process::Signal::TERM, rustix::process::Signal::HUP, rustix::process::Signal::INT] {
+        let world = World::new();
+        let mut screen = console(&world, &[]);
+        screen.wait("application runs");
+        screen.signal(signal);
+        assert_eq!(screen.wait_end(), Some(130), "{signal:?}");
+        assert!(screen.is_as_the_shell_left_it(), "{signal:?}");
+    }
+}
+
+#[test]
+fn without_a_port_the_list_of_ports_comes_first_and_an_emulated_unit_is_a_key_away() {
+    let world = World::new();
+    let screen = Screen::start(world.command(&[]), 24, 80);
+    let list = screen.wait("emu:axtc4co");
+    assert!(list.contains("Emulated"), "{list}");
+    screen.keys("p");
+    screen.keys("nowhere\r");
+    let failed = screen.wait("Not connected");
+    assert!(failed.contains("nowhere"), "{failed}");
+    screen.keys(ESC);
+}
+
+#[test]
+fn without_a_terminal_the_console_says_what_it_needs() {
+    let world = World::new();
+    let ran = world.run(&["--port", "emu:axtc4co"], b"");
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("terminal") && ran.err.contains("--help"), "{}", ran.err);
+    let ran = world.run(&["--port", "emu:axtc5co"], b"");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("axtc4co"), "what there is: {}", ran.err);
+}
