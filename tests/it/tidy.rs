@@ -118,6 +118,16 @@ fn every_link_in_the_documents_leads_somewhere() {
     assert!(dead.is_empty(), "dead links:\n{}", dead.join("\n"));
 }
 
+#[test]
+fn the_picture_in_the_readme_is_one_the_program_draws() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = fs::read_to_string(root.join("README.md")).expect("a README");
+    let snapshot = root.join("src/tui/snapshots/axcon__tui__pictures__overview_streaming_small.snap");
+    let snapshot = fs::read_to_string(snapshot).expect("the picture");
+    let picture = snapshot.splitn(3, "---\n").nth(2).expect("a picture behind the header").trim_end();
+    assert!(readme.contains(picture), "the README shows another picture than the program draws:\n{picture}");
+}
+
 fn sources() -> Vec<(PathBuf, String)> {
     files("src", "rs")
 }
