@@ -45,6 +45,8 @@ pub enum Origin {
 pub struct Scrollback {
     lines: VecDeque<TextLine>,
     dropped: u64,
+    /// Entries of the record already taken in.
+    followed: u64,
     from_unit: Writer,
     to_unit: Writer,
 }
@@ -52,8 +54,6 @@ pub struct Scrollback {
 /// Where the line of one direction stands.
 #[derive(Debug)]
 struct Writer {
-    /// Bytes of this direction already seen.
-    seen: u64,
     /// Number of the line under construction.
     line: Option<u64>,
     /// The last byte ended a line as CR: an LF behind it belongs to it.
@@ -64,52 +64,32 @@ struct Writer {
 
 impl Default for Writer {
     fn default() -> Self {
-        Writer { seen: 0, line: None, after_return: false, visible: Visible::new(Controls::Layout) }
+        Writer { line: None, after_return: false, visible: Visible::new(Controls::Layout) }
     }
 }
 
 impl Scrollback {
     /// Takes in what the record has and this has not seen. Says whether there was anything.
     pub fn follow(&mut self, record: &Record) -> bool {
-        if self.from_unit.seen >= record.received() && self.to_unit.seen >= record.sent() {
+        if record.entry_count() <= self.followed {
             return false;
         }
-        // Newest first, until what is missing of both directions has been passed.
-        let mut missing_from_unit = record.received().saturating_sub(self.from_unit.seen);
-        let mut missing_to_unit = record.sent().saturating_sub(self.to_unit.seen);
-        let mut entries = Vec::new();
-        for entry in record.entries().rev() {
-            if missing_from_unit == 0 && missing_to_unit == 0 {
-                break;
-            }
-            let missing = match entry.direction {
-                Direction::FromUnit => &mut missing_from_unit,
-                Direction::ToUnit => &mut missing_to_unit,
-            };
-            *missing = missing.saturating_sub(entry.bytes.len() as u64);
-            entries.push(entry);
-        }
-        for entry in entries.into_iter().rev() {
-            let seen = self.writer(entry.direction).seen;
-            let known = usize::try_from(seen.saturating_sub(entry.start)).unwrap_or(usize::MAX);
-            for &byte in entry.bytes.iter().skip(known) {
+        for entry in record.entries_from(self.followed) {
+            for &byte in &entry.bytes {
                 match entry.direction {
                     Direction::FromUnit => self.received(entry.at, byte),
                     Direction::ToUnit => self.sent(entry.at, byte),
                 }
             }
-            let end = entry.start + entry.bytes.len() as u64;
-            let writer = self.writer_mut(entry.direction);
-            writer.seen = writer.seen.max(end);
         }
-        self.from_unit.seen = record.received();
-        self.to_unit.seen = record.sent();
+        self.followed = record.entry_count();
         true
     }
 
     /// A word of the console's own, and the start of a new record.
     pub fn begin(&mut self, at: Instant, text: String) {
         self.note(at, text);
+        self.followed = 0;
         self.from_unit = Writer::default();
         self.to_unit = Writer::default();
     }

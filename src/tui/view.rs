@@ -347,7 +347,7 @@ pub fn doing(job: Job) -> &'static str {
 fn done(job: Job) -> &'static str {
     match job {
         Job::Identify => "The unit has answered.",
-        Job::StreamOn => "The stream is on. The unit keeps it on, also after a power cycle, until T switches it off.",
+        Job::StreamOn => "The stream is on, also after a power cycle, until T switches it off.",
         Job::StreamOff => "The stream is off.",
         Job::RestoreDefaults => "The defaults are restored and the unit has restarted.",
         Job::Load => "The upload has ended.",

@@ -2,6 +2,7 @@
 
 #[cfg(unix)]
 mod commands;
+mod console;
 mod emulator;
 mod images;
 #[cfg(unix)]

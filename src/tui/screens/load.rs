@@ -619,7 +619,7 @@ fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line<'static>> 
             rows.push(lines::labelled(theme, if number == 0 { label } else { "" }, line));
         }
     };
-    paragraph("Happened", &report.what);
+    paragraph("Happened", &visible::sentence(&report.what));
     paragraph("Unit now", unit);
     paragraph(
         "Version",
