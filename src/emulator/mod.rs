@@ -2,8 +2,8 @@
 //!
 //! Here are power and reset: which program runs, and when. The loader lives in flash of its own and runs first; it
 //! starts the application if the program in flash is intact and made for this product, unless it has been told to
-//! wait for a file. What the programs say and do is in [`firmware`] and [`bootloader`]; the port they talk through
-//! in [`uart`]; what outlives the power in [`memory`]; what they measure in [`sensors`].
+//! wait for a file. What the programs say and do is in `firmware` and `bootloader`; the port they talk through
+//! in `uart`; what outlives the power in [`memory`]; what they measure in [`sensors`].
 //!
 //! Deterministic: the same setup and the same inputs at the same times give the same bytes, however often
 //! [`handle_timeout`](Endpoint::handle_timeout) is called in between, because things happen only when they are due.

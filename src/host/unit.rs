@@ -468,7 +468,7 @@ pub fn unit(product: &'static Product, seed: u64, flash: Vec<u8>, parameters: Ve
     Unit::new(Setup { product, loader: product.loader.kind, seed, flash, parameters })
 }
 
-/// The program flash of a unit as it leaves the factory: the sample image of [`FACTORY_VERSION`], erased behind it.
+/// The program flash of a unit as it leaves the factory: the sample image of V1.1.0, erased behind it.
 pub fn factory_flash(product: &Product) -> Vec<u8> {
     let mut flash = vec![0xFF; product.flash.program_words as usize * 2];
     let target = product.target();

@@ -1,6 +1,6 @@
 //! Program images: S-record files, what they hold, and whether they may be sent.
 //!
-//! [`check`] reads a file of any size once and gives a [`Report`] with every defect in it; only a report without an
+//! [`check()`] reads a file of any size once and gives a [`Report`] with every defect in it; only a report without an
 //! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] knows one line, [`make`]
 //! builds sample files. This module does not know the products: whoever asks passes them as [`Target`]s.
 

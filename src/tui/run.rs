@@ -1,7 +1,7 @@
 //! The loop around [`App`]: the one file of the console that touches the system.
 //!
 //! Everything that happens comes on one channel; the app is told, its effects are performed in their order, and the
-//! picture is drawn when something has changed: at once after a key, else at most [`FRAME`] apart. Nothing wakes the
+//! picture is drawn when something has changed: at once after a key, else at most a frame apart. Nothing wakes the
 //! loop without an input or a due timer. Files, ports and folders are looked at in threads of their own, so that a
 //! slow disk does not hold the keys.
 
