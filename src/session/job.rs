@@ -31,8 +31,11 @@ pub(super) struct Desk<'a> {
     pub(super) transmitter: &'a mut Transmitter,
     pub(super) facts: &'a mut Facts,
     pub(super) events: &'a mut VecDeque<Event>,
-    /// Text without a line end, the last thing the unit has printed.
+    /// Words without a line end behind them, the last thing the unit has printed: perhaps a question. `None` for signs
+    /// alone, like the `>` of a command line.
     pub(super) pending: Option<&'a Text>,
+    /// Set when what the unit prints from now on is an answer, and no part of the line before.
+    pub(super) cut: bool,
     /// Bytes received so far: text that begins here or later is newer than this moment.
     pub(super) received: u64,
     /// Set when secret bytes have been queued: what comes back until the next line end may echo them.
@@ -42,6 +45,7 @@ pub(super) struct Desk<'a> {
 impl Desk<'_> {
     /// Sends keys.
     pub(super) fn send(&mut self, keys: &[u8]) {
+        self.cut = true;
         // Only a unit that holds us lets this queue fill, and jobs send a few bytes between two deadlines.
         self.transmitter.push_text(keys, Secrecy::Open);
     }
@@ -51,6 +55,7 @@ impl Desk<'_> {
         self.transmitter.push_piece(Transmit { bytes: secret.to_vec(), secrecy: Secrecy::Secret });
         self.transmitter.push_piece(Transmit::open(*b"\r"));
         *self.echo_is_secret = true;
+        self.cut = true;
     }
 
     /// Leaves whatever question is open: Enter without an answer.

@@ -320,19 +320,19 @@ impl Session {
         let Some(mut running) = self.running.take() else { return };
         let lost = matches!(signal, Signal::LinkLost);
         let before = self.facts.clone();
-        let pending = self.framer.pending();
-        let outcome = running.work.handle(
-            signal,
-            &mut Desk {
-                now: self.now,
-                transmitter: &mut self.transmitter,
-                facts: &mut self.facts,
-                events: &mut self.events,
-                pending: pending.as_ref(),
-                received: self.record.received(),
-                echo_is_secret: &mut self.password_open,
-            },
-        );
+        let pending = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric));
+        let mut desk = Desk {
+            now: self.now,
+            transmitter: &mut self.transmitter,
+            facts: &mut self.facts,
+            events: &mut self.events,
+            pending: pending.as_ref(),
+            cut: false,
+            received: self.record.received(),
+            echo_is_secret: &mut self.password_open,
+        };
+        let outcome = running.work.handle(signal, &mut desk);
+        let cut = desk.cut;
         if self.facts != before {
             self.events.push_back(Event::FactsChanged);
         }
@@ -344,6 +344,15 @@ impl Session {
             }
             None => self.running = Some(running),
         }
+        if cut {
+            self.cut_line();
+        }
+    }
+
+    /// What the unit has printed without a line end is over: it stays text, and nobody is told.
+    fn cut_line(&mut self) {
+        self.prompt.due = None;
+        self.framer.cut(|_| {});
     }
 }
 

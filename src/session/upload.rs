@@ -22,6 +22,8 @@ const PASSWORD_PROMPT: Duration = Duration::from_millis(2500);
 const LOADER_PROMPT: Duration = Duration::from_secs(8);
 /// Silence behind the loader's prompt before the first record: whatever else it prints should be out.
 const SETTLE: Duration = Duration::from_millis(80);
+/// How long a loader that was found waiting may take to call what we asked it an error.
+const CLEAR_LINE: Duration = Duration::from_millis(300);
 /// How long the loader may take after an error to say that it waits again.
 const RESTART: Duration = Duration::from_secs(2);
 /// From the end record to the new banner: the last page, the reset, the first start.
@@ -142,7 +144,13 @@ impl Upload {
         self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash));
         self.mark = desk.received;
         match unit {
-            UnitNow::Loader => self.settle(desk),
+            UnitNow::Loader => {
+                // The question who is there may still lie in its line buffer: Enter makes an error of it, which is
+                // over before the first record.
+                desk.send(b"\r");
+                self.stage = Stage::Settle;
+                self.deadline = Some(desk.now + CLEAR_LINE);
+            }
             UnitNow::Application | UnitNow::Unknown => {
                 desk.send(b"l");
                 self.stage = Stage::AskedForLoader;
@@ -155,7 +163,8 @@ impl Upload {
 
     fn settle(&mut self, desk: &Desk<'_>) {
         self.stage = Stage::Settle;
-        self.deadline = Some(desk.now + SETTLE);
+        let quiet = desk.now + SETTLE;
+        self.deadline = Some(self.deadline.map_or(quiet, |deadline| deadline.max(quiet)));
     }
 
     /// Something was heard while a loader is being asked for.
@@ -173,6 +182,7 @@ impl Upload {
                     let what = "cancelled; nothing has been sent, the old software is untouched";
                     return self.end(desk, Verdict::Interrupted, UnitNow::Loader, what);
                 }
+                self.deadline = None;
                 self.settle(desk);
             }
             Message::Refusal | Message::MenuKey(_) | Message::Prompt(Prompt::Password) if password_sent => {
@@ -407,6 +417,7 @@ impl Upload {
                 self.end(desk, Verdict::UnitRefused, UnitNow::Unknown, what)
             }
             Stage::Settle if due => {
+                desk.cut = true;
                 self.mark = desk.received;
                 self.stage = Stage::Transfer;
                 self.transfer(desk)

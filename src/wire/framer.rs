@@ -85,6 +85,12 @@ impl Framer {
         }
     }
 
+    /// Ends the current line here, without a line end: what comes next answers something we have sent, and is no part
+    /// of the prompt before it.
+    pub fn cut(&mut self, mut out: impl FnMut(Item)) {
+        self.end_line(self.offset, &mut out);
+    }
+
     /// Text since the last line end, if it is not blank.
     pub fn pending(&self) -> Option<Text> {
         let text = clean(&self.line);
@@ -200,6 +206,17 @@ mod tests {
         let (items, pending) = frame(&[b"..\x13.\x11."]);
         assert_eq!(items, [Item::Hold(true), Item::Hold(false)]);
         assert_eq!(pending.map(|text| text.text).as_deref(), Some("...."));
+    }
+
+    #[test]
+    fn a_cut_parts_a_prompt_from_the_answer() {
+        let mut framer = Framer::default();
+        framer.push(b"> ", |item| panic!("{item:?}"));
+        let mut items = Vec::new();
+        framer.cut(|item| items.push(item));
+        framer.push(b"Password? ", |item| panic!("{item:?}"));
+        assert_eq!(items, [Item::Line(Text { span: Span { start: 0, end: 2 }, text: "> ".into() })]);
+        assert_eq!(framer.pending().map(|text| (text.span.start, text.text)), Some((2, "Password? ".into())));
     }
 
     #[test]

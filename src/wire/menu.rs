@@ -121,7 +121,9 @@ pub(super) fn software(words: &Words, products: &[&str]) -> Option<SoftwareName>
 
 /// Network variables a line names.
 pub(super) fn network(line: &str, words: &Words) -> Option<Network> {
-    let node_id = words.position("node").and_then(|at| {
+    let speaks_of_network = words.has_any(&["network", "can", "canopen", "nmt"]);
+    let named = words.position("node").or_else(|| words.position("id").filter(|_| speaks_of_network));
+    let node_id = named.and_then(|at| {
         let after = words.iter().skip(at + 1).take(4).find_map(number)?;
         u8::try_from(after).ok().filter(|node_id| (1..=127).contains(node_id))
     });
@@ -242,6 +244,7 @@ mod tests {
             ("Baudrate: 125k", None, Some(125), None),
             ("State: Pre-Operational", None, None, Some(NmtState::PreOperational)),
             ("NMT state OPERATIONAL", None, None, Some(NmtState::Operational)),
+            ("network: id=7Fh  125000 bit/s", Some(127), Some(125), None),
             ("Node 5 is PRE OPERATIONAL at 20 kbit/s", Some(5), Some(20), Some(NmtState::PreOperational)),
         ];
         for (line, node_id, can_kbps, nmt_state) in table {

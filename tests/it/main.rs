@@ -9,6 +9,7 @@ mod images;
 mod live;
 #[cfg(unix)]
 mod ptys;
+mod stranger;
 mod support;
 mod talks;
 mod tidy;
