@@ -302,7 +302,7 @@ pictures! {
     };
     connect_by_path: |size| {
         let mut stage = Stage::with_ports(size);
-        stage.press(KeyCode::End).press(KeyCode::Enter).keys("tcp://bench-3:4001");
+        stage.press(KeyCode::End).press(KeyCode::Enter).keys("/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_AX12345-if00-port0");
         stage
     };
     overview_without_link: |size| {

@@ -76,9 +76,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             "Connect to",
             {
                 let mut rows = paragraphs(
-                    &[
-                        "A serial port (/dev/ttyUSB0, COM3), emu:axtc4co, tcp://HOST:PORT, rfc2217://HOST:PORT or replay:FILE.",
-                    ],
+                    &["A serial port (/dev/ttyUSB0, COM3), a pseudo-terminal, or an emulated unit (emu:axtc4co)."],
                     columns,
                 );
                 rows.push(Line::default());

@@ -29,7 +29,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('p'))],
         cmd: Cmd::Type,
         short: "path",
-        long: "type a path or address, e.g. /dev/ttyUSB0 or tcp://host:port",
+        long: "type the path of a port that is not listed",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
@@ -171,7 +171,7 @@ impl Connect {
         let heading = match entry {
             Entry::Port(port) => visible::text(&port.link),
             Entry::Emulated(product) => format!("Emulated {}", product.name),
-            Entry::Other => "Path or address".into(),
+            Entry::Other => "Another port".into(),
         };
         let mut shown = vec![Line::default(), lines::rule(theme, columns, &heading, "")];
         match entry {
@@ -205,9 +205,8 @@ impl Connect {
             }
             Entry::Other => {
                 shown.push(text("/dev/ttyUSB0 or COM3      a serial port that is not listed".into()));
-                shown.push(text("tcp://HOST:PORT           a raw socket, e.g. of ser2net".into()));
-                shown.push(text("rfc2217://HOST:PORT       a remote serial port".into()));
-                shown.push(text("replay:FILE               a recording, read only".into()));
+                shown.push(text("/dev/pts/3 or a link      a pseudo-terminal, e.g. of axcon emulate or socat".into()));
+                shown.push(text("emu:axtc4co               an emulated unit in this program".into()));
             }
         }
         shown
@@ -239,7 +238,7 @@ fn row(scene: Scene, entry: &Entry, is_chosen: bool, columns: usize) -> Line<'st
             (visible::text(&port.link), format!("{busy}{}", visible::text(&port.description)), Some(port.link.clone()))
         }
         Entry::Emulated(product) => (emulated_link(product), product.title.clone(), Some(emulated_link(product))),
-        Entry::Other => ("path or address ...".into(), String::new(), None),
+        Entry::Other => ("another port ...".into(), String::new(), None),
     };
     let is_ours = link.is_some() && link == scene.view.link.name;
     let state = match &scene.view.link.state {
