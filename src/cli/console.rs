@@ -9,7 +9,6 @@ use crate::host::Input;
 use crate::host::clock::Clock;
 use crate::host::journal::{Journal, Note};
 use crate::host::link::{Connection, LinkSpec, Options};
-use crate::image::{Report, Severity};
 use crate::time::Instant;
 use crate::tui::run::{End, World};
 use crate::tui::{self, Failure, ImageFacts};
@@ -52,43 +51,8 @@ fn failure(error: &CliError) -> Failure {
 
 fn check(path: PathBuf) -> ImageFacts {
     match image_cli::read(&path, None, &[]) {
-        Ok(report) => facts(path, &report),
-        Err(error) => ImageFacts {
-            path,
-            ok: false,
-            product: None,
-            version: None,
-            records: 0,
-            characters: 0,
-            defects: vec![error.to_string()],
-            checked: None,
-        },
-    }
-}
-
-fn facts(path: PathBuf, report: &Report) -> ImageFacts {
-    let identity = report.facts.identity.as_ref();
-    let mut defects: Vec<_> = report.defects.iter().collect();
-    defects.sort_by_key(|defect| defect.severity != Severity::Error);
-    let mut defects: Vec<String> = defects
-        .into_iter()
-        .map(|defect| {
-            let (severity, id) = (defect.severity.name(), defect.id);
-            format!("{severity} {id}: line {}, column {}: {}", defect.line, defect.column, defect.message)
-        })
-        .collect();
-    if report.unlisted() > 0 {
-        defects.push(format!("{} more defects are not listed", report.unlisted()));
-    }
-    ImageFacts {
-        path,
-        ok: report.is_ok(),
-        product: identity.map(|identity| identity.product.clone()),
-        version: identity.map(|identity| identity.version),
-        records: report.facts.records as usize,
-        characters: report.facts.characters as usize,
-        defects,
-        checked: report.image(),
+        Ok(report) => ImageFacts::of_report(path, &report),
+        Err(error) => ImageFacts::unreadable(path, error.to_string()),
     }
 }
 

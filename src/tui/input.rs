@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use ratatui::crossterm::event::Event as TerminalEvent;
 
 use crate::endpoint::Transmit;
-use crate::image::CheckedImage;
+use crate::image::{CheckedImage, Report, Severity};
 use crate::version::Version;
 
 /// What can happen.
@@ -148,4 +148,47 @@ pub struct ImageFacts {
     pub defects: Vec<String>,
     /// The image itself, if it may be sent.
     pub checked: Option<CheckedImage>,
+}
+
+impl ImageFacts {
+    /// What a check has found; errors come first.
+    pub fn of_report(path: PathBuf, report: &Report) -> Self {
+        let identity = report.facts.identity.as_ref();
+        let mut defects: Vec<_> = report.defects.iter().collect();
+        defects.sort_by_key(|defect| defect.severity != Severity::Error);
+        let mut defects: Vec<String> = defects
+            .into_iter()
+            .map(|defect| {
+                let (severity, id) = (defect.severity.name(), defect.id);
+                format!("{severity} {id}: line {}, column {}: {}", defect.line, defect.column, defect.message)
+            })
+            .collect();
+        if report.unlisted() > 0 {
+            defects.push(format!("{} more defects are not listed", report.unlisted()));
+        }
+        ImageFacts {
+            path,
+            ok: report.is_ok(),
+            product: identity.map(|identity| identity.product.clone()),
+            version: identity.map(|identity| identity.version),
+            records: report.facts.records as usize,
+            characters: report.facts.characters as usize,
+            defects,
+            checked: report.image(),
+        }
+    }
+
+    /// A file that could not be read, and why.
+    pub fn unreadable(path: PathBuf, why: String) -> Self {
+        ImageFacts {
+            path,
+            ok: false,
+            product: None,
+            version: None,
+            records: 0,
+            characters: 0,
+            defects: vec![why],
+            checked: None,
+        }
+    }
 }

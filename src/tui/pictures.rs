@@ -37,8 +37,13 @@ struct Stage {
 
 impl Stage {
     fn new(size: (u16, u16)) -> Self {
-        let options =
-            Options { link: None, directory: PathBuf::from("/work/images"), colour: false, start_of_day: NOON, size };
+        let options = Options {
+            link: None,
+            directory: PathBuf::from("/home/service/images"),
+            colour: false,
+            start_of_day: NOON,
+            size,
+        };
         let mut app = App::new(options);
         let effects = app.start();
         Stage { app, size, now: Instant::ZERO, effects }
@@ -117,7 +122,7 @@ impl Stage {
             file("AXTC4CO_V1.1.0.elf.S", 242_846),
             file("readme.txt", 99),
         ];
-        self.input(Input::FilesListed { directory: "/work/images".into(), entries: Ok(entries) });
+        self.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(entries) });
         self
     }
 
@@ -210,7 +215,7 @@ impl Stage {
 
 fn good_image() -> ImageFacts {
     ImageFacts {
-        path: "/work/images/AXTC4CO_V1.2.0.elf.S".into(),
+        path: "/home/service/images/AXTC4CO_V1.2.0.elf.S".into(),
         ok: true,
         product: Some("AXTC4CO".into()),
         version: Some(Version::new(1, 2, 0)),
@@ -224,7 +229,7 @@ fn good_image() -> ImageFacts {
 fn bad_image() -> ImageFacts {
     let defects =
         (1..=40).map(|n| format!("line {}, column 43: the checksum is A{:X}, it should be 5C", n * 7, n % 16));
-    ImageFacts { path: "/work/images/bad.S".into(), ok: false, defects: defects.collect(), ..good_image() }
+    ImageFacts { path: "/home/service/images/bad.S".into(), ok: false, defects: defects.collect(), ..good_image() }
 }
 
 fn progress() -> Progress {
@@ -391,7 +396,7 @@ pictures! {
     load_cannot_list: |size| {
         let mut stage = Stage::connected(size);
         stage.keys("l").input(Input::FilesListed {
-            directory: "/root/secret".into(),
+            directory: "/home/other/secret".into(),
             entries: Err("permission denied".into()),
         });
         stage
@@ -703,12 +708,12 @@ fn folders_are_walked_and_the_way_back_finds_the_folder_again() {
     let mut stage = Stage::connected(SMALL).picking();
     stage.asked();
     stage.press(KeyCode::Down).press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::ListFiles("/work/images/bad".into())]);
-    stage.input(Input::FilesListed { directory: "/work/images/bad".into(), entries: Ok(Vec::new()) });
+    assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images/bad".into())]);
+    stage.input(Input::FilesListed { directory: "/home/service/images/bad".into(), entries: Ok(Vec::new()) });
     stage.press(KeyCode::Esc);
-    assert_eq!(stage.asked(), [Effect::ListFiles("/work/images".into())]);
+    assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images".into())]);
     let bad = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, modified: None };
-    stage.input(Input::FilesListed { directory: "/work/images".into(), entries: Ok(vec![bad]) });
+    stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(vec![bad]) });
     assert!(stage.shows("› bad/"));
 }
 

@@ -122,14 +122,13 @@ impl Console {
                 self.app.drawn();
                 next_frame = now + FRAME;
             }
+            // A flood of inputs must not keep a timer from expiring.
+            if self.app.poll_timeout().is_some_and(|due| due <= now) && self.handle(Input::Timeout) {
+                return Ok(End::Quit);
+            }
             let due = self.app.is_dirty().then_some(next_frame);
             let wake = [due, self.app.poll_timeout()].into_iter().flatten().min().unwrap_or(Instant::NEVER);
-            let Some(input) = self.next_input(wake) else {
-                if self.handle(Input::Timeout) {
-                    return Ok(End::Quit);
-                }
-                continue;
-            };
+            let Some(input) = self.next_input(wake) else { continue };
             let leaves = match input {
                 host::Input::Terminal(event) => {
                     // What a key changes is seen at once.

@@ -6,7 +6,7 @@ use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
 use axcon::emulator::sensors::{Channel, Condition};
 use axcon::emulator::{Setup, Unit};
-use axcon::image::{Report, make};
+use axcon::image::make;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::tui::{App, Effect, ImageFacts, Input, LinkInfo, Options};
 use axcon::version::Version;
@@ -75,7 +75,7 @@ impl Desk {
                     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
                     let file = new_image();
                     let report = axcon::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
-                    self.input(Input::ImageChecked(Box::new(facts(path, &report))));
+                    self.input(Input::ImageChecked(Box::new(ImageFacts::of_report(path, &report))));
                 }
                 Effect::Quit => self.over = true,
                 Effect::CloseLink | Effect::ListPorts | Effect::UploadBegins { .. } | Effect::UploadEnds { .. } => {}
@@ -236,19 +236,4 @@ fn new_image() -> Vec<u8> {
     let target = axtc4co().target();
     let recipe = make::Recipe { target: &target, version: Version::new(1, 2, 0), words: 0xC000, flaw: None };
     make::make(&recipe).expect("an image of the usual size")
-}
-
-/// What a host that has read the file tells the console.
-fn facts(path: PathBuf, report: &Report) -> ImageFacts {
-    let identity = report.facts.identity.as_ref();
-    ImageFacts {
-        path,
-        ok: report.is_ok(),
-        product: identity.map(|identity| identity.product.clone()),
-        version: identity.map(|identity| identity.version),
-        records: report.facts.records as usize,
-        characters: report.facts.characters as usize,
-        defects: report.defects.iter().map(|defect| defect.message.clone()).collect(),
-        checked: report.image(),
-    }
 }
