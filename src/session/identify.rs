@@ -4,7 +4,7 @@
 //! that swallows the key, so the question is repeated in other words: Enter leaves every prompt, `x` the view of the
 //! object dictionary (section 4.1.1). A loader that waits for a file calls the key an error, and so shows itself.
 
-use super::event::{Outcome, UnitState};
+use super::event::{Event, Outcome, UnitState};
 use super::job::{Desk, Signal, Work};
 use crate::time::{Duration, Instant};
 use crate::wire::{LoaderText, MenuKey, Message, Prompt, XON};
@@ -15,6 +15,9 @@ const ANSWER: Duration = Duration::from_millis(800);
 const QUIET: Duration = Duration::from_millis(150);
 /// How long an answer may go on: the stream may run on behind the menu.
 const LONGEST_ANSWER: Duration = Duration::from_millis(1500);
+/// How long a unit may have stopped us before it is asked all the same: no page takes that long to write, so its XON has
+/// been lost, or it has lost its power since.
+const STALE_HOLD: Duration = Duration::from_secs(4);
 /// Entries that make a menu of lines that look like entries.
 const MENU_ENTRIES: u32 = 3;
 
@@ -36,6 +39,10 @@ pub(super) struct Identify {
 
 impl Identify {
     fn ask(&mut self, desk: &mut Desk<'_>) {
+        if desk.transmitter.held_since().is_some_and(|since| since + STALE_HOLD <= desk.now) {
+            desk.transmitter.hold(desk.now, false);
+            desk.events.push_back(Event::Held(false));
+        }
         desk.send(QUESTIONS[self.asked]);
         self.asked += 1;
         self.asked_at = desk.now;

@@ -259,6 +259,18 @@ impl Session {
 
     fn heard(&mut self, text: Text, message: Message) {
         self.learn(text.span, &message);
+        // A unit that starts has forgotten that it stopped us, and will never say "go on".
+        let starts = matches!(
+            message,
+            Message::Software(_)
+                | Message::FirstStart
+                | Message::Loader(LoaderText::Header | LoaderText::Waiting)
+                | Message::Prompt(Prompt::WaitingForFile)
+        );
+        if starts && self.transmitter.held_since().is_some() {
+            self.transmitter.hold(self.now, false);
+            self.events.push_back(Event::Held(false));
+        }
         self.events.push_back(match &message {
             Message::Row(row) => Event::Row { at: self.now, span: text.span, row: row.clone() },
             _ => Event::Heard { at: self.now, span: text.span, message: message.clone() },

@@ -1,8 +1,10 @@
 //! Stories of uploads: console and unit on one cable, in virtual time.
 
+use axcon::emulator::Running;
 use axcon::image::Identity;
+use axcon::rng::Rng;
 use axcon::secret::Secret;
-use axcon::session::{Command, Event, Phase, UnitNow, Verdict};
+use axcon::session::{Command, Event, Outcome, Phase, UnitNow, Verdict};
 use axcon::time::Duration;
 use axcon::version::Version;
 
@@ -109,7 +111,7 @@ fn a_power_cut_at_any_record_leaves_a_unit_that_a_second_upload_saves() {
         assert!(bench.run_until(limit, moment).is_some(), "record {cut} is reached");
         bench.power_cycle(Duration::from_millis(500));
         let outcome = bench.outcome();
-        let axcon::session::Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+        let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
         // Before the header has arrived the old software is intact and comes back; then the loader waits for ever.
         let now = if cut == 0 { UnitNow::Application } else { UnitNow::Loader };
         assert_eq!((report.verdict, report.unit), (Verdict::Failed, now), "cut at {cut}: {report:?}");
@@ -147,7 +149,7 @@ fn cancelling_in_the_middle_of_the_file_says_that_the_unit_waits_in_its_loader()
     bench.command(Command::Load(Box::new(order(small_image("AXTC4CO", "1.2.0")))));
     let limit = bench.now + Duration::from_secs(60);
     bench.run_until(limit, |event| matches!(event, Event::Progress(progress) if progress.records > 50));
-    let axcon::session::Outcome::Loaded(report) = bench.ask(Command::Cancel) else { panic!("no report") };
+    let Outcome::Loaded(report) = bench.ask(Command::Cancel) else { panic!("no report") };
     assert_eq!((report.verdict, report.unit), (Verdict::Interrupted, UnitNow::Loader), "{report:?}");
     let sent = bench.wire.len();
     bench.run_for(Duration::from_secs(2));
@@ -162,4 +164,82 @@ fn the_password_is_nowhere_in_the_record() {
     assert_eq!(report.verdict, Verdict::Done);
     assert!(bench.wire.windows(9).any(|window| window == b"AXIO-2010"), "it was sent");
     assert!(!bench.transcript().contains("AXIO"), "and not kept");
+}
+
+/// What a seed does to an upload: characters changed, lost or doubled on either way, a power cut, an adapter's latency.
+fn disturbed(seed: u64) -> Bench {
+    let mut rng = Rng::new(seed).fork("upload faults");
+    let mut bench = Bench::with(factory_flash("1.1.0"), Duration::from_millis(rng.below(21)));
+    bench.run_for(Duration::from_secs(4));
+    let fault = |rng: &mut Rng, span: u64| {
+        let (at, kind, bit) = (rng.below(span), rng.below(3), rng.below(8));
+        move |number: u64, byte: u8| match kind {
+            _ if number != at => vec![byte],
+            0 => vec![byte ^ (1 << bit)],
+            1 => vec![],
+            _ => vec![byte, byte],
+        }
+    };
+    if rng.chance(60) {
+        bench.disturb(fault(&mut rng, 15_000));
+    }
+    if rng.chance(60) {
+        bench.disturb_answers(fault(&mut rng, 700));
+    }
+    bench
+}
+
+/// Runs one seed: the verdict has to be true, and the next upload has to succeed.
+fn upload_with_faults(seed: u64) {
+    let image = small_image("AXTC4CO", "1.2.0");
+    let wanted = flash_with(&image);
+    let end = image.identity().expect("an identity").program_words as usize * 2;
+    let mut bench = disturbed(seed);
+    let mut rng = Rng::new(seed).fork("power");
+    bench.command(Command::Load(Box::new(order(image.clone()))));
+    if rng.chance(30) {
+        let moment = Duration::from_millis(rng.below(3_000));
+        bench.run_for(moment);
+        // What was said before a power cut says nothing about after it.
+        if bench.session.job().is_some() {
+            bench.power_cycle(Duration::from_millis(rng.below(2_000)));
+        }
+    }
+    let begun = bench.now;
+    let Outcome::Loaded(report) = bench.outcome() else { panic!("seed {seed}: no report") };
+    assert!(bench.now.since(begun) < Duration::from_secs(90), "seed {seed} took {:?}", bench.now.since(begun));
+    bench.run_for(Duration::from_millis(200)); // A unit that has just got its power starts.
+    let flash_is_right = bench.unit.unit().flash()[..end] == wanted[..end];
+    let running = bench.unit.unit().running();
+    match report.verdict {
+        Verdict::Done => {
+            assert!(flash_is_right, "seed {seed}: a false success: {report:?}");
+            assert_eq!(running, Running::Application, "seed {seed}: {report:?}");
+        }
+        _ if report.unit == UnitNow::Loader => assert_eq!(running, Running::Loader, "seed {seed}: {report:?}"),
+        _ if report.unit == UnitNow::Application => {
+            assert_eq!(running, Running::Application, "seed {seed}: {report:?}");
+        }
+        _ => {}
+    }
+    assert!(!bench.transcript().contains("AXIO"), "seed {seed}: the password is in the record");
+    bench.leave_in_peace();
+    bench.run_for(Duration::from_secs(3));
+    let mut again = order(image);
+    again.product = Some("AXTC4CO".into());
+    let second = bench.load(again);
+    assert_eq!(second.verdict, Verdict::Done, "seed {seed}: first {report:?}\nthen {second:?}\n{}", bench.transcript());
+    assert!(bench.unit.unit().flash()[..end] == wanted[..end], "seed {seed}: the second upload");
+}
+
+/// `AXCON_SEED=N cargo test whatever_the_line_does` replays a single one.
+#[test]
+fn whatever_the_line_does_the_verdict_is_true_and_the_next_upload_succeeds() {
+    let seeds = match std::env::var("AXCON_SEED").ok().and_then(|seed| seed.parse().ok()) {
+        Some(seed) => seed..seed + 1,
+        None => 0..std::env::var("AXCON_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(300),
+    };
+    for seed in seeds {
+        upload_with_faults(seed);
+    }
 }

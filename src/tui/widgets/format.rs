@@ -26,7 +26,13 @@ pub fn minutes(duration: Duration) -> String {
 
 /// `200 ms`, `1.5 s`, `60 s`.
 pub fn period(duration: Duration) -> String {
-    let millis = duration.as_millis();
+    // Measured from when rows came: the last digits are the line's and the adapter's.
+    let rounded = |step: u128| (duration.as_millis() + step / 2) / step * step;
+    let millis = match duration.as_millis() {
+        0..100 => rounded(1),
+        100..995 => rounded(10),
+        _ => rounded(100),
+    };
     match millis {
         0..1000 => format!("{millis} ms"),
         _ if millis.is_multiple_of(1000) => format!("{} s", millis / 1000),
@@ -151,8 +157,8 @@ mod tests {
     fn times_read_as_people_say_them() {
         assert_eq!([21, 725, 3600].map(|s| minutes(Duration::from_secs(s))), ["0:21", "12:05", "1:00:00"]);
         assert_eq!(
-            [200, 1000, 1500, 60_000].map(|ms| period(Duration::from_millis(ms))),
-            ["200 ms", "1 s", "1.5 s", "60 s"]
+            [3, 203, 999, 1000, 1500, 60_000].map(|ms| period(Duration::from_millis(ms))),
+            ["3 ms", "200 ms", "1 s", "1 s", "1.5 s", "60 s"]
         );
         let late = Duration::from_secs(86_399);
         assert_eq!(time_of_day_millis(late, Instant::from_millis(1_250)), "00:00:00.250");

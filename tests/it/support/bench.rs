@@ -28,10 +28,14 @@ pub struct Bench {
     pub unit: Plugged<Unit>,
     to_session: Line,
     middleman: Option<Middleman>,
+    middleman_back: Option<Middleman>,
     sent: u64,
+    received: u64,
     /// Everything that has left for the unit, in order.
     pub wire: Vec<u8>,
     pub events: VecDeque<Event>,
+    /// How the job ended that ended while time was let pass.
+    ended: Option<Outcome>,
 }
 
 impl Bench {
@@ -52,9 +56,12 @@ impl Bench {
             unit: Plugged::new(unit, Line::new(character_time(BAUD), latency)),
             to_session: Line::new(Duration::ZERO, latency),
             middleman: None,
+            middleman_back: None,
             sent: 0,
+            received: 0,
             wire: Vec::new(),
             events: VecDeque::new(),
+            ended: None,
         }
     }
 
@@ -63,13 +70,20 @@ impl Bench {
         self.middleman = Some(Box::new(middleman));
     }
 
-    /// Takes him away.
+    /// Puts somebody on the way back.
+    pub fn disturb_answers(&mut self, middleman: impl FnMut(u64, u8) -> Vec<u8> + 'static) {
+        self.middleman_back = Some(Box::new(middleman));
+    }
+
+    /// Takes them away.
     pub fn leave_in_peace(&mut self) {
         self.middleman = None;
+        self.middleman_back = None;
     }
 
     /// Gives the session a command.
     pub fn command(&mut self, command: Command) {
+        self.ended = None;
         self.session.command(self.now, command).expect("the session takes the command");
         self.drain();
     }
@@ -77,11 +91,21 @@ impl Bench {
     /// Lets time pass.
     pub fn run_for(&mut self, span: Duration) {
         let end = self.now + span;
-        self.run_until(end, |_| false);
+        let mut ended = None;
+        self.run_until(end, |event| {
+            if let Event::Finished(outcome) = event {
+                ended = Some(outcome.clone());
+            }
+            false
+        });
+        self.ended = ended.or(self.ended.take());
     }
 
     /// Lets time pass until a job has ended.
     pub fn outcome(&mut self) -> Outcome {
+        if let Some(outcome) = self.ended.take() {
+            return outcome;
+        }
         let limit = self.now + Duration::from_secs(300);
         match self.run_until(limit, |event| matches!(event, Event::Finished(_))) {
             Some(Event::Finished(outcome)) => outcome,
@@ -147,7 +171,12 @@ impl Bench {
         let to_session = &mut self.to_session;
         self.unit.advance(next, |at, bytes| to_session.push(at, bytes));
         while let Some((at, byte)) = self.to_session.pop_arrived(next) {
-            self.session.handle_bytes(at.max(next), &[byte]);
+            let through = match &mut self.middleman_back {
+                Some(middleman) => middleman(self.received, byte),
+                None => vec![byte],
+            };
+            self.received += 1;
+            self.session.handle_bytes(at.max(next), &through);
             self.drain();
         }
         self.session.handle_timeout(next);
