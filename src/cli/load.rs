@@ -56,6 +56,12 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let Some(image) = report.image() else {
         return refuse(&report, &name, output);
     };
+    if image.identity().is_none() && !args.allow.contains(&DefectId::NoIdentity) {
+        let message =
+            format!("{name} does not say which product and version it is, so nobody could tell what runs then");
+        return Err(CliError::message(Kind::ImageRefused, message)
+            .hint("if you know that it is made for this unit: --allow no-identity, and compare the banner yourself"));
+    }
     if !output.json && (report.warnings > 0 || report.allowed > 0) {
         output.remark(image_cli::report_text(&report, &name).trim_end());
     }

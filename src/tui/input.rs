@@ -166,15 +166,20 @@ impl ImageFacts {
         if report.unlisted() > 0 {
             defects.push(format!("{} more defects are not listed", report.unlisted()));
         }
+        // What does not say what it is cannot be compared with the unit, nor with its banner.
+        let ok = report.is_ok() && identity.is_some();
+        if report.is_ok() && !ok {
+            defects.insert(0, "error: only the command line sends an image that does not say what it is".into());
+        }
         ImageFacts {
             path,
-            ok: report.is_ok(),
+            ok,
             product: identity.map(|identity| identity.product.clone()),
             version: identity.map(|identity| identity.version),
             records: report.facts.records as usize,
             characters: report.facts.characters as usize,
             defects,
-            checked: report.image(),
+            checked: report.image().filter(|_| ok),
         }
     }
 

@@ -28,7 +28,7 @@ fn in_tree_text(path: &str) -> String {
     in_tree(path).display().to_string()
 }
 
-/// The bad files, by defect, with the line at which each is found.
+/// The bad and the odd files, by defect, with the line at which each is found.
 const BAD: [(&str, u64); 40] = [
     ("empty-file", 1),
     ("not-s-record", 1),
@@ -72,6 +72,12 @@ const BAD: [(&str, u64); 40] = [
     ("unknown-product", 10),
 ];
 
+/// Where the sample with a defect lies: a file with an error is bad, one with a warning is odd.
+fn sample(id: DefectId) -> String {
+    let folder = if id.severity() == Severity::Error { "bad" } else { "odd" };
+    format!("{folder}/{id}.elf.S")
+}
+
 #[test]
 fn the_program_makes_every_sample_file_anew() {
     for version in ["1.1.0", "1.2.0"] {
@@ -79,19 +85,21 @@ fn the_program_makes_every_sample_file_anew() {
         let kept = fs::read(in_tree(&format!("firmware_images/AXTC4CO_V{version}.elf.S"))).expect("a sample");
         assert!(made.stdout == kept, "AXTC4CO V{version} is not what the program makes: {}", text(&made.stderr));
     }
-    let mut kept: BTreeMap<String, Vec<u8>> = fs::read_dir(in_tree("firmware_images/bad"))
-        .expect("the folder of bad files")
-        .map(|entry| entry.expect("an entry").path())
-        .map(|path| {
-            (path.file_name().expect("a name").to_string_lossy().into_owned(), fs::read(&path).expect("a file"))
-        })
-        .collect();
+    let mut kept: BTreeMap<String, Vec<u8>> = BTreeMap::new();
+    for folder in ["bad", "odd"] {
+        for entry in fs::read_dir(in_tree("firmware_images").join(folder)).expect("a folder of samples") {
+            let path = entry.expect("an entry").path();
+            let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+            kept.insert(format!("{folder}/{name}"), fs::read(&path).expect("a file"));
+        }
+    }
     let recipe = ["image", "make", "--product", "AXTC4CO", "--version", "1.2.0", "--words", "320", "--out", "-"];
     for flaw in make::flaws() {
         let made = axcon(&[&recipe[..], &["--defect", flaw.name()]].concat());
         assert!(made.status.success(), "{flaw}: {}", text(&made.stderr));
-        let kept = kept.remove(&format!("{flaw}.elf.S"));
-        assert!(kept.as_ref() == Some(&made.stdout), "bad/{flaw}.elf.S is not what the program makes");
+        let name = sample(flaw);
+        let kept = kept.remove(&name);
+        assert!(kept.as_ref() == Some(&made.stdout), "{name} is not what the program makes");
     }
     assert_eq!(kept.into_keys().collect::<Vec<_>>(), Vec::<String>::new(), "files nothing makes");
 }
@@ -100,7 +108,7 @@ fn the_program_makes_every_sample_file_anew() {
 fn each_bad_file_shows_its_defect_in_its_line_and_no_other_error() {
     for (name, line) in BAD {
         let id: DefectId = name.parse().expect("a defect");
-        let checked = axcon(&["image", "check", "--json", &in_tree_text(&format!("firmware_images/bad/{name}.elf.S"))]);
+        let checked = axcon(&["image", "check", "--json", &in_tree_text(&format!("firmware_images/{}", sample(id)))]);
         let refused = id.severity() == Severity::Error;
         assert_eq!(checked.status.code(), Some(if refused { 5 } else { 0 }), "{name}");
         let report = json(&checked.stdout);
