@@ -341,6 +341,9 @@ pub fn next_step(report: &LoadReport) -> &'static str {
         (_, UnitNow::Loader) if report.records == 0 => {
             "the unit waits in its loader, its old software intact: upload, or switch it off and on"
         }
+        (_, UnitNow::Loader) if report.phase == Phase::Finish && report.records == report.records_total => {
+            "the unit waits in its loader: upload an image that is made for it, 'axcon image info' says what this one is"
+        }
         (_, UnitNow::Loader) => "the unit waits in its loader, without software: run the same command again",
         (Verdict::WrongApplication, _) => "compare the version above with the file, and upload the right one",
         (_, UnitNow::Application) => "the unit runs its software: nothing has been changed, try again",
