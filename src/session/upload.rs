@@ -300,7 +300,7 @@ impl Upload {
 
     /// The banner is complete, or its time is over.
     fn judge(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let image = self.order.image.identity();
+        let image = self.order.image.identity().cloned();
         let version = self.after.version.map(|(_, version)| version);
         if self.after.loader_waits && !self.after.application {
             let what = "the loader took the file but waits for another: it does not start what was sent";
@@ -308,20 +308,19 @@ impl Upload {
         }
         match (&self.after.product, version) {
             (Some(product), Some(version)) => {
-                let product_fits = image.is_none_or(|image| image.product.eq_ignore_ascii_case(product));
-                let version_fits = image.is_none_or(|image| image.version == version);
-                if product_fits && version_fits {
-                    if let Some(transfer) = &mut self.transfer {
-                        transfer.take_all_sent();
+                let runs = format!("the unit runs {product} V{version}");
+                let other =
+                    image.filter(|image| !image.product.eq_ignore_ascii_case(product) || image.version != version);
+                if let Some(transfer) = &mut self.transfer {
+                    transfer.take_all_sent();
+                }
+                self.report_progress_of(Phase::Verify, desk);
+                match other {
+                    None => self.end(desk, Verdict::Done, UnitNow::Application, runs),
+                    Some(sent) => {
+                        let what = format!("{runs}, but {} V{} was sent", sent.product, sent.version);
+                        self.end(desk, Verdict::WrongApplication, UnitNow::Application, what)
                     }
-                    let what = format!("the unit runs {product} V{version}");
-                    self.end(desk, Verdict::Done, UnitNow::Application, what)
-                } else {
-                    let sent = image.map_or_else(String::new, |image| {
-                        format!(", but {} V{} was sent", image.product, image.version)
-                    });
-                    let what = format!("the unit runs {product} V{version}{sent}");
-                    self.end(desk, Verdict::WrongApplication, UnitNow::Application, what)
                 }
             }
             _ if self.after.application && !matches!(self.stage, Stage::AskVersion(_)) => {
@@ -461,10 +460,14 @@ impl Upload {
     }
 
     fn report_progress(&mut self, desk: &mut Desk<'_>) {
+        self.report_progress_of(self.phase(), desk);
+    }
+
+    fn report_progress_of(&mut self, phase: Phase, desk: &mut Desk<'_>) {
         let Some(transfer) = &self.transfer else { return };
         let (records, bytes, bytes_total) = transfer.taken();
         let progress = Progress {
-            phase: self.phase(),
+            phase,
             records,
             records_total: transfer.sent().1,
             bytes,

@@ -124,11 +124,12 @@ fn an_upload_in_json_is_progress_line_by_line_and_then_the_verdict() {
     assert_eq!(verdict["records"], verdict["records_total"]);
     let phases: Vec<&str> = progress.iter().filter_map(|object| object["phase"].as_str()).collect();
     assert!(progress.iter().all(|object| object["schema"] == "axcon.progress/1"));
-    for phase in ["enter-loader", "transfer", "finish"] {
+    for phase in ["enter-loader", "transfer", "finish", "verify"] {
         assert!(phases.contains(&phase), "{phases:?}");
     }
     let bytes: Vec<u64> = progress.iter().filter_map(|object| object["bytes"].as_u64()).collect();
     assert!(bytes.is_sorted(), "{bytes:?}");
+    assert_eq!(bytes.last().copied(), progress[0]["bytes_total"].as_u64());
 }
 
 #[test]
