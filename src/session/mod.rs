@@ -21,7 +21,7 @@ use crate::endpoint::{Endpoint, Secrecy, Transmit};
 use crate::record::{Direction, Record, Span};
 use crate::time::character_time;
 use crate::time::{Duration, Instant};
-use crate::wire::{Framer, Item, LoaderText, Message, NmtState, Prompt, Text, Vocabulary};
+use crate::wire::{Confidence, Framer, Item, LoaderText, Message, NmtState, Prompt, Text, Vocabulary};
 use job::{Desk, Signal, Work};
 use transmitter::Transmitter;
 
@@ -298,7 +298,10 @@ impl Session {
                 }
             }
             Message::Software(name) => {
-                facts.state = UnitState::Application;
+                // Three numbers with points between them are not enough to make a unit of whatever talks there.
+                if name.product.is_some() || name.confidence > Confidence::Bare {
+                    facts.state = UnitState::Application;
+                }
                 if let Some(product) = &name.product {
                     facts.product = Some(Known { value: product.clone(), origin, span });
                 }
@@ -307,7 +310,6 @@ impl Session {
                 }
             }
             Message::Network(network) => {
-                facts.state = UnitState::Application;
                 if let Some(value) = network.node_id {
                     facts.node_id = Some(Known { value, origin, span });
                 }

@@ -35,7 +35,7 @@ pub enum Item {
 pub struct Text {
     /// Where, line end excluded.
     pub span: Span,
-    /// Printable characters; whatever is not UTF-8 shows as U+FFFD.
+    /// Printable characters; damage (not UTF-8, or a control character) shows as U+FFFD.
     pub text: String,
 }
 
@@ -158,10 +158,16 @@ fn moves_cursor(escape: Escape, byte: u8) -> bool {
     )
 }
 
-/// Bytes as text: no control characters, tabs as blanks.
+/// Bytes as text: tabs as blanks; NUL and BEL, which old devices send between words, left out; any other control
+/// character is damage, and shows as what is not UTF-8 does.
 fn clean(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(bytes);
-    text.chars().filter_map(|c| if c == '\t' { Some(' ') } else { (!c.is_control()).then_some(c) }).collect()
+    let shown = |c: char| match c {
+        '\t' => Some(' '),
+        '\0' | '\u{7}' => None,
+        c if c.is_control() => Some(char::REPLACEMENT_CHARACTER),
+        c => Some(c),
+    };
+    String::from_utf8_lossy(bytes).chars().filter_map(shown).collect()
 }
 
 #[cfg(test)]

@@ -150,7 +150,8 @@ fn can_kbps(words: &Words) -> Option<u16> {
     let list: Vec<&str> = words.iter().collect();
     let speaks_of_rate = words.has_any(&["baud", "kbit", "kbps", "kbaud", "kb", "mbit", "mbps", "bitrate"])
         || words.has_all(&["bit", "rate"])
-        || list.iter().any(|word| word.ends_with("kbit") || word.ends_with("kbps") || word.ends_with("k"));
+        || list.windows(2).any(|pair| pair == ["bit", "s"])
+        || list.iter().any(|word| word.ends_with("kbit") || word.ends_with("bps"));
     if !speaks_of_rate {
         return None;
     }

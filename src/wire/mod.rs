@@ -61,6 +61,10 @@ impl Vocabulary<'_> {
         if let Some(text) = boot::recognise(line, &words) {
             return Message::Loader(text);
         }
+        // A wrong line rate, or another device, sends damaged text without end: what is damaged proves nothing.
+        if line.contains(char::REPLACEMENT_CHARACTER) {
+            return Message::Text;
+        }
         if words.has_all(&["first", "start"]) && words.has_any(&["performing", "initialization", "initialisation"]) {
             return Message::FirstStart;
         }

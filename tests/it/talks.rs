@@ -1,6 +1,7 @@
 //! Stories of talks with the firmware: console and unit on one cable, in virtual time.
 
 use axcon::endpoint::Endpoint;
+use axcon::rng::Rng;
 use axcon::session::{Command, Event, Job, Outcome, Session, UnitState};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
@@ -145,4 +146,28 @@ fn a_job_given_while_the_unit_is_being_asked_who_it_is_begins_behind_that() {
     assert_eq!(bench.outcome(), Outcome::Cancelled(Job::StreamOff));
     assert_eq!(bench.outcome(), Outcome::Identified);
     assert_eq!(bench.session.facts().stream, Some(Source::FieldValue), "what was cancelled has not begun");
+}
+
+#[test]
+fn noise_is_never_taken_for_a_unit() {
+    for seed in 0..40 {
+        let mut rng = Rng::new(seed).fork("noise");
+        let mut session = Session::new(115_200);
+        let mut now = Instant::ZERO;
+        session.command(now, Command::Identify).expect("taken");
+        let mut ended = false;
+        // As fast as a pseudo-terminal lets a stranger talk, for as long as the question takes.
+        while !ended {
+            now += Duration::from_millis(10);
+            let noise: Vec<u8> = (0..1000).map(|_| rng.next_u64() as u8).collect();
+            session.handle_bytes(now, &noise);
+            session.handle_timeout(now);
+            while session.poll_transmit().is_some() {}
+            while let Some(event) = session.poll_event() {
+                ended |= matches!(event, Event::Finished(Outcome::Identified));
+            }
+            assert!(now < Instant::from_millis(10_000), "an end");
+        }
+        assert_eq!(session.facts().state, UnitState::Unknown, "seed {seed}: {:?}", session.facts());
+    }
 }
