@@ -14,7 +14,7 @@ use super::transfer::{Stall, Transfer};
 use crate::device::Product;
 use crate::time::{Duration, Instant};
 use crate::version::Version;
-use crate::wire::{Confidence, LoaderText, Message, Prompt, Text};
+use crate::wire::{Confidence, LoaderText, Message, Prompt, Text, visible};
 
 /// How long the unit may take to ask for the password.
 const PASSWORD_PROMPT: Duration = Duration::from_millis(2500);
@@ -517,7 +517,7 @@ impl Upload {
 
     fn quote(&mut self, text: &Text, message: &Message) {
         if !matches!(message, Message::Row(_)) {
-            self.heard = text.text.trim().chars().take(QUOTED).collect();
+            self.heard = visible::line(text.text.trim().as_bytes()).chars().take(QUOTED).collect();
         }
     }
 }
