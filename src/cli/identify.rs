@@ -126,6 +126,5 @@ fn source<T>(known: &Option<Known<T>>) -> Option<&'static str> {
     known.as_ref().map(|known| match known.origin {
         Origin::Banner => "banner",
         Origin::Menu => "menu",
-        Origin::Text => "text",
     })
 }

@@ -184,8 +184,6 @@ pub enum Origin {
     Banner,
     /// The main menu, printed on request.
     Menu,
-    /// Some other text of the unit.
-    Text,
 }
 
 /// Who is talking at the other end.

@@ -322,7 +322,9 @@ impl Load {
         let mut rows = vec![lines::rule(theme, area.width, "Loading", &name), Line::default()];
         let progress = scene.view.load.progress;
         let current = progress.map_or(Phase::Check, |progress| progress.phase);
-        for (phase, words) in PHASES {
+        // A loader that erases page by page has no step for it.
+        let steps = PHASES.into_iter().filter(|(phase, _)| *phase != Phase::Erase || current == Phase::Erase);
+        for (phase, words) in steps {
             let (mark, style) = match phase.cmp(&current) {
                 std::cmp::Ordering::Less => ("done", theme.quiet()),
                 std::cmp::Ordering::Equal => ("now", theme.strong()),

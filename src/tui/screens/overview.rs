@@ -197,7 +197,6 @@ fn known<T>(fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -> Span<'stati
             let origin = match known.origin {
                 Origin::Banner => "banner",
                 Origin::Menu => "menu",
-                Origin::Text => "text",
             };
             Span::raw(format!("{} ({origin})", show(&known.value)))
         }
