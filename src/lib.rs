@@ -22,6 +22,8 @@ pub mod wire;
 
 pub mod image;
 
+pub mod canopen;
+
 pub mod device;
 
 pub mod session;

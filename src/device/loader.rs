@@ -12,16 +12,19 @@ use serde::Deserialize;
 pub enum LoaderKind {
     /// SDK, 2000-2004: one page buffer, one parked record, XOFF when the data crosses into another page.
     G1,
+    /// Circular buffer, 2005 and later: XOFF behind every record.
+    G3,
 }
 
 impl LoaderKind {
     /// All kinds, for the command line.
-    pub const ALL: [LoaderKind; 1] = [LoaderKind::G1];
+    pub const ALL: [LoaderKind; 2] = [LoaderKind::G1, LoaderKind::G3];
 
     /// The name the command line and the product files use.
     pub const fn name(self) -> &'static str {
         match self {
             LoaderKind::G1 => "g1",
+            LoaderKind::G3 => "g3",
         }
     }
 }

@@ -3,8 +3,10 @@
 //! Shared by both ends of the cable, so it holds only what a manual (or a public fact) says, never what one side does
 //! about it. What is not known is left out here and treated as unknown there.
 
+pub mod dictionary;
 mod loader;
 
+pub use dictionary::Dictionary;
 pub use loader::LoaderKind;
 
 use std::sync::OnceLock;
@@ -33,10 +35,15 @@ pub struct Product {
     pub console: Console,
     /// Rows of the data stream.
     pub stream: stream::Layout,
+    /// How it measures.
+    pub measurement: Measurement,
     /// Program flash.
     pub flash: FlashMap,
     /// The bootloader.
     pub loader: Loader,
+    /// The object dictionary.
+    #[serde(skip)]
+    pub dictionary: Dictionary,
 }
 
 /// Identity and factory settings on the CAN side.
@@ -85,8 +92,46 @@ pub struct Console {
     pub defaults_answer: String,
     /// What the bootloader prints when it wants a file.
     pub loader_prompt: String,
+    /// What the bootloader prints when it has taken a file.
+    pub loaded: Option<String>,
     /// What the new software prints when it runs for the first time.
-    pub first_start: String,
+    pub first_start: Option<String>,
+}
+
+/// How a product measures.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measurement {
+    /// What is connected to its inputs.
+    pub sensors: SensorKind,
+    /// Number of inputs.
+    pub channels: u8,
+    /// From power-up to the first values, in ms; it is not operational before either.
+    pub first_data_ms: u16,
+    /// What becomes of an NMT start in that time.
+    pub early_start: EarlyStart,
+    /// Shortest and longest repetition time of the stream in ms.
+    pub stream_period_ms: (u16, u16),
+}
+
+/// What is connected to a product's inputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SensorKind {
+    /// Thermocouples, with a cold junction in the unit.
+    Thermocouple,
+    /// Resistance temperature detectors with 2, 3 or 4 wires.
+    Rtd,
+}
+
+/// What becomes of an NMT start that comes before the first values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EarlyStart {
+    /// It is carried out when the values are there.
+    Deferred,
+    /// It is lost.
+    Ignored,
 }
 
 /// The bootloader.
@@ -95,6 +140,8 @@ pub struct Console {
 pub struct Loader {
     /// The kind that is believed to be in the unit.
     pub kind: LoaderKind,
+    /// Whether it waits for any key before it wants the file.
+    pub asks_for_key: bool,
     /// How upload files are named, `{version}` standing for the version.
     pub file_name: String,
 }
@@ -130,7 +177,8 @@ impl Product {
     }
 }
 
-const FILES: [(&str, &str); 1] = [("axtc4co.toml", include_str!("axtc4co.toml"))];
+const FILES: [(&str, &str); 2] =
+    [("axtc4co.toml", include_str!("axtc4co.toml")), ("axrtd8co.toml", include_str!("axrtd8co.toml"))];
 
 #[cfg(test)]
 mod tests {

@@ -13,6 +13,7 @@ pub mod cable;
 mod dialect;
 mod firmware;
 pub mod memory;
+pub mod objects;
 pub mod sensors;
 mod uart;
 
@@ -289,7 +290,7 @@ impl Unit {
                 (Some(identity), _) => {
                     Program::Application(Box::new(Firmware::start(board, identity, Dialect::plain())))
                 }
-                (None, LoaderKind::G1) => Program::Loader(Box::new(Bootloader::start(board))),
+                (None, LoaderKind::G1 | LoaderKind::G3) => Program::Loader(Box::new(Bootloader::start(board))),
             }
         });
     }

@@ -102,8 +102,9 @@ impl Firmware {
         };
         if board.parameters.values().first_start {
             // The manual prints one ellipsis character, an ASCII port can only send dots (errata E-114).
-            let text = board.product.console.first_start.replace('…', "...");
-            firmware.say(board, &format!("\r\n{text}\r\n"));
+            if let Some(text) = &board.product.console.first_start {
+                firmware.say(board, &format!("\r\n{}\r\n", text.replace('…', "...")));
+            }
             board.parameters.change(board.stores, |values| values.first_start = false);
         }
         let banner = firmware.dialect.banner(&firmware.identity, &board.product.title);
