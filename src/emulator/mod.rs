@@ -12,6 +12,7 @@ mod bootloader;
 pub mod cable;
 mod dialect;
 mod firmware;
+pub mod knob;
 pub mod memory;
 pub mod objects;
 pub mod sensors;
