@@ -129,6 +129,15 @@ fn the_picture_in_the_readme_is_one_the_program_draws() {
     assert!(readme.contains(picture), "the README shows another picture than the program draws:\n{picture}");
 }
 
+/// All source files and tests with their text, by their paths from the repository's root.
+pub fn sources_and_tests() -> Vec<(String, String)> {
+    sources()
+        .into_iter()
+        .chain(files("tests", "rs"))
+        .map(|(path, text)| (path.to_string_lossy().into_owned(), text))
+        .collect()
+}
+
 fn sources() -> Vec<(PathBuf, String)> {
     files("src", "rs")
 }
