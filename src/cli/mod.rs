@@ -1,6 +1,9 @@
 //! The command line: what can be asked for, and where each answer is made.
 
+pub mod confirm;
 pub mod console;
+pub mod defaults;
+pub mod diagnostics;
 pub mod emulate;
 pub mod error;
 pub mod identify;
@@ -65,6 +68,10 @@ enum Command {
     Identify(identify::Args),
     /// Switch the data stream on and write it down.
     Stream(stream::Args),
+    /// Read the unit's diagnostics pages.
+    Diagnostics(diagnostics::Args),
+    /// Restore the factory's object dictionary.
+    Defaults(defaults::Args),
     /// Check an image, upload it, and verify the new banner.
     Load(load::Args),
     /// A plain terminal: keys out, bytes in.
@@ -96,6 +103,8 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Ports(args)) => ports::run(args, global, output),
         Some(Command::Identify(args)) => identify::run(args, global, output),
         Some(Command::Stream(args)) => stream::run(args, global, output),
+        Some(Command::Diagnostics(args)) => diagnostics::run(args, global, output),
+        Some(Command::Defaults(args)) => defaults::run(args, global, output),
         Some(Command::Load(args)) => load::run(args, global, output),
         Some(Command::Terminal(args)) => terminal::run(args, global, output),
         Some(Command::Emulate(args)) => emulate::run(args, global, output),

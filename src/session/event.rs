@@ -7,6 +7,7 @@ use crate::record::Span;
 use crate::secret::Secret;
 use crate::time::{Duration, Instant};
 use crate::version::Version;
+use crate::wire::Text;
 use crate::wire::stream::{Row, Source};
 
 /// What the user wants of the unit. One job runs at a time, and one more may be given while it is being found out who is
@@ -29,6 +30,11 @@ pub enum Command {
     StreamOff,
     /// Restore the default object dictionary; the unit resets itself (AXTC4CO manual, section 4.1.2).
     RestoreDefaults,
+    /// Read pages of diagnostics: so many, or until it is cancelled; then no more come.
+    Diagnostics {
+        /// How many.
+        pages: Option<u32>,
+    },
     /// Upload new software.
     Load(Box<LoadOrder>),
     /// End the running job as soon as that is safe, and say what the unit is now.
@@ -57,6 +63,8 @@ pub enum Job {
     StreamOff,
     /// [`Command::RestoreDefaults`].
     RestoreDefaults,
+    /// [`Command::Diagnostics`].
+    Diagnostics,
     /// [`Command::Load`].
     Load,
 }
@@ -98,6 +106,13 @@ pub enum Event {
         span: Span,
         /// What it says.
         row: Row,
+    },
+    /// A page of diagnostics is complete.
+    Page {
+        /// When its last line came.
+        at: Instant,
+        /// Its lines, as printed.
+        lines: Vec<Text>,
     },
     /// What is known of the unit has changed: see `Session::facts`.
     FactsChanged,

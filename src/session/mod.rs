@@ -5,6 +5,7 @@
 //! through bytes. Whatever a job does, the lines and rows go out as events as well.
 
 mod console;
+mod diagnostics;
 mod event;
 mod identify;
 mod job;
@@ -114,6 +115,7 @@ impl Session {
             }
             Command::StreamOff => (Job::StreamOff, Box::new(console::StreamOff::default())),
             Command::RestoreDefaults => (Job::RestoreDefaults, Box::new(console::RestoreDefaults::default())),
+            Command::Diagnostics { pages } => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::new(pages))),
             Command::Load(order) => {
                 let password = order.password.reveal();
                 if password.is_empty() || password.iter().any(u8::is_ascii_control) {

@@ -457,6 +457,7 @@ impl App {
             Command::StreamOn { .. } => Some(Job::StreamOn),
             Command::StreamOff => Some(Job::StreamOff),
             Command::RestoreDefaults => Some(Job::RestoreDefaults),
+            Command::Diagnostics { .. } => Some(Job::Diagnostics),
             Command::Load(_) => Some(Job::Load),
         };
         let leaves_view = matches!(&command, Command::Keys(keys) if keys.iter().any(|key| b"xX".contains(key)));

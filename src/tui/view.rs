@@ -160,7 +160,7 @@ impl View {
     /// Takes in one event; `facts` are the session's at that moment.
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         match event {
-            Event::Heard { .. } => {}
+            Event::Heard { .. } | Event::Page { .. } => {}
             Event::Row { at, row, .. } => self.row(*at, row),
             Event::FactsChanged => self.facts_changed(facts),
             Event::Held(true) => self.load.held_since = Some(now),
@@ -340,6 +340,7 @@ pub fn doing(job: Job) -> &'static str {
         Job::StreamOn => "switching the stream on",
         Job::StreamOff => "switching the stream off",
         Job::RestoreDefaults => "restoring the defaults",
+        Job::Diagnostics => "reading the diagnostics",
         Job::Load => "loading new software",
     }
 }
@@ -350,6 +351,7 @@ fn done(job: Job) -> &'static str {
         Job::StreamOn => "The stream is on, also after a power cycle, until T switches it off.",
         Job::StreamOff => "The stream is off.",
         Job::RestoreDefaults => "The defaults are restored and the unit has restarted.",
+        Job::Diagnostics => "The diagnostics are off.",
         Job::Load => "The upload has ended.",
     }
 }

@@ -5,6 +5,7 @@
 //! is unknown, so recognition goes by words and numbers, never by position or layout.
 
 mod boot;
+pub mod diagnostics;
 mod framer;
 mod menu;
 mod prompt;

@@ -88,6 +88,67 @@ fn the_defaults_are_restored_by_yes_and_the_unit_comes_back() {
     assert_eq!(bench.ask(Command::RestoreDefaults), Outcome::Done(Job::RestoreDefaults), "{}", bench.transcript());
 }
 
+/// Pages of diagnostics within a time, as their lines.
+fn pages_within(bench: &mut Bench, time: Duration) -> Vec<Vec<String>> {
+    let mut pages = Vec::new();
+    let end = bench.now + time;
+    bench.run_until(end, |event| {
+        if let Event::Page { lines, .. } = event {
+            pages.push(lines.iter().map(|line| line.text.clone()).collect());
+        }
+        false
+    });
+    pages
+}
+
+#[test]
+fn diagnostics_are_read_page_by_page_and_stopped_whether_they_ran_before_or_not() {
+    for (runs_before, streams) in [(false, false), (true, false), (false, true), (true, true)] {
+        let mut bench = Bench::new();
+        bench.run_for(Duration::from_secs(4));
+        if streams {
+            bench.ask(Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(20) });
+        }
+        if runs_before {
+            bench.command(Command::Keys(b"s".to_vec()));
+            bench.run_for(Duration::from_millis(2300));
+        }
+        bench.command(Command::Diagnostics { pages: Some(3) });
+        let pages = pages_within(&mut bench, Duration::from_secs(12));
+        assert_eq!(pages.len(), 3, "{runs_before} {streams}: {pages:?}");
+        assert!(pages.iter().all(|page| page.iter().any(|line| line.contains("Supply"))), "{pages:?}");
+        assert!(pages.iter().flatten().all(|line| !line.contains(';')), "no row is taken for a line: {pages:?}");
+        assert_eq!(bench.session.job(), None, "the job has ended");
+        let before = bench.transcript().matches("Supply").count();
+        bench.run_for(Duration::from_secs(5));
+        assert_eq!(bench.transcript().matches("Supply").count(), before, "no page comes any more");
+    }
+}
+
+#[test]
+fn diagnostics_that_are_cancelled_at_any_moment_are_off_afterwards() {
+    for moment_ms in (0..4_500).step_by(130) {
+        let mut bench = Bench::new();
+        bench.run_for(Duration::from_secs(4));
+        bench.command(Command::Diagnostics { pages: None });
+        bench.run_for(Duration::from_millis(moment_ms));
+        let outcome = bench.ask(Command::Cancel);
+        assert_eq!(outcome, Outcome::Cancelled(Job::Diagnostics), "cancelled after {moment_ms} ms");
+        let before = bench.transcript().matches("Supply").count();
+        bench.run_for(Duration::from_secs(3));
+        assert_eq!(bench.transcript().matches("Supply").count(), before, "cancelled after {moment_ms} ms");
+    }
+}
+
+#[test]
+fn a_unit_without_diagnostics_ends_the_wait() {
+    let mut bench = Bench::new();
+    bench.disturb(|_, byte| if byte == b's' { Vec::new() } else { vec![byte] });
+    bench.run_for(Duration::from_secs(4));
+    let outcome = bench.ask(Command::Diagnostics { pages: Some(1) });
+    assert!(matches!(outcome, Outcome::NoAnswer { job: Job::Diagnostics, .. }), "{outcome:?}");
+}
+
 #[test]
 fn a_password_typed_by_hand_is_secret_too() {
     let mut bench = Bench::new();

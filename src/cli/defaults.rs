@@ -1,0 +1,56 @@
+//! `axcon defaults`: the factory's object dictionary, through the unit's own D.
+
+use serde::Serialize;
+
+use super::Global;
+use super::confirm::confirm;
+use super::error::{CliError, Kind};
+use super::output::Output;
+use super::talk::{Talk, expect_done};
+use crate::session::{Command, Outcome};
+
+/// Arguments of `axcon defaults`.
+///
+/// All parameters go back to their factory values at once and the unit resets itself; node-ID, CAN bit rate and the
+/// settings of the stream stay. It is done when the unit's new banner has been seen.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+#[derive(Serialize)]
+struct Object<'a> {
+    schema: &'static str,
+    product: Option<&'a str>,
+    version: Option<String>,
+    node_id: Option<u8>,
+}
+
+/// Restores the defaults.
+///
+/// # Errors
+/// If nobody said yes, no unit answers, or its banner does not come back.
+pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    confirm("All parameters go back to their factory values and the unit resets itself", global, output)?;
+    let mut talk = Talk::open(global, output)?;
+    talk.find_application()?;
+    let result = match talk.ask(Command::RestoreDefaults)? {
+        Outcome::NoAnswer { awaited: awaited @ "the banner after the reset", .. } => {
+            let message = format!("the answer Yes has been given, but {awaited} did not come");
+            Err(CliError::message(Kind::NoAnswer, message)
+                .hint("'axcon identify' says whether the unit runs; 'axcon dictionary dump' shows its parameters"))
+        }
+        outcome => expect_done(outcome),
+    };
+    let facts = talk.session().facts().clone();
+    talk.close(output);
+    result?;
+    let product = facts.product.as_ref().map(|known| known.value.as_str());
+    let version = facts.version.as_ref().map(|known| known.value.to_string());
+    if output.json {
+        let node_id = facts.node_id.as_ref().map(|known| known.value);
+        return output.object(&Object { schema: "axcon.defaults/1", product, version, node_id });
+    }
+    let unit = product.unwrap_or("the unit");
+    let version = version.map(|version| format!(" V{version}")).unwrap_or_default();
+    output.remark(&format!("axcon: the defaults are restored; {unit}{version} has started anew"));
+    Ok(())
+}

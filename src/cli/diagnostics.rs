@@ -1,0 +1,88 @@
+//! `axcon diagnostics`: the unit's own pages, and the numbers on them.
+
+use serde::Serialize;
+
+use super::Global;
+use super::error::{CliError, Kind};
+use super::output::{Closed, Output};
+use super::talk::{Ended, Talk, expect_done};
+use crate::session::{Command, Event};
+use crate::wire::{diagnostics, visible};
+
+/// Arguments of `axcon diagnostics`.
+///
+/// Pages are shown as the unit prints them, one a second, until it is enough or Ctrl-C; then no more come.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// End after N pages.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    count: Option<u32>,
+    /// How pages are written. JSON if --json is given: one object a page, with the numbers found on it.
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    Text,
+    Json,
+}
+
+#[derive(Serialize)]
+struct PageObject {
+    schema: &'static str,
+    time: String,
+    lines: Vec<String>,
+    values: Vec<ValueObject>,
+}
+
+#[derive(Serialize)]
+struct ValueObject {
+    label: String,
+    value: f64,
+    unit: Option<String>,
+}
+
+/// Reads pages.
+///
+/// # Errors
+/// If no unit answers, or shows no pages.
+pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let json = args.format.unwrap_or(if output.json { Format::Json } else { Format::Text }) == Format::Json;
+    let mut talk = Talk::open(global, output)?;
+    talk.find_application()?;
+    let clock = talk.clock();
+    let mut written = Ok(());
+    let ended = talk.run(Command::Diagnostics { pages: args.count }, |_, event| {
+        let Event::Page { at, lines } = event else { return Ok(()) };
+        // Whatever becomes of our output, the unit's pages have to be stopped: the job goes on to its end.
+        if written.is_err() {
+            return Ok(());
+        }
+        let lines: Vec<String> = lines.iter().map(|line| visible::line(line.text.trim_end().as_bytes())).collect();
+        written = if json {
+            let values = lines.iter().flat_map(|line| diagnostics::quantities(line)).map(|quantity| ValueObject {
+                label: quantity.label,
+                value: quantity.value,
+                unit: quantity.unit,
+            });
+            let time = clock.wall(*at).strftime("%Y-%m-%dT%H:%M:%S%.3fZ").to_string();
+            output.object(&PageObject { schema: "axcon.diagnostics/1", time, values: values.collect(), lines })
+        } else {
+            output.data(format!("{}\n\n", lines.join("\n")).as_bytes())
+        };
+        Ok(())
+    });
+    talk.close(output);
+    match written {
+        Err(error) if !error.error.is::<Closed>() => return Err(error),
+        Ok(()) | Err(_) => {}
+    }
+    match ended? {
+        // Without a count, the interrupt is the way to end.
+        Ended::Finished { interrupted: true, .. } if args.count.is_none() => Ok(()),
+        Ended::Finished { interrupted: true, .. } => Err(CliError::message(Kind::Interrupted, "interrupted")),
+        Ended::Finished { outcome, interrupted: false } => expect_done(outcome),
+        Ended::Lost { error, .. } => Err(error),
+    }
+}

@@ -1,0 +1,193 @@
+//! Reading diagnostics: S switches pages on that come every second, and off again (AXTC4CO manual, section 4.1.4).
+//!
+//! The key only toggles, and nothing a unit prints is known to say which way. So the pages themselves are the evidence:
+//! what comes in one go, has numbers in it and comes again. Pages that come already are joined; when it is enough, S
+//! is pressed until they have stopped.
+
+use super::event::{Event, Job, Outcome};
+use super::job::{Desk, Signal, Work};
+use crate::record::Span;
+use crate::time::{Duration, Instant};
+use crate::wire::{Message, Prompt, Text, diagnostics};
+
+/// How long to look for pages that come already: one comes every second.
+const WATCH: Duration = Duration::from_millis(1300);
+/// How long the first page may take: a unit has no values for up to 5 s behind its power-up (AXRTD8CO manual,
+/// section 1.1).
+const FIRST_PAGE: Duration = Duration::from_millis(6500);
+/// How long the next page may take.
+const NEXT_PAGE: Duration = Duration::from_millis(2500);
+/// Silence that ends a page: lines follow each other within a millisecond, an adapter adds some 20.
+const QUIET: Duration = Duration::from_millis(200);
+/// Time without a page behind the key that stops them.
+const STOPPED: Duration = Duration::from_millis(1500);
+/// A page that comes so soon behind that key was under way before it.
+const UNDER_WAY: Duration = Duration::from_millis(700);
+/// How often the key is pressed to stop them.
+const MOST_STOPS: u32 = 3;
+/// Lines of a page at most; more than a screen at 200x60 shows.
+const MOST_LINES: usize = 200;
+
+/// The job.
+#[derive(Debug)]
+pub(super) struct Diagnostics {
+    /// Pages wanted; `None` for as many as come until the job is cancelled.
+    wanted: Option<u32>,
+    taken: u32,
+    stage: Stage,
+    page: Vec<Text>,
+    page_at: Instant,
+    /// When the page counts as complete.
+    page_due: Option<Instant>,
+    deadline: Option<Instant>,
+    heard: Option<Span>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// Pages may come already.
+    Watching,
+    /// The key is out.
+    Asked,
+    /// Pages come.
+    Reading,
+    /// The key is out that stops them, pressed so often.
+    Stopping { presses: u32, at: Instant, cancelled: bool },
+}
+
+impl Diagnostics {
+    pub(super) fn new(wanted: Option<u32>) -> Self {
+        Diagnostics {
+            wanted,
+            taken: 0,
+            stage: Stage::Watching,
+            page: Vec::new(),
+            page_at: Instant::ZERO,
+            page_due: None,
+            deadline: None,
+            heard: None,
+        }
+    }
+
+    /// A line that may be part of a page.
+    fn line(&mut self, text: &Text, now: Instant) {
+        self.heard = Some(text.span);
+        if self.page.len() < MOST_LINES {
+            self.page.push(text.clone());
+        }
+        self.page_at = now;
+        self.page_due = Some(now + QUIET);
+    }
+
+    /// Nothing has followed for a while: what has come is a page if it shows numbers.
+    fn page_complete(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.page_due = None;
+        let mut lines = std::mem::take(&mut self.page);
+        if let Some(text) = desk.pending {
+            lines.push(text.clone());
+            // It has been read: what is painted over it is the next page.
+            desk.cut = true;
+        }
+        if !lines.iter().any(|line| !diagnostics::quantities(&line.text).is_empty()) {
+            return None;
+        }
+        match self.stage {
+            Stage::Stopping { at, .. } if desk.now.since(at) < UNDER_WAY => {
+                self.deadline = Some(desk.now + STOPPED);
+                None
+            }
+            // The key was lost, or went the other way.
+            Stage::Stopping { presses: MOST_STOPS, .. } => {
+                let awaited = "the end of the diagnostics";
+                Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
+            }
+            Stage::Stopping { presses, cancelled, .. } => {
+                self.stop(desk, presses + 1, cancelled);
+                None
+            }
+            Stage::Watching | Stage::Asked | Stage::Reading => {
+                self.stage = Stage::Reading;
+                self.deadline = Some(desk.now + NEXT_PAGE);
+                self.taken += 1;
+                desk.events.push_back(Event::Page { at: self.page_at, lines });
+                if self.wanted.is_some_and(|wanted| self.taken >= wanted) {
+                    self.stop(desk, 1, false);
+                }
+                None
+            }
+        }
+    }
+
+    fn stop(&mut self, desk: &mut Desk<'_>, presses: u32, cancelled: bool) {
+        desk.send(b"s");
+        self.stage = Stage::Stopping { presses, at: desk.now, cancelled };
+        self.deadline = Some(desk.now + STOPPED);
+    }
+
+    fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let job = Job::Diagnostics;
+        match self.stage {
+            Stage::Watching => {
+                desk.send(b"s");
+                self.stage = Stage::Asked;
+                self.deadline = Some(desk.now + FIRST_PAGE);
+                None
+            }
+            Stage::Asked => {
+                if desk.pending.is_some() {
+                    desk.leave_dialogue();
+                }
+                Some(Outcome::NoAnswer { job, awaited: "a page of diagnostics", heard: self.heard })
+            }
+            // What looked like a page before the key was none, or somebody has stopped them.
+            Stage::Reading if self.taken == 1 => {
+                desk.send(b"s");
+                self.stage = Stage::Asked;
+                self.deadline = Some(desk.now + FIRST_PAGE);
+                None
+            }
+            Stage::Reading => Some(Outcome::NoAnswer { job, awaited: "the next page", heard: self.heard }),
+            Stage::Stopping { cancelled: true, .. } => Some(Outcome::Cancelled(job)),
+            Stage::Stopping { .. } => Some(Outcome::Done(job)),
+        }
+    }
+}
+
+impl Work for Diagnostics {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Begin => {
+                self.deadline = Some(desk.now + WATCH);
+                None
+            }
+            // A question is none of a page's lines; it is not ours to answer.
+            Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults)) => {
+                desk.leave_dialogue();
+                let awaited = "a page of diagnostics";
+                Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
+            }
+            Signal::Heard(_, Message::Row(_) | Message::Prompt(_)) => None,
+            Signal::Heard(text, _) => {
+                self.line(text, desk.now);
+                None
+            }
+            Signal::Hold(_) => None,
+            Signal::Tick if self.page_due.is_some_and(|due| due <= desk.now) => self.page_complete(desk),
+            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.time_is_up(desk),
+            Signal::Tick => None,
+            Signal::Cancel => match self.stage {
+                Stage::Watching => Some(Outcome::Cancelled(Job::Diagnostics)),
+                Stage::Asked | Stage::Reading => {
+                    self.stop(desk, 1, true);
+                    None
+                }
+                Stage::Stopping { .. } => None,
+            },
+            Signal::LinkLost => Some(Outcome::Cancelled(Job::Diagnostics)),
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        [self.page_due, self.deadline].into_iter().flatten().min()
+    }
+}

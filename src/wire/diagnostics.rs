@@ -1,0 +1,123 @@
+//! Pages of diagnostics, which S shows every second (AXTC4CO manual, section 4.1.4).
+//!
+//! What a page shows is lost with the manual's figures, so nothing is expected of it: wherever a line puts a number
+//! behind words, that is a quantity with its label. The page itself stays as printed.
+
+/// A number on a page, and what the page calls it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quantity {
+    /// The words before it; those of the line's first quantity stand before the further ones.
+    pub label: String,
+    /// The number.
+    pub value: f64,
+    /// The unit behind it, as printed, if the word behind it is one.
+    pub unit: Option<String>,
+}
+
+/// Units as pages write them, in lower case, `µ` as `u`.
+const UNITS: [&str; 22] = [
+    "v", "mv", "uv", "a", "ma", "c", "°c", "degc", "deg", "f", "°f", "ohm", "ohms", "Ω", "ms", "s", "us", "%", "hz",
+    "kbit/s", "kbps", "w",
+];
+
+/// Quantities of one line a page may have; a line is not longer than the framer lets it be.
+const MOST_QUANTITIES: usize = 64;
+
+/// The quantities a line shows, in its order. A time like `0:01:02` and an address are none.
+pub fn quantities(line: &str) -> Vec<Quantity> {
+    let mut found: Vec<Quantity> = Vec::new();
+    let mut label: Vec<&str> = Vec::new();
+    let mut words = line.split([' ', '\t', '=', '|', ';', ',']).map(bare).filter(|word| !word.is_empty()).peekable();
+    while let Some(word) = words.next() {
+        let Some((value, glued)) = number(word) else {
+            label.push(word);
+            continue;
+        };
+        let unit = match glued {
+            Some(unit) => Some(unit.to_owned()),
+            None => words.next_if(|next| is_unit(next)).map(str::to_owned),
+        };
+        if label.is_empty() && found.is_empty() {
+            // A number that nothing names is no quantity, but may be part of a name: `2 Supply`.
+            label.push(word);
+            continue;
+        }
+        let first = found.first().map(|quantity| quantity.label.as_str());
+        let label: Vec<&str> = first.into_iter().chain(std::mem::take(&mut label)).collect();
+        found.push(Quantity { label: label.join(" "), value, unit });
+        if found.len() == MOST_QUANTITIES {
+            break;
+        }
+    }
+    found
+}
+
+/// A word without the signs around it.
+fn bare(word: &str) -> &str {
+    let word = word.trim_matches(['(', ')', '[', ']', '<', '>', '*', '"', '\'']);
+    word.trim_end_matches([':', '.']).trim_start_matches([':', '.'])
+}
+
+/// A decimal number, and a unit that is glued to it: `24.1V`.
+fn number(word: &str) -> Option<(f64, Option<&str>)> {
+    let end = word.find(|c: char| !matches!(c, '0'..='9' | '.' | '+' | '-')).unwrap_or(word.len());
+    let (digits, rest) = word.split_at(end);
+    if !digits.contains(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    let value: f64 = digits.parse().ok()?;
+    match rest {
+        "" => Some((value, None)),
+        unit if is_unit(unit) => Some((value, Some(unit))),
+        _ => None,
+    }
+}
+
+fn is_unit(word: &str) -> bool {
+    let word = word.to_lowercase().replace(['µ', 'μ'], "u");
+    UNITS.iter().any(|unit| *unit == word || unit.to_lowercase() == word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn read(line: &str) -> Vec<(String, f64, Option<String>)> {
+        quantities(line).into_iter().map(|quantity| (quantity.label, quantity.value, quantity.unit)).collect()
+    }
+
+    #[test]
+    fn numbers_are_found_with_what_the_page_calls_them() {
+        let quantity = |label: &str, value, unit: Option<&str>| (label.to_owned(), value, unit.map(str::to_owned));
+        let table = [
+            ("Supply Voltage: 24.10 V", vec![quantity("Supply Voltage", 24.1, Some("V"))]),
+            ("VSUP=23.9V", vec![quantity("VSUP", 23.9, Some("V"))]),
+            (
+                "TC1  100.123 C   raw   3991 uV",
+                vec![quantity("TC1", 100.123, Some("C")), quantity("TC1 raw", 3991.0, Some("uV"))],
+            ),
+            ("Active Errors              0", vec![quantity("Active Errors", 0.0, None)]),
+            ("Cold junction (°C) -12.5", vec![quantity("Cold junction °C", -12.5, None)]),
+            (
+                "RTD3 | 109.73 Ohm | 25.0 °C",
+                vec![quantity("RTD3", 109.73, Some("Ohm")), quantity("RTD3", 25.0, Some("°C"))],
+            ),
+            ("Diagnostics   up 0:00:12", vec![]),
+            ("CAN State  Pre-Operational", vec![]),
+            ("12.5", vec![]),
+            ("----------", vec![]),
+            ("", vec![]),
+        ];
+        for (line, expected) in table {
+            assert_eq!(read(line), expected, "{line:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_without_complaint(line in "\\PC{0,200}") {
+            prop_assert!(quantities(&line).len() <= MOST_QUANTITIES);
+        }
+    }
+}
