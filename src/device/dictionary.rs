@@ -51,7 +51,7 @@ pub struct Entry {
     /// Whether a PDO may carry it.
     pub mappable: bool,
     /// Its value from the factory; `None` where the unit itself supplies it: measurements, versions, serial number.
-    pub default: Option<Default>,
+    pub default: Option<FactoryValue>,
     /// Which values it takes, within its type.
     pub limits: Limits,
     /// Unit of its value, e.g. `°C`.
@@ -73,7 +73,7 @@ pub enum Access {
 
 /// A factory value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Default {
+pub struct FactoryValue {
     /// The value, without the node-ID.
     pub value: Value,
     /// Whether the node-ID is added to it: COB-IDs.
@@ -82,7 +82,7 @@ pub struct Default {
 
 /// Which values an entry takes: those from `low` to `high`, and the `values` besides. Without bounds and values: all of
 /// its type. With values and without bounds: only these.
-#[derive(Clone, Debug, PartialEq, std::default::Default)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Limits {
     /// The lowest.
     pub low: Option<Bound>,
@@ -164,12 +164,28 @@ impl Object {
     }
 }
 
-impl Default {
+impl FactoryValue {
     /// The value on a unit with this node-ID.
     pub fn on_node(self, node_id: u8) -> Value {
         match self.value {
             Value::Unsigned32(value) if self.plus_node_id => Value::Unsigned32(value + u32::from(node_id)),
             value => value,
+        }
+    }
+}
+
+impl Limits {
+    /// Whether a value is within the limits, as far as they depend on no other entry.
+    pub fn admit_alone(&self, value: Value) -> bool {
+        if self.values.contains(&value) {
+            return true;
+        }
+        let number = value.as_f64();
+        let above = |bound: Bound| matches!(bound, Bound::Value(low) if number < low.as_f64());
+        let below = |bound: Bound| matches!(bound, Bound::Value(high) if number > high.as_f64());
+        match (self.low, self.high) {
+            (None, None) => self.values.is_empty(),
+            (low, high) => !low.is_some_and(above) && !high.is_some_and(below),
         }
     }
 }

@@ -5,6 +5,7 @@
 
 pub mod dictionary;
 mod loader;
+pub mod schema;
 
 pub use dictionary::Dictionary;
 pub use loader::LoaderKind;
@@ -18,8 +19,7 @@ use crate::version::Version;
 use crate::wire::stream;
 
 /// One product, as its file describes it.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Product {
     /// Part number, e.g. `AXTC4CO`; what banners and identity blocks print.
     pub name: String,
@@ -42,7 +42,6 @@ pub struct Product {
     /// The bootloader.
     pub loader: Loader,
     /// The object dictionary.
-    #[serde(skip)]
     pub dictionary: Dictionary,
 }
 
@@ -156,7 +155,10 @@ impl Product {
         ALL.get_or_init(|| {
             FILES
                 .iter()
-                .map(|(name, text)| toml::from_str(text).unwrap_or_else(|error| panic!("{name}: {error}")))
+                .map(|(name, text)| {
+                    schema::read(name, text)
+                        .unwrap_or_else(|complaints| panic!("{}", schema::Complaint::list(&complaints)))
+                })
                 .collect()
         })
     }
@@ -187,21 +189,22 @@ mod tests {
     #[test]
     fn every_product_file_is_sound() {
         for (file, text) in FILES {
-            let product: Product = toml::from_str(text).unwrap_or_else(|error| panic!("{file}: {error}"));
+            let product = schema::read(file, text)
+                .unwrap_or_else(|complaints| panic!("{}", schema::Complaint::list(&complaints)));
             assert_eq!(file, format!("{}.toml", product.name.to_lowercase()));
-            assert!(product.name.len() <= 12, "{file}: the name has to fit the identity block");
-            assert!(
-                product.flash.program_words.is_multiple_of(product.flash.page_words),
-                "{file}: flash ends within a page"
-            );
-            assert!((1..=127).contains(&product.can.node_id), "{file}: node-ID");
-            assert!(product.loader.file_name.contains("{version}"), "{file}: file name without a version");
-            for format in [&product.stream.field_value, &product.stream.process_value] {
-                let width = *format.widths.first().unwrap_or_else(|| panic!("{file}: a field without a width"));
-                for word in [Some(&format.disabled), Some(&format.open), format.short.as_ref()].into_iter().flatten() {
-                    assert!(word.len() <= width, "{file}: '{word}' does not fit its field");
-                }
+            for (at, object, entry) in product.dictionary.entries() {
+                assert!(!object.name.is_empty() && !entry.name.is_empty(), "{file}: {at} has no name");
+                assert!(entry.mappable || entry.default.is_some() || at.index < 0x3000, "{file}: {at} has no value");
             }
+        }
+    }
+
+    #[test]
+    fn dictionaries_are_as_large_as_the_manuals_tables() {
+        // B-002, B-6: as the errata resolve them.
+        for (name, objects, entries) in [("AXTC4CO", 55, 227), ("AXRTD8CO", 56, 326)] {
+            let dictionary = &Product::named(name).expect("built in").dictionary;
+            assert_eq!((dictionary.objects().len(), dictionary.entries().count()), (objects, entries), "{name}");
         }
     }
 

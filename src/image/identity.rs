@@ -11,6 +11,9 @@ pub const WORD_ADDRESS: u32 = 0x80;
 /// Bytes the block takes.
 pub const LENGTH: usize = 64;
 
+/// ASCII characters of a product name at most.
+pub const LONGEST_NAME: usize = 12;
+
 const BYTE_OFFSET: usize = WORD_ADDRESS as usize * 2;
 const MAGIC: &[u8; 4] = b"AXID";
 const FORMAT: u16 = 1;
@@ -109,7 +112,7 @@ impl Identity {
             assert!(text.len() <= room && text.is_ascii(), "'{text}' does not fit its field");
             block[at..at + text.len()].copy_from_slice(text.as_bytes());
         };
-        put(8, 12, &self.product);
+        put(8, LONGEST_NAME, &self.product);
         put(20, 12, &self.version.to_string());
         put(32, 10, &self.build_date);
         put(42, 8, &self.build_time);
