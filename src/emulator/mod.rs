@@ -15,6 +15,7 @@ mod firmware;
 pub mod knob;
 pub mod memory;
 pub mod objects;
+pub mod rtd_curve;
 pub mod sensors;
 mod uart;
 
