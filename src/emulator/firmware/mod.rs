@@ -11,7 +11,7 @@ mod view;
 use std::collections::VecDeque;
 
 use super::dialect::{Diagnosis, Dialect, NetworkState, Sentence};
-use super::memory::{PERIOD_MS, StreamSetting};
+use super::memory::StreamSetting;
 use super::sensors::Channel;
 use super::uart::{XOFF, XON};
 use super::{Board, Reset};
@@ -252,7 +252,7 @@ impl Firmware {
     }
 
     fn stream_on(&mut self, board: &mut Board<'_>, source: Source, answer: &str) -> Dialogue {
-        let Some(period_ms) = parse_period(answer) else {
+        let Some(period_ms) = parse_period(answer, board.product.measurement.stream_period_ms) else {
             self.print(board, Sentence::BadPeriod);
             return Dialogue::Menu;
         };
@@ -410,13 +410,13 @@ fn period(stream: StreamSetting) -> Duration {
 }
 
 /// The repetition rate an answer means: nothing typed means the default.
-fn parse_period(answer: &str) -> Option<u16> {
+fn parse_period(answer: &str, (shortest, longest): (u16, u16)) -> Option<u16> {
     let answer = answer.trim();
     if answer.is_empty() {
         return Some(DEFAULT_PERIOD_MS);
     }
     let plain = answer.bytes().all(|byte| byte.is_ascii_digit());
-    plain.then(|| answer.parse().ok()).flatten().filter(|period_ms| PERIOD_MS.contains(period_ms))
+    plain.then(|| answer.parse().ok()).flatten().filter(|period_ms| (shortest..=longest).contains(period_ms))
 }
 
 #[cfg(test)]
@@ -426,10 +426,10 @@ mod tests {
     #[test]
     fn a_repetition_rate_is_a_whole_number_within_its_limits() {
         for (answer, period_ms) in [("", Some(1_000)), ("1", Some(1)), ("60000", Some(60_000)), (" 250 ", Some(250))] {
-            assert_eq!(parse_period(answer), period_ms, "{answer:?}");
+            assert_eq!(parse_period(answer, (1, 60_000)), period_ms, "{answer:?}");
         }
         for answer in ["0", "60001", "-5", "1.5", "x", "99999999999", "1 0"] {
-            assert_eq!(parse_period(answer), None, "{answer:?}");
+            assert_eq!(parse_period(answer, (1, 60_000)), None, "{answer:?}");
         }
     }
 }

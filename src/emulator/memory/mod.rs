@@ -7,4 +7,4 @@ mod flash;
 mod parameters;
 
 pub use flash::{Flash, Written};
-pub use parameters::{IMAGE_BYTES, PERIOD_MS, ParameterStore, Parameters, ParametersError, StartDelay, StreamSetting};
+pub use parameters::{IMAGE_BYTES, ParameterStore, Parameters, ParametersError, StartDelay, StreamSetting};

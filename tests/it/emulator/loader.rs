@@ -415,7 +415,7 @@ fn an_upload_that_has_begun_keeps_the_unit_in_its_loader() {
 fn settings_survive_an_upload() {
     let mut bench = Bench::at_menu();
     bench.keys(b"tp700\r");
-    let before = *bench.unit().settings();
+    let before = bench.unit().settings().clone();
     enter_loader(&mut bench);
     upload(&mut bench, &file(&new_program()));
     assert_eq!(*bench.unit().settings(), before);
