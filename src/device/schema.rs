@@ -229,7 +229,8 @@ impl Reader<'_> {
                 self.complain(at, format!("{key}.widths"), "there is no width");
                 continue;
             };
-            for word in [Some(&format.disabled), Some(&format.open), format.short.as_ref()].into_iter().flatten() {
+            let words = [Some(&format.disabled), Some(&format.open), format.short.as_ref(), format.error.as_ref()];
+            for word in words.into_iter().flatten() {
                 if word.is_empty() || word.len() > width {
                     self.complain(at, key.clone(), format!("'{word}' is not a word of 1 to {width} characters"));
                 }

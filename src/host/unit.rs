@@ -465,7 +465,7 @@ pub fn factory_unit(product: &'static Product, seed: u64) -> Unit {
 
 /// A unit with these memories, without power; empty `parameters` are fresh ones.
 pub fn unit(product: &'static Product, seed: u64, flash: Vec<u8>, parameters: Vec<u8>) -> Unit {
-    Unit::new(Setup { product, loader: product.loader.kind, seed, flash, parameters })
+    Unit::new(Setup { product, loader: product.loader.kind, seed, dialect: 0, flash, parameters })
 }
 
 /// The program flash of a unit as it leaves the factory: the sample image of V1.1.0, erased behind it.

@@ -47,7 +47,7 @@ impl Bench {
     /// A unit with this flash, just powered on, behind an adapter of this latency.
     pub fn with(flash: Vec<u8>, latency: Duration) -> Self {
         let product = axtc4co();
-        let setup = Setup { product, loader: LoaderKind::G1, seed: 1, flash, parameters: Vec::new() };
+        let setup = Setup { product, loader: LoaderKind::G1, seed: 1, dialect: 0, flash, parameters: Vec::new() };
         let mut unit = Unit::new(setup);
         unit.power_on(Instant::ZERO);
         Bench {
