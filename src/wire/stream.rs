@@ -79,7 +79,12 @@ impl Layout {
                 text.push(';');
             }
             match reading {
-                Reading::Value(value) => text.push_str(&format!("{value:>width$.*}", format.decimals)),
+                Reading::Value(value) => {
+                    // Rounded first: nothing is "-0.0".
+                    let scale = 10f64.powi(format.decimals as i32);
+                    let value = (value * scale).round() / scale + 0.0;
+                    text.push_str(&format!("{value:>width$.*}", format.decimals));
+                }
                 Reading::Disabled => text.push_str(&format!("{:<width$}", format.disabled)),
                 Reading::Open => text.push_str(&format!("{:<width$}", format.open)),
                 Reading::Short => {

