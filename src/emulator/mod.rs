@@ -20,6 +20,7 @@ pub mod memory;
 pub mod network;
 pub mod objects;
 pub mod rtd_curve;
+pub mod scenario;
 pub mod sensors;
 mod uart;
 
