@@ -5,6 +5,7 @@
 
 mod complaint;
 pub mod dictionary;
+pub mod eds;
 mod loader;
 pub mod schema;
 
