@@ -2,6 +2,7 @@
 
 mod console;
 mod loader;
+mod loader_g3;
 
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
