@@ -3,8 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::Deserialize;
+
 /// A software version: major, minor, patch. Ordered, so that a downgrade can be told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[serde(try_from = "String")]
 pub struct Version {
     /// First number.
     pub major: u16,
@@ -46,6 +49,14 @@ impl FromStr for Version {
         let mut next = || numbers.next().flatten().ok_or_else(complaint);
         let version = Version::new(next()?, next()?, next()?);
         if numbers.next().is_some() { Err(complaint()) } else { Ok(version) }
+    }
+}
+
+impl TryFrom<String> for Version {
+    type Error = NotAVersion;
+
+    fn try_from(text: String) -> Result<Self, NotAVersion> {
+        text.parse()
     }
 }
 

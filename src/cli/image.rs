@@ -64,7 +64,7 @@ struct MakeArgs {
     /// The version it says it is, e.g. 1.2.0.
     #[arg(long, value_name = "VERSION")]
     version: Version,
-    /// Its size in 16-bit words; by default three quarters of the flash.
+    /// Its size in 16-bit words; by default three quarters of the flash, 81,920 at most.
     #[arg(long, value_name = "N")]
     words: Option<u32>,
     /// Give it this one defect.

@@ -6,6 +6,9 @@
 
 use serde::Deserialize;
 
+use crate::image::FlashMap;
+use crate::time::Duration;
+
 /// Which generation of loader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -26,5 +29,48 @@ impl LoaderKind {
             LoaderKind::G1 => "g1",
             LoaderKind::G3 => "g3",
         }
+    }
+
+    /// How it stops and releases its sender.
+    pub const fn pacing(self) -> Pacing {
+        match self {
+            LoaderKind::G1 => Pacing::Pages,
+            LoaderKind::G3 => Pacing::Records,
+        }
+    }
+}
+
+/// How a loader stops and releases its sender: what XOFF and XON prove.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pacing {
+    /// XOFF when the data crosses into another page, XON when the old page is written. One more record may be on its
+    /// way, no second one.
+    Pages,
+    /// XOFF behind every record, XON when the receive ring is empty: each pair says that a record has been taken. S0
+    /// erases all of the program flash before its XON. Nobody counts what is in the ring of [`RING`] characters.
+    Records,
+}
+
+/// Characters a G3 loader's receive ring holds; one more overwrites the first ("about 550": public sources).
+pub const RING: usize = 550;
+
+/// Erasing one page or sector (public data sheet of the 56F83xx, likely the part).
+pub const ERASE_TIME: Duration = Duration::from_millis(20);
+
+/// The longest that erasing all of the program flash can take: page by page, with the smallest pages any part of the
+/// family has. A part with larger sectors, or one that erases in bulk, is quicker.
+pub fn longest_erase(flash: &FlashMap) -> Duration {
+    ERASE_TIME * flash.program_words.div_ceil(flash.page_words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::AddressUnit;
+
+    #[test]
+    fn erasing_half_a_megabyte_page_by_page_takes_twenty_seconds() {
+        let flash = FlashMap { address_unit: AddressUnit::Word, program_words: 0x40000, page_words: 256 };
+        assert_eq!(longest_erase(&flash), Duration::from_millis(20_480));
     }
 }

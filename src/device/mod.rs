@@ -11,7 +11,7 @@ pub mod schema;
 
 pub use complaint::{Complaint, Complaints};
 pub use dictionary::Dictionary;
-pub use loader::LoaderKind;
+pub use loader::{ERASE_TIME, LoaderKind, Pacing, RING, longest_erase};
 
 use std::sync::OnceLock;
 
@@ -144,6 +144,10 @@ pub struct Loader {
     pub kind: LoaderKind,
     /// Whether it waits for any key before it wants the file.
     pub asks_for_key: bool,
+    /// What it prints now and then while it takes the file.
+    pub progress: char,
+    /// Version of the program that emulated units leave the factory with.
+    pub factory_version: Version,
     /// How upload files are named, `{version}` standing for the version.
     pub file_name: String,
 }

@@ -345,17 +345,19 @@ impl Unit {
     fn start_program(&mut self, now: Instant, cause: Reset) {
         let identity = Identity::verify(self.flash.bytes()).ok();
         let own = identity.filter(|identity| identity.product == self.product.name);
-        let may_start = match (cause, self.parameters.values().start_delay) {
-            (Reset::Start, StartDelay::AtOnce) => own,
-            (Reset::Start, StartDelay::WaitsForEver) | (Reset::StayInLoader, _) => None,
+        let startable = own.filter(|_| self.parameters.values().start_delay == StartDelay::AtOnce);
+        let may_leave = startable.is_some();
+        let may_start = match cause {
+            Reset::Start => startable,
+            Reset::StayInLoader => None,
         };
         let (loader, dialect) = (self.loader, self.dialect);
         self.with_program(now, |program, board| {
-            *program = match (may_start, loader) {
-                (Some(identity), _) => {
+            *program = match may_start {
+                Some(identity) => {
                     Program::Application(Box::new(Firmware::start(board, identity, Dialect::drawn(dialect))))
                 }
-                (None, LoaderKind::G1 | LoaderKind::G3) => Program::Loader(Box::new(Bootloader::start(board))),
+                None => Program::Loader(Box::new(Bootloader::start(loader, board, may_leave))),
             }
         });
     }

@@ -30,7 +30,6 @@ use crate::endpoint::Endpoint;
 use crate::image::make;
 use crate::rng::Rng;
 use crate::time::{Duration, Instant, character_time};
-use crate::version::Version;
 
 /// What can be hosted: a unit's serial port with the knobs the host needs.
 pub trait Hosted: Endpoint + Send + 'static {
@@ -468,15 +467,13 @@ pub fn factory_setup(product: &'static Product, seed: u64) -> Setup {
     Setup { product, loader, seed, dialect: 0, flash: factory_flash(product), parameters: Vec::new() }
 }
 
-/// The program flash of a unit as it leaves the factory: the sample image of V1.1.0, erased behind it.
+/// The program flash of a unit as it leaves the factory: the sample image of its first version, erased behind it.
 pub fn factory_flash(product: &Product) -> Vec<u8> {
     let mut flash = vec![0xFF; product.flash.program_words as usize * 2];
     let target = product.target();
     let words = make::usual_words(&target);
-    let program = make::program(&make::Recipe { target: &target, version: FACTORY_VERSION, words, flaw: None });
+    let version = product.loader.factory_version;
+    let program = make::program(&make::Recipe { target: &target, version, words, flaw: None });
     flash[..program.len()].copy_from_slice(&program);
     flash
 }
-
-/// The version that emulated units leave the factory with.
-const FACTORY_VERSION: Version = Version::new(1, 1, 0);

@@ -60,10 +60,13 @@ pub fn flaws() -> impl Iterator<Item = DefectId> {
         .filter(|id| !matches!(id, DefectId::TooLarge | DefectId::WrongProduct | DefectId::FileName))
 }
 
-/// The usual size of a product's sample image: three quarters of its flash.
+/// The usual size of a product's sample image: three quarters of its flash, but no more than [`MOST_USUAL_WORDS`].
 pub fn usual_words(target: &Target) -> u32 {
-    target.flash.program_words / 4 * 3
+    (target.flash.program_words / 4 * 3).min(MOST_USUAL_WORDS)
 }
+
+/// Samples of large products stay moderate: 160 KByte of program, enough for addresses of more than 16 bits.
+const MOST_USUAL_WORDS: u32 = 0x1_4000;
 
 /// Makes the file's bytes.
 ///

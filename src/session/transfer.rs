@@ -1,13 +1,25 @@
-//! Sending an image to a loader: records built anew, one on its way at a time, flow control awaited where it must come.
+//! Sending an image to a loader: records built anew, never more on their way than it can keep, flow control awaited where
+//! it must come.
 //!
-//! What decides how to send is in the public sources of the loaders (generation `g1`, the SDK's of 2000-2004): it keeps
-//! one page of 256 words. A record whose data crosses into another page is parked, XOFF goes out, and after 0.6 ms of
-//! silence the old page is written, during which the loader is deaf; XON says that it listens again. A second record
-//! in the meantime is an overrun, and at the end record a parked one is lost while success is reported. So behind each
-//! record that crosses, and before the end record, the sender waits for XON. That the XOFF may be shown late by an
-//! adapter (16 ms are 184 characters) does not matter then: it is awaited, not reacted to.
+//! What decides how to send is in the public sources of the loaders, as profiles (`device::Pacing`):
+//!
+//! - Generation `g1` keeps one page of 256 words. A record whose data crosses into another page is parked, XOFF goes out,
+//!   and after 0.6 ms of silence the old page is written, during which the loader is deaf; XON says that it listens
+//!   again. A second record in the meantime is an overrun, and at the end record a parked one is lost while success is
+//!   reported. So behind each record that crosses, and before the end record, the sender waits for XON.
+//! - Generation `g3` has a ring of some 550 characters without an overrun check. It stops us behind every record and lets
+//!   us go on when the ring is empty, so each XOFF with its XON says that one more record has been taken. No more than
+//!   [`WINDOW`] characters are on their way without that, so the ring cannot overflow whatever an adapter shows late; and
+//!   behind the header, while all of the flash is erased, and before the end record nothing is.
+//!
+//! That the XOFF may be shown late by an adapter (16 ms are 184 characters) does not matter either way: it is awaited,
+//! not reacted to. Which generation a unit has is believed, not known. A loader that stops us behind the header is a g3
+//! whatever the product's file says, and one that stops us neither there nor behind the first data is sent to as a g1.
+
+use std::collections::VecDeque;
 
 use super::transmitter::Transmitter;
+use crate::device::{Pacing, RING, longest_erase};
 use crate::endpoint::Transmit;
 use crate::image::srecord::{self, Kind, Record};
 use crate::image::{FlashMap, Image};
@@ -16,19 +28,28 @@ use crate::time::{Duration, Instant};
 /// How long behind the last character of a record that crosses into another page the loader's XOFF may take: an
 /// adapter shows it 20 ms late at worst, a busy computer later still.
 const HOLD_EXPECTED: Duration = Duration::from_millis(300);
-/// How long the loader may hold us. Writing a page takes it some 30 ms, erasing all of its flash seconds.
+/// How long behind a record the XON may take that says it is taken, if the loader shows otherwise that it is there:
+/// words are programmed in 3 ms, but here the end of it is a failed upload, so a busy computer gets more time.
+const ACKNOWLEDGED: Duration = Duration::from_millis(1000);
+/// How long the loader may hold us. Writing a page takes it some 30 ms. Erasing all of its flash takes seconds, which
+/// come on top.
 const LONGEST_HOLD: Duration = Duration::from_secs(4);
 /// The same, if nothing at all has been heard since the crossing before: a unit that lost its power is worth a moment,
 /// and not one more record, since what comes back may be its menu.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
+/// Characters on their way to a ring of [`RING`] at most: six records of 32 data bytes, and 50 to spare for keys that
+/// were pressed before. More than the 372 that a line carries in the 32 ms an adapter makes of the way there and back.
+const WINDOW: usize = RING - 50;
 
 /// Why a transfer cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stall {
     /// The loader has held us for [`LONGEST_HOLD`].
     Held,
-    /// Nothing has been heard since the crossing before.
+    /// Nothing has been heard since the record before.
     Silent,
+    /// A record has not been acknowledged, though the loader did so before: it may be lost.
+    Unacknowledged,
 }
 
 /// One record ready to leave.
@@ -52,9 +73,16 @@ pub(super) struct Transfer {
     /// Records the loader must have taken.
     taken: usize,
     bytes_taken: usize,
+    /// When the last character has left of each record let go and not taken.
+    left_at: VecDeque<Instant>,
+    pacing: Pacing,
+    /// The loader has stopped us since the record taken last.
+    stopped: bool,
+    /// How long it may erase behind the header.
+    longest_erase: Duration,
     /// Behind a record that crosses: when its last character has left.
     crossing: Option<Instant>,
-    /// Something has been heard since the crossing before.
+    /// Something has been heard since the crossing before, or since the record taken last.
     alive: bool,
     begun: Option<Instant>,
     deadline: Option<Instant>,
@@ -63,9 +91,9 @@ pub(super) struct Transfer {
 impl Transfer {
     /// Builds the records: upper case, CR behind each (the newer loaders take nothing else), a four-byte header address,
     /// no count records.
-    pub(super) fn new(image: &Image, flash: &FlashMap) -> Self {
-        let header = &image.header[..image.header.len().min(srecord::LONGEST_HEADER)];
-        let header = line(|text| srecord::write_header(header, text));
+    pub(super) fn new(image: &Image, flash: &FlashMap, pacing: Pacing) -> Self {
+        let header = header(image);
+        let header = line(|text| srecord::write_header(&header, text));
         let mut records = vec![Outgoing { text: header, address: None, crosses: false }];
         let mut page = None;
         for block in &image.blocks {
@@ -91,6 +119,10 @@ impl Transfer {
             sent: 0,
             taken: 0,
             bytes_taken: 0,
+            left_at: VecDeque::new(),
+            pacing,
+            stopped: false,
+            longest_erase: longest_erase(flash),
             crossing: None,
             alive: false,
             begun: None,
@@ -106,12 +138,11 @@ impl Transfer {
         self.begun.get_or_insert(now);
         self.deadline = None;
         if let Some(since) = transmitter.held_since() {
-            let limit = since + LONGEST_HOLD;
+            let limit = since + self.longest_hold();
             self.deadline = Some(limit);
             return if limit <= now { Err(Stall::Held) } else { Ok(false) };
         }
-        if let Some(left_at) = self.crossing {
-            let limit = left_at + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE };
+        if let Some(limit) = self.waits_until() {
             if now < limit {
                 self.deadline = Some(limit);
                 return Ok(false);
@@ -123,14 +154,9 @@ impl Transfer {
                 self.deadline = Some(transmitter.ready_at());
                 return Ok(false);
             }
-            let record = &self.records[self.sent];
-            transmitter.push_piece(Transmit::open(record.text.clone()));
-            self.sent += 1;
-            if record.crosses {
-                // The piece is let go in this same step, so it leaves behind what has been let go before.
-                let left_at = transmitter.free_at().max(now) + transmitter.time_for(record.text.len());
-                self.crossing = Some(left_at);
-                self.deadline = Some(left_at + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE });
+            self.let_go(now, transmitter);
+            if let Some(limit) = self.waits_until() {
+                self.deadline = Some(limit);
                 return Ok(false);
             }
         }
@@ -143,14 +169,28 @@ impl Transfer {
 
     /// The loader has sent XOFF (`true`) or XON.
     pub(super) fn hold(&mut self, held: bool) {
-        if self.crossing.is_some() {
-            if held {
-                self.alive = true;
-            } else {
+        if self.pacing == Pacing::Pages && held && self.crossing.is_none() && self.taken == 0 && self.sent > 0 {
+            // Nothing was to be written yet: this is the hold behind the header.
+            self.pacing = Pacing::Records;
+        }
+        match self.pacing {
+            Pacing::Pages if self.crossing.is_none() => {}
+            Pacing::Pages if held => self.alive = true,
+            Pacing::Pages => {
                 // XON alone will do: it comes when the page is written, and the XOFF may have been lost on the line.
                 self.crossing = None;
                 self.alive = false;
                 self.take_all_sent();
+            }
+            Pacing::Records => {
+                self.alive = true;
+                // Only both together count: what is damaged on the line must not count twice.
+                if std::mem::replace(&mut self.stopped, held) && !held && self.taken < self.sent {
+                    self.alive = false;
+                    self.bytes_taken += self.records[self.taken].text.len();
+                    self.taken += 1;
+                    self.left_at.pop_front();
+                }
             }
         }
     }
@@ -162,13 +202,24 @@ impl Transfer {
 
     /// Whether the loader has shown by its flow control that it takes the records.
     pub(super) fn is_taken(&self) -> bool {
-        self.taken > 0
+        self.taken > 0 || (self.pacing == Pacing::Records && self.stopped)
+    }
+
+    /// Whether the loader must be erasing all of its flash.
+    pub(super) fn is_erasing(&self) -> bool {
+        self.pacing == Pacing::Records && self.taken == 0 && self.stopped
+    }
+
+    /// Whether a loader that has lost its place in a record waits in silence for the rest of it.
+    pub(super) fn may_wait_in_a_record(&self) -> bool {
+        self.pacing == Pacing::Records && self.sent > 0
     }
 
     /// The loader has said that it is through.
     pub(super) fn take_all_sent(&mut self) {
         self.bytes_taken += self.records[self.taken..self.sent].iter().map(|record| record.text.len()).sum::<usize>();
         self.taken = self.sent;
+        self.left_at.clear();
     }
 
     /// When [`advance`](Transfer::advance) is wanted.
@@ -196,17 +247,64 @@ impl Transfer {
         self.begun
     }
 
-    /// No XOFF came behind a record that should have brought one. A loader of another kind may do without, if it shows
-    /// in another way that it is there.
+    fn longest_hold(&self) -> Duration {
+        if self.is_erasing() { self.longest_erase + LONGEST_HOLD } else { LONGEST_HOLD }
+    }
+
+    /// Until when an answer of the loader is awaited before the next record may go, if one is.
+    fn waits_until(&self) -> Option<Instant> {
+        match self.pacing {
+            Pacing::Pages => Some(self.crossing? + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE }),
+            Pacing::Records => {
+                let &left_at = self.left_at.back()?;
+                let next = self.records.get(self.sent)?;
+                let on_their_way: usize = self.records[self.taken..self.sent].iter().map(|sent| sent.text.len()).sum();
+                let is_end = self.sent + 1 == self.records.len();
+                // The header and the first data have to show first that this loader answers.
+                let fits = self.taken >= PROVEN && !is_end && on_their_way + next.text.len() <= WINDOW;
+                (!fits).then(|| left_at + if self.alive { ACKNOWLEDGED } else { SIGN_OF_LIFE })
+            }
+        }
+    }
+
+    /// Lets the next record go.
+    fn let_go(&mut self, now: Instant, transmitter: &mut Transmitter) {
+        let record = &self.records[self.sent];
+        // The piece is let go in this same step, so it leaves behind what has been let go before.
+        let left_at = transmitter.free_at().max(now) + transmitter.time_for(record.text.len());
+        transmitter.push_piece(Transmit::open(record.text.clone()));
+        self.left_at.push_back(left_at);
+        if record.crosses && self.pacing == Pacing::Pages {
+            self.crossing = Some(left_at);
+        }
+        self.sent += 1;
+    }
+
+    /// No XOFF came where one should have. A loader of another kind may do without, if it shows in another way that it
+    /// is there.
     fn pass_unheld(&mut self) -> Result<(), Stall> {
-        if !self.alive {
-            return Err(Stall::Silent);
+        match self.pacing {
+            // G1 says nothing behind the header.
+            Pacing::Records if self.taken == 0 => self.pacing = Pacing::Pages,
+            _ if !self.alive => return Err(Stall::Silent),
+            Pacing::Records if self.taken < PROVEN => self.pacing = Pacing::Pages,
+            Pacing::Records => return Err(Stall::Unacknowledged),
+            Pacing::Pages => {}
         }
         self.crossing = None;
         self.alive = false;
         self.take_all_sent();
         Ok(())
     }
+}
+
+/// Records that have to be acknowledged one by one before more than one is on its way: the header, and the first data.
+const PROVEN: usize = 2;
+
+/// The header's text: no more than fits a record, and nothing that would act on us when a loader echoes it.
+pub(super) fn header(image: &Image) -> Vec<u8> {
+    let printable = |&byte: &u8| if matches!(byte, b' '..=b'~') { byte } else { b'.' };
+    image.header.iter().take(srecord::LONGEST_HEADER).map(printable).collect()
 }
 
 fn line(write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {

@@ -10,8 +10,8 @@
 use super::event::{Event, Facts, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitNow, UnitState, Verdict};
 use super::identify::Identify;
 use super::job::{Desk, Signal, Work};
-use super::transfer::{Stall, Transfer};
-use crate::device::Product;
+use super::transfer::{self, Stall, Transfer};
+use crate::device::{Pacing, Product};
 use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::{Confidence, LoaderText, Message, Prompt, Text, visible};
@@ -34,6 +34,16 @@ const SECOND_PROMPT: Duration = Duration::from_secs(3);
 const BANNER_QUIET: Duration = Duration::from_millis(300);
 /// Silence behind a menu without a version before the unit is asked.
 const ASK_VERSION: Duration = Duration::from_millis(1000);
+/// How long behind the password a loader that wants a key may take to ask for it, before it gets one unasked. Less than
+/// the 10 s for which it wants one (errata E-I12).
+const UNASKED_KEY: Duration = Duration::from_millis(3000);
+/// The same behind its header.
+const UNASKED_KEY_BEHIND_HEADER: Duration = Duration::from_millis(1000);
+/// How long a loader with a ring may be silent behind the end record, before it is taken to wait for the rest of it.
+const END_UNHEARD: Duration = Duration::from_millis(1500);
+/// What brings a loader out of a record it has lost its place in: as many digits as the longest record has (it takes
+/// anything for a digit), and a line end. At a menu Enter does nothing.
+const FILLER: [u8; 516] = [b'\r'; 516];
 /// Characters of a quotation.
 const QUOTED: usize = 160;
 
@@ -46,6 +56,10 @@ pub(super) struct Upload {
     transfer: Option<Transfer>,
     stage: Stage,
     deadline: Option<Instant>,
+    /// What is to be sent if nothing is heard until then.
+    unheard: Option<(Instant, Unheard)>,
+    /// The loader has been brought out of a record once.
+    filled: bool,
     /// Text that begins before this offset is history.
     mark: u64,
     /// The last text heard in this job that was not a row of the stream.
@@ -75,6 +89,15 @@ enum Stage {
     },
 }
 
+/// What is to be sent to a loader that is not heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Unheard {
+    /// The key it must be waiting for.
+    Key,
+    /// [`FILLER`].
+    Filler,
+}
+
 /// What has been heard since the end record.
 #[derive(Default)]
 struct After {
@@ -93,6 +116,8 @@ impl Upload {
             transfer: None,
             stage: Stage::Check(Identify::default()),
             deadline: None,
+            unheard: None,
+            filled: false,
             mark: 0,
             heard: String::new(),
             cancelled: false,
@@ -108,6 +133,14 @@ impl Upload {
         let said = facts.product.as_ref().map(|known| known.value.clone());
         let image_product = self.order.image.identity().map(|identity| identity.product.clone());
         match facts.state {
+            UnitState::Silent if self.may_be_lost_in_a_record() => {
+                self.fill_up(desk);
+                let mut identify = Identify::default();
+                let outcome = identify.handle(Signal::Begin, desk);
+                self.deadline = identify.deadline();
+                self.stage = Stage::Check(identify);
+                return outcome.and_then(|_| self.checked(desk));
+            }
             UnitState::Silent => {
                 return self.end(desk, Verdict::NoAnswer, UnitNow::Unknown, "nothing answers on this port");
             }
@@ -141,7 +174,7 @@ impl Upload {
             return self.end(desk, Verdict::Refused, unit, what);
         };
         self.product = Some(known.name.clone());
-        self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash));
+        self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash, known.loader.kind.pacing()));
         self.mark = desk.received;
         match unit {
             UnitNow::Loader => {
@@ -167,6 +200,18 @@ impl Upload {
         self.deadline = Some(self.deadline.map_or(quiet, |deadline| deadline.max(quiet)));
     }
 
+    /// Whether the silent unit may be a loader that has lost its place in a record of an upload before this one: it
+    /// takes every question for the rest of it.
+    fn may_be_lost_in_a_record(&self) -> bool {
+        let product = self.order.product.as_deref().and_then(Product::named);
+        !self.filled && product.is_some_and(|product| product.loader.kind.pacing() == Pacing::Records)
+    }
+
+    fn fill_up(&mut self, desk: &mut Desk<'_>) {
+        self.filled = true;
+        desk.send(&FILLER);
+    }
+
     /// Something was heard while a loader is being asked for.
     fn entering(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
         let password_sent = matches!(self.stage, Stage::PasswordSent);
@@ -175,14 +220,23 @@ impl Upload {
                 desk.send_secret(self.order.password.reveal());
                 self.stage = Stage::PasswordSent;
                 self.deadline = Some(desk.now + LOADER_PROMPT);
+                self.unheard = self.asks_for_key().then_some((desk.now + UNASKED_KEY, Unheard::Key));
             }
-            Message::Prompt(Prompt::AnyKey) | Message::Loader(LoaderText::AnyKey) if password_sent => desk.send(b"\r"),
+            Message::Prompt(Prompt::AnyKey) | Message::Loader(LoaderText::AnyKey) if password_sent => {
+                desk.send(b"\r");
+                // Should it be lost on the line, another one.
+                self.unheard = Some((desk.now + UNASKED_KEY_BEHIND_HEADER, Unheard::Key));
+            }
+            Message::Loader(LoaderText::Header) if password_sent && self.unheard.is_some() => {
+                self.unheard = Some((desk.now + UNASKED_KEY_BEHIND_HEADER, Unheard::Key));
+            }
             Message::Loader(LoaderText::Waiting) | Message::Prompt(Prompt::WaitingForFile) if password_sent => {
                 if self.cancelled {
                     let what = "cancelled; nothing has been sent, the old software is untouched";
                     return self.end(desk, Verdict::Interrupted, UnitNow::Loader, what);
                 }
                 self.deadline = None;
+                self.unheard = None;
                 self.settle(desk);
             }
             Message::Refusal | Message::MenuKey(_) | Message::Prompt(Prompt::Password) if password_sent => {
@@ -206,21 +260,33 @@ impl Upload {
         None
     }
 
+    fn asks_for_key(&self) -> bool {
+        self.product.as_deref().and_then(Product::named).is_some_and(|product| product.loader.asks_for_key)
+    }
+
+    /// Whether the text is the header's, which some loaders echo, whatever it says.
+    fn is_echo_of_header(&self, text: &Text) -> bool {
+        let header = transfer::header(self.order.image.image());
+        let header = String::from_utf8_lossy(&header);
+        !header.trim().is_empty() && text.text.trim() == header.trim()
+    }
+
     /// Something was heard while records are on their way: anything but the loader's progress ends the transfer.
-    /// `end` is where in the record it ends.
-    fn transferring(&mut self, message: &Message, end: u64, desk: &mut Desk<'_>) {
+    fn transferring(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) {
         let failed = match message {
             Message::Loader(LoaderText::Progress | LoaderText::Header) | Message::Text | Message::Refusal => None,
-            Message::Loader(LoaderText::Error(code)) => {
-                Some((format!("the loader reports error {code}{}", meaning(*code)), UnitNow::Loader))
+            _ if self.is_echo_of_header(text) => None,
+            Message::Loader(LoaderText::Error(error)) => {
+                Some((format!("the loader reports error {error}"), UnitNow::Loader))
             }
-            Message::Loader(LoaderText::Waiting | LoaderText::Restarting) | Message::Prompt(Prompt::WaitingForFile) => {
+            Message::Loader(LoaderText::Waiting | LoaderText::Restarting | LoaderText::AnyKey)
+            | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
                 Some(("the loader started over and wants the file from its beginning".to_owned(), UnitNow::Loader))
             }
             Message::Loader(LoaderText::Loaded | LoaderText::Started) => {
                 Some(("the loader says it is done before the end of the file was sent".to_owned(), UnitNow::Unknown))
             }
-            Message::Loader(LoaderText::AnyKey) | Message::Prompt(_) => {
+            Message::Prompt(_) => {
                 Some(("the unit asks for something else in the middle of the file".to_owned(), UnitNow::Unknown))
             }
             Message::MenuKey(_)
@@ -243,7 +309,7 @@ impl Upload {
                     // What was on its way may have been keys for a menu: leave whatever dialogue they opened.
                     desk.leave_dialogue();
                 }
-                self.fail(desk, end, what, unit);
+                self.fail(desk, text.span.end, what, unit);
             }
         }
     }
@@ -260,11 +326,12 @@ impl Upload {
     fn finishing(&mut self, message: &Message, end: u64, desk: &mut Desk<'_>) {
         let quiet = desk.now + BANNER_QUIET;
         match message {
-            Message::Loader(LoaderText::Error(code)) => {
-                let what = format!("the loader reports error {code}{} at the end of the file", meaning(*code));
+            Message::Loader(LoaderText::Error(error)) => {
+                let what = format!("the loader reports error {error} at the end of the file");
                 self.fail(desk, end, what, UnitNow::Loader);
             }
-            Message::Loader(LoaderText::Waiting) | Message::Prompt(Prompt::WaitingForFile) => {
+            Message::Loader(LoaderText::Waiting | LoaderText::AnyKey)
+            | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
                 self.after = After { loader_waits: true, ..After::default() };
                 self.deadline = Some(desk.now + SECOND_PROMPT);
             }
@@ -399,6 +466,12 @@ impl Upload {
     }
 
     fn tick(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if let Some((_, unheard)) = self.unheard.take_if(|(due, _)| *due <= desk.now) {
+            match unheard {
+                Unheard::Key => desk.send(b"\r"),
+                Unheard::Filler => self.fill_up(desk),
+            }
+        }
         let due = self.deadline.is_some_and(|deadline| deadline <= desk.now);
         match &mut self.stage {
             Stage::Check(identify) => {
@@ -444,15 +517,22 @@ impl Upload {
                 self.mark = desk.received;
                 self.stage = Stage::Finish;
                 self.deadline = Some(desk.now + NEW_BANNER);
+                let ends = transfer.may_wait_in_a_record();
+                self.unheard = ends.then_some((desk.now + END_UNHEARD, Unheard::Filler));
             }
             Err(stall) => {
                 let unit = if transfer.is_taken() { UnitNow::Loader } else { UnitNow::Unknown };
                 let what = match stall {
                     Stall::Held => "the loader stopped us (XOFF) and did not let us go on",
                     Stall::Silent => "the loader has fallen silent",
+                    Stall::Unacknowledged => "the loader has not acknowledged a record (XOFF, XON), so it may be lost",
                 };
+                let fill_up = transfer.may_wait_in_a_record();
                 desk.transmitter.clear();
                 self.fail(desk, desk.received, what.to_owned(), unit);
+                if fill_up && stall != Stall::Held {
+                    self.fill_up(desk);
+                }
             }
         }
         self.report_progress(desk);
@@ -490,6 +570,7 @@ impl Upload {
         match self.stage {
             Stage::Check(_) => Phase::Check,
             Stage::AskedForLoader | Stage::PasswordSent | Stage::Settle => Phase::EnterLoader,
+            Stage::Transfer if self.transfer.as_ref().is_some_and(Transfer::is_erasing) => Phase::Erase,
             Stage::Transfer | Stage::Failing { .. } => Phase::Transfer,
             Stage::Finish => Phase::Finish,
             Stage::AskVersion(_) => Phase::Verify,
@@ -513,6 +594,24 @@ impl Upload {
             what: what.into(),
             heard: self.heard.clone(),
         })))
+    }
+
+    /// Something is heard: what was to be sent to a loader that is not heard need not be, or not to its end.
+    fn listen(&mut self, desk: &mut Desk<'_>) {
+        match self.stage {
+            Stage::Finish | Stage::Failing { .. } => {
+                self.unheard = None;
+                if std::mem::take(&mut self.filled) {
+                    desk.transmitter.clear();
+                }
+            }
+            Stage::Check(_)
+            | Stage::AskedForLoader
+            | Stage::PasswordSent
+            | Stage::Settle
+            | Stage::Transfer
+            | Stage::AskVersion(_) => {}
+        }
     }
 
     fn quote(&mut self, text: &Text, message: &Message) {
@@ -544,6 +643,7 @@ impl Work for Upload {
             Signal::Tick => self.tick(desk),
             Signal::Heard(text, message) => {
                 self.quote(text, message);
+                self.listen(desk);
                 let is_news = text.span.start >= self.mark;
                 match &mut self.stage {
                     Stage::Check(identify) | Stage::AskVersion(identify) => {
@@ -564,7 +664,7 @@ impl Work for Upload {
                         None
                     }
                     Stage::Transfer if is_news => {
-                        self.transferring(message, text.span.end, desk);
+                        self.transferring(text, message, desk);
                         None
                     }
                     Stage::Finish if is_news => {
@@ -572,7 +672,8 @@ impl Work for Upload {
                         None
                     }
                     Stage::Failing { what, .. } if is_news => match message {
-                        Message::Loader(LoaderText::Waiting) | Message::Prompt(Prompt::WaitingForFile) => {
+                        Message::Loader(LoaderText::Waiting | LoaderText::AnyKey)
+                        | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
                             let what = what.clone();
                             self.end(desk, Verdict::Failed, UnitNow::Loader, what)
                         }
@@ -585,20 +686,6 @@ impl Work for Upload {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.deadline
-    }
-}
-
-/// What the error numbers of the loaders `g1` and `g2` mean.
-fn meaning(code: u32) -> &'static str {
-    match code {
-        1 => " (characters lost or damaged on the line)",
-        2 => " (a character that belongs to no record)",
-        3 => " (a record it does not take)",
-        4 => " (wrong check sum)",
-        5 => " (records came faster than it takes them)",
-        6 => " (the flash could not be written)",
-        7 => " (internal error)",
-        _ => "",
+        [self.deadline, self.unheard.map(|(due, _)| due)].into_iter().flatten().min()
     }
 }

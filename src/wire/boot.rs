@@ -5,6 +5,8 @@
 //! `Error # 000N`, `Restarting.`, `Loaded 0x.... Program and 0x.... Data words.`, `Application started.`,
 //! `Download Complete`, `Error: ` with four hex digits.
 
+use std::fmt;
+
 use super::words::{Words, number};
 
 /// What the bootloader says.
@@ -18,14 +20,62 @@ pub enum LoaderText {
     AnyKey,
     /// A sign of progress: nothing but dots or stars.
     Progress,
-    /// Something was wrong; the number as printed.
-    Error(u32),
+    /// Something was wrong.
+    Error(LoaderError),
     /// It starts over and wants the header record again.
     Restarting,
     /// It believes the file has been taken. Proves only that the terminator arrived.
     Loaded,
     /// It hands over to the application.
     Started,
+}
+
+/// What a loader has against a file. Shown as the loader prints it, with what it means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoaderError {
+    /// A number (generations g1 and g2).
+    Number(u32),
+    /// The bits of a status word (generation g3).
+    Status(u16),
+}
+
+/// What the error numbers mean.
+const NUMBERS: [(u32, &str); 7] = [
+    (1, "characters lost or damaged on the line"),
+    (2, "a character that belongs to no record"),
+    (3, "a record it does not take"),
+    (4, "wrong check sum"),
+    (5, "records came faster than it takes them"),
+    (6, "the flash could not be written"),
+    (7, "internal error"),
+];
+
+/// What the bits of the status word mean.
+const BITS: [(u16, &str); 8] = [
+    (0x0001, "wrong check sum"),
+    (0x0002, "no record, or one it does not take"),
+    (0x0004, "the flash could not be accessed"),
+    (0x0008, "the flash is protected"),
+    (0x0010, "the flash could not be written"),
+    (0x0020, "an impossible start address"),
+    (0x0040, "characters lost or damaged on the line"),
+    (0x0080, "an address outside its flash"),
+];
+
+impl fmt::Display for LoaderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let meanings: Vec<&str> = match self {
+            LoaderError::Number(number) => {
+                write!(f, "{number}")?;
+                NUMBERS.iter().filter(|(known, _)| known == number).map(|(_, meaning)| *meaning).collect()
+            }
+            LoaderError::Status(status) => {
+                write!(f, "{status:04X}")?;
+                BITS.iter().filter(|(bit, _)| status & bit != 0).map(|(_, meaning)| *meaning).collect()
+            }
+        };
+        if meanings.is_empty() { Ok(()) } else { write!(f, " ({})", meanings.join("; ")) }
+    }
 }
 
 /// What a line says, if it is the loader's.
@@ -39,8 +89,8 @@ pub(super) fn recognise(line: &str, words: &Words) -> Option<LoaderText> {
     if words.has_any(&["waiting", "ready"]) && (s_record || words.has_all(&["appl", "file"])) {
         return Some(LoaderText::Waiting);
     }
-    if let Some(code) = error_code(line, words) {
-        return Some(LoaderText::Error(code));
+    if let Some(error) = error(line, words) {
+        return Some(LoaderText::Error(error));
     }
     if words.has_any(&["restarting"]) {
         return Some(LoaderText::Restarting);
@@ -62,19 +112,18 @@ pub(super) fn recognise(line: &str, words: &Words) -> Option<LoaderText> {
     None
 }
 
-/// `Error # 0004`, `error #4`, `Error: 0001`: the word first, then nothing but its number.
-fn error_code(line: &str, words: &Words) -> Option<u32> {
+/// `Error # 0004`, `error #4`, `Error: 0001`: the word first, then nothing but its number or its bits.
+fn error(line: &str, words: &Words) -> Option<LoaderError> {
     // Progress marks may stand before it on the same line.
     if words.get(0) != Some("error") || words.iter().count() > 3 {
         return None;
     }
-    let hexadecimal = line.contains(':');
     let code = words.iter().nth(1)?;
     let digits = code.strip_prefix("0x").unwrap_or(code);
-    if hexadecimal {
-        u32::from_str_radix(digits, 16).ok()
+    if line.contains(':') {
+        u16::from_str_radix(digits, 16).ok().map(LoaderError::Status)
     } else {
-        number(code).and_then(|code| u32::try_from(code).ok())
+        number(code).and_then(|code| u32::try_from(code).ok()).map(LoaderError::Number)
     }
 }
 
@@ -92,15 +141,17 @@ mod tests {
             ("Serial Bootloader v2.0", Some(LoaderText::Header)),
             ("....", Some(LoaderText::Progress)),
             ("...*", Some(LoaderText::Progress)),
-            ("Error # 0004", Some(LoaderText::Error(4))),
-            ("...Error # 0002", Some(LoaderText::Error(2))),
-            ("Error: 0010", Some(LoaderText::Error(16))),
+            ("Error # 0004", Some(LoaderText::Error(LoaderError::Number(4)))),
+            ("...Error # 0002", Some(LoaderText::Error(LoaderError::Number(2)))),
+            ("Error: 0010", Some(LoaderText::Error(LoaderError::Status(0x10)))),
             ("Restarting.", Some(LoaderText::Restarting)),
             ("Loaded 0xC000 Program and 0x0000 Data words.", Some(LoaderText::Loaded)),
             ("S-File has been loaded successfully", Some(LoaderText::Loaded)),
             ("Download Complete", Some(LoaderText::Loaded)),
             ("Application started.", Some(LoaderText::Started)),
             ("Hit any key to continue", Some(LoaderText::AnyKey)),
+            ("56F83xx Serial Bootloader v2.0", Some(LoaderText::Header)),
+            ("Application started!", Some(LoaderText::Started)),
             ("L - Load New Software", None),
             ("Error count 0", None),
             ("Error register 00h", None),
@@ -109,6 +160,20 @@ mod tests {
         ];
         for (line, expected) in table {
             assert_eq!(recognise(line, &Words::of(line)), expected, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn errors_are_told_in_words_number_by_number_and_bit_by_bit() {
+        let table = [
+            (LoaderError::Number(4), "4 (wrong check sum)"),
+            (LoaderError::Number(9), "9"),
+            (LoaderError::Status(0x0001), "0001 (wrong check sum)"),
+            (LoaderError::Status(0x0012), "0012 (no record, or one it does not take; the flash could not be written)"),
+            (LoaderError::Status(0x0100), "0100"),
+        ];
+        for (error, expected) in table {
+            assert_eq!(error.to_string(), expected);
         }
     }
 }

@@ -13,7 +13,7 @@ pub mod stream;
 pub mod visible;
 mod words;
 
-pub use boot::LoaderText;
+pub use boot::{LoaderError, LoaderText};
 pub use framer::{Framer, Item, LONGEST_LINE, Text, XOFF, XON};
 pub use menu::{Confidence, MenuKey, Network, NmtState, SoftwareName};
 pub use prompt::{Prompt, SourceKeys};

@@ -28,6 +28,10 @@ fn in_tree_text(path: &str) -> String {
     in_tree(path).display().to_string()
 }
 
+/// The sound files.
+const SOUND: [(&str, &str); 4] =
+    [("AXTC4CO", "1.1.0"), ("AXTC4CO", "1.2.0"), ("AXRTD8CO", "2.1.1"), ("AXRTD8CO", "2.2.0")];
+
 /// The bad and the odd files, by defect, with the line at which each is found.
 const BAD: [(&str, u64); 40] = [
     ("empty-file", 1),
@@ -80,10 +84,10 @@ fn sample(id: DefectId) -> String {
 
 #[test]
 fn the_program_makes_every_sample_file_anew() {
-    for version in ["1.1.0", "1.2.0"] {
-        let made = axcon(&["image", "make", "--product", "AXTC4CO", "--version", version, "--out", "-"]);
-        let kept = fs::read(in_tree(&format!("firmware_images/AXTC4CO_V{version}.elf.S"))).expect("a sample");
-        assert!(made.stdout == kept, "AXTC4CO V{version} is not what the program makes: {}", text(&made.stderr));
+    for (product, version) in SOUND {
+        let made = axcon(&["image", "make", "--product", product, "--version", version, "--out", "-"]);
+        let kept = fs::read(in_tree(&format!("firmware_images/{product}_V{version}.elf.S"))).expect("a sample");
+        assert!(made.stdout == kept, "{product} V{version} is not what the program makes: {}", text(&made.stderr));
     }
     let mut kept: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     for folder in ["bad", "odd"] {
@@ -178,6 +182,40 @@ fn a_sound_image_is_told_in_words_and_as_data() {
     for (member, value) in expected.as_object().expect("an object") {
         assert_eq!(&report[member], value, "{member}");
     }
+}
+
+#[test]
+fn an_image_is_checked_against_the_flash_of_its_product() {
+    let file = in_tree_text("firmware_images/AXRTD8CO_V2.2.0.elf.S");
+    let report = json(&axcon(&["image", "check", "--json", "--product", "axrtd8co", &file]).stdout);
+    let expected = serde_json::json!({
+        "ok": true, "product": "AXRTD8CO", "version": "2.2.0", "records": 5122, "address_unit": "word",
+        "ranges": [{"start": 0, "end": 0x1_4000}], "defects": [],
+    });
+    for (member, value) in expected.as_object().expect("an object") {
+        assert_eq!(&report[member], value, "{member}");
+    }
+    let told = text(&axcon(&["image", "info", &file]).stdout);
+    assert!(told.contains("163,840 bytes, 31 % of the AXRTD8CO's flash"), "{told}");
+
+    // For the smaller unit it is the wrong product, and too large.
+    let other = axcon(&["image", "check", "--json", "--product", "axtc4co", &file]);
+    assert_eq!(other.status.code(), Some(5));
+    let report = json(&other.stdout);
+    let defects: Vec<&str> =
+        report["defects"].as_array().expect("a list").iter().filter_map(|defect| defect["id"].as_str()).collect();
+    assert!(defects.contains(&"wrong-product"), "{defects:?}");
+
+    // One word behind the last of 512 KByte.
+    let folder = tempfile::tempdir().expect("a folder");
+    let beyond = folder.path().join("AXRTD8CO_V2.2.0.elf.S").display().to_string();
+    let recipe = ["--words", "320", "--defect", "out-of-range", "--out", &beyond];
+    let made = axcon(&[&["image", "make", "--product", "AXRTD8CO", "--version", "2.2.0"][..], &recipe].concat());
+    assert_eq!(made.status.code(), Some(0), "{}", text(&made.stderr));
+    let refused = axcon(&["image", "check", &beyond]);
+    assert_eq!(refused.status.code(), Some(5));
+    let said = text(&refused.stdout);
+    assert!(said.contains("out-of-range") && said.contains("0x00040000: outside the AXRTD8CO"), "{said}");
 }
 
 #[test]

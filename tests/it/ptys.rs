@@ -546,6 +546,8 @@ fn verbs_and_scenarios_do_to_a_unit_what_they_say() {
     .expect("written");
     let mut emulator = world.start(&["emulate", "axtc4co", "axrtd8co", "--scenario", "day.toml"]);
     emulator.wait_out("serial: ");
+    // A unit answers nobody in its first moments.
+    thread::sleep(Duration::from_millis(200));
     emulator.input(b"set 1 temperature 250\n2 set 3 resistance 100\n");
     emulator.input(b"all status\n1 write 6126:1 18.0\n1 read 6126:1\n2 read 3000:1\n2 write 3000:1 7\n");
     let said = emulator.wait_out("2: 3000:01 = 1 (IEC 0.00385)");

@@ -15,7 +15,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("wire", &["record", "version"]),
     ("image", &["rng", "version"]),
     ("canopen", &[]),
-    ("device", &["canopen", "image", "version", "wire"]),
+    ("device", &["canopen", "image", "time", "version", "wire"]),
     ("session", &["canopen", "device", "endpoint", "image", "record", "secret", "time", "version", "wire"]),
     ("emulator", &["canopen", "device", "endpoint", "image", "rng", "time", "version", "wire"]),
     ("host", &["canopen", "device", "emulator", "endpoint", "image", "record", "rng", "time", "version"]),

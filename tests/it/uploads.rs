@@ -1,5 +1,6 @@
 //! Stories of uploads: console and unit on one cable, in virtual time.
 
+use axcon::device::{LoaderKind, Product};
 use axcon::emulator::Running;
 use axcon::image::Identity;
 use axcon::rng::Rng;
@@ -8,7 +9,9 @@ use axcon::session::{Command, Event, Outcome, Phase, UnitNow, Verdict};
 use axcon::time::Duration;
 use axcon::version::Version;
 
-use crate::support::bench::{Bench, factory_flash, flash_with, full_image, order, small_image};
+use crate::support::bench::{
+    Bench, axrtd8co, axtc4co, factory_flash, flash_with, full_image, image_of, order, small_image,
+};
 
 #[test]
 fn an_upload_succeeds_and_the_flash_holds_exactly_the_image() {
@@ -166,10 +169,82 @@ fn the_password_is_nowhere_in_the_record() {
     assert!(!bench.transcript().contains("AXIO"), "and not kept");
 }
 
+/// A unit with eight channels that has run for a moment, V2.1.1 in it.
+fn rtd8(latency: Duration) -> Bench {
+    let flash = flash_with(&small_image("AXRTD8CO", "2.1.1"));
+    let mut bench = Bench::of(axrtd8co(), LoaderKind::G3, flash, latency);
+    bench.run_for(Duration::from_secs(6));
+    bench
+}
+
+#[test]
+fn a_loader_that_wants_a_key_and_erases_everything_gets_its_key_and_its_time() {
+    let mut bench = rtd8(Duration::ZERO);
+    let image = small_image("AXRTD8CO", "2.2.0");
+    bench.command(Command::Load(Box::new(order(image.clone()))));
+    let mut phases = Vec::new();
+    let mut report = None;
+    let limit = bench.now + Duration::from_secs(60);
+    bench.run_until(limit, |event| {
+        match event {
+            Event::Progress(progress) if phases.last() != Some(&progress.phase) => phases.push(progress.phase),
+            Event::Finished(Outcome::Loaded(loaded)) => report = Some(loaded.clone()),
+            _ => {}
+        }
+        report.is_some()
+    });
+    let report = report.unwrap_or_else(|| panic!("no report:\n{}", bench.transcript()));
+    assert_eq!((report.verdict, report.unit), (Verdict::Done, UnitNow::Application), "{report:?}");
+    assert_eq!(
+        (report.version_before, report.version_after),
+        (Some(Version::new(2, 1, 1)), Some(Version::new(2, 2, 0)))
+    );
+    let steps = [Phase::EnterLoader, Phase::Transfer, Phase::Erase, Phase::Transfer, Phase::Finish, Phase::Verify];
+    assert_eq!(phases, steps, "{}", bench.transcript());
+    assert!(bench.unit.unit().flash() == flash_with(&image), "and nothing else is left in the flash");
+}
+
+#[test]
+fn what_a_ring_of_550_characters_costs_at_any_latency() {
+    let image = image_of("AXRTD8CO", "2.2.0", 20_000);
+    for (latency, most) in [(0, 1.02), (4, 1.02), (16, 1.02), (20, 1.2)] {
+        let mut bench = rtd8(Duration::from_millis(latency));
+        bench.wire.clear();
+        let report = bench.load(order(image.clone()));
+        assert_eq!(report.verdict, Verdict::Done, "{latency} ms: {report:?}");
+        let line = bench.wire.len() as f64 / 11_520.0;
+        // Erasing, and what is waited for behind the end record until the new banner is complete.
+        let ratio = (report.duration.as_secs_f64() - 10.24 - 0.6) / line;
+        assert!(ratio > 0.9 && ratio <= most, "{latency} ms: {ratio}");
+    }
+}
+
+/// A product to upload to, the version in the unit and the one to upload.
+struct Target {
+    product: &'static Product,
+    before: &'static str,
+    after: &'static str,
+    /// How long an upload takes, about, in ms.
+    takes_ms: u64,
+    /// How many characters the unit says meanwhile, about.
+    says: u64,
+}
+
+/// Which product a seed draws.
+fn target(seed: u64) -> Target {
+    if Rng::new(seed).fork("product").chance(50) {
+        Target { product: axtc4co(), before: "1.1.0", after: "1.2.0", takes_ms: 3_000, says: 700 }
+    } else {
+        Target { product: axrtd8co(), before: "2.1.1", after: "2.2.0", takes_ms: 14_000, says: 1_800 }
+    }
+}
+
 /// What a seed does to an upload: characters changed, lost or doubled on either way, a power cut, an adapter's latency.
-fn disturbed(seed: u64) -> Bench {
+fn disturbed(seed: u64, target: &Target) -> Bench {
     let mut rng = Rng::new(seed).fork("upload faults");
-    let mut bench = Bench::with(factory_flash("1.1.0"), Duration::from_millis(rng.below(21)));
+    let flash = flash_with(&small_image(&target.product.name, target.before));
+    let latency = Duration::from_millis(rng.below(21));
+    let mut bench = Bench::of(target.product, target.product.loader.kind, flash, latency);
     bench.run_for(Duration::from_secs(4));
     let fault = |rng: &mut Rng, span: u64| {
         let (at, kind, bit) = (rng.below(span), rng.below(3), rng.below(8));
@@ -184,21 +259,22 @@ fn disturbed(seed: u64) -> Bench {
         bench.disturb(fault(&mut rng, 15_000));
     }
     if rng.chance(60) {
-        bench.disturb_answers(fault(&mut rng, 700));
+        bench.disturb_answers(fault(&mut rng, target.says));
     }
     bench
 }
 
 /// Runs one seed: the verdict has to be true, and the next upload has to succeed.
 fn upload_with_faults(seed: u64) {
-    let image = small_image("AXTC4CO", "1.2.0");
+    let target = target(seed);
+    let image = small_image(&target.product.name, target.after);
     let wanted = flash_with(&image);
     let end = image.identity().expect("an identity").program_words as usize * 2;
-    let mut bench = disturbed(seed);
+    let mut bench = disturbed(seed, &target);
     let mut rng = Rng::new(seed).fork("power");
     bench.command(Command::Load(Box::new(order(image.clone()))));
     if rng.chance(30) {
-        let moment = Duration::from_millis(rng.below(3_000));
+        let moment = Duration::from_millis(rng.below(target.takes_ms));
         bench.run_for(moment);
         // What was said before a power cut says nothing about after it.
         if bench.session.job().is_some() {
@@ -226,7 +302,7 @@ fn upload_with_faults(seed: u64) {
     bench.leave_in_peace();
     bench.run_for(Duration::from_secs(3));
     let mut again = order(image);
-    again.product = Some("AXTC4CO".into());
+    again.product = Some(target.product.name.clone());
     let second = bench.load(again);
     assert_eq!(second.verdict, Verdict::Done, "seed {seed}: first {report:?}\nthen {second:?}\n{}", bench.transcript());
     assert!(bench.unit.unit().flash()[..end] == wanted[..end], "seed {seed}: the second upload");

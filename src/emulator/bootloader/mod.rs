@@ -1,290 +1,68 @@
-//! The G1 loader: takes an S-record file and writes it to program flash, page by page.
+//! The loaders a unit may have in its boot flash: they take an S-record file and write it to program flash.
 //!
-//! A public fact about the Motorola SDK's loaders for 16-bit parts, likely but not proven for these units. Its
-//! texts are its own and the manual's prompt (AXTC4CO manual, section 4.1.5), so no dialect touches them. It lives
-//! in flash of its own: no file can damage it. It knows nothing of what it loads: success means that S7 has come.
-//! Which program runs after the reset is decided by the unit (`emulator/mod.rs`).
+//! Two generations, each with its own habits ([`g1`], [`g3`]), behind one door. A loader lives in flash of its own: no
+//! file can damage it. It knows nothing of what it loads: success means that the end record has come. Which program
+//! runs after the reset is decided by the unit (`emulator/mod.rs`).
 //!
-//! Decisions where no fact was at hand, all guesses: both cases of hex digits; an S0 in the middle of a load begins
-//! a new one; what comes while an error text leaves is lost without another error; after an error the sender is let
-//! go on (XON) if it was stopped; S7 waits for silence like a full page does.
+//! What the manual quotes of a product's loader comes from the product's file and wins over what the public loaders
+//! print. No dialect touches these texts.
 
-mod record;
+mod g1;
+mod g3;
 
-use super::memory::{Flash, StartDelay, Written};
-use super::uart::{XOFF, XON};
-use super::{Board, Reset};
-use crate::time::{Duration, Instant};
-use record::{DataRecord, Decoder, Fault, Record};
-
-/// Silence on the line after which the loader stops to listen and begins to write (about 0.6 ms, public fact).
-pub const SILENCE: Duration = Duration::from_micros(600);
-
-/// Copyright and name; the middle of the line is not known to the letter.
-const HEADER: &str = "(c) Motorola Inc. S-Record loader. Version 1.3";
-
-/// Address flag of data memory in CodeWarrior's files.
-const DATA_FLAG: u32 = 0x0200_0000;
-/// High half of data memory addresses as this loader counts them.
-const DATA_HIGH_HALF: u32 = 0x0020;
+use super::Board;
+use super::memory::Flash;
+use crate::device::LoaderKind;
+use crate::time::Instant;
 
 /// The loader while it runs.
 #[derive(Debug)]
-pub struct Bootloader {
-    decoder: Decoder,
-    activity: Activity,
-    load: Option<Load>,
-    heard_at: Instant,
-    /// Texts are leaving and nobody listens until then.
-    deaf_until: Instant,
-    /// XOFF has been sent, XON not yet.
-    holds_sender: bool,
-    /// Dots have been printed on the last line.
-    line_begun: bool,
-}
-
-/// What the loader is doing.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Activity {
-    Listening,
-    /// The page buffer has to be written, as soon as the line is silent.
-    AwaitingSilence(Then),
-    /// Flash is being written, the receiver is not served.
-    Writing {
-        then: Then,
-        overrun: bool,
-    },
-    /// The file is in: the reset follows when the last text has left.
-    Leaving,
-}
-
-/// What follows when a page is written.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Then {
-    /// Goes on with the record that did not fit the page.
-    TakeUp(DataRecord),
-    /// S7 has come.
-    Finish,
-}
-
-/// A load between S0 and S7.
-#[derive(Debug, Default)]
-struct Load {
-    page: Option<PageBuffer>,
-    program_words: u32,
-    data_words: u32,
-}
-
-#[derive(Debug)]
-struct PageBuffer {
-    page: u32,
-    words: Vec<u16>,
-}
-
-/// Where a word of the file goes.
-enum Place {
-    Program(u32),
-    Data,
-    Nowhere,
+pub enum Bootloader {
+    /// The SDK's.
+    G1(g1::Loader),
+    /// The one with a circular buffer.
+    G3(g3::Loader),
 }
 
 impl Bootloader {
-    /// Starts the loader: it says who it is and what it wants.
-    pub fn start(board: &mut Board<'_>) -> Self {
-        let mut loader = Bootloader {
-            decoder: Decoder::default(),
-            activity: Activity::Listening,
-            load: None,
-            heard_at: board.now,
-            deaf_until: Instant::ZERO,
-            holds_sender: false,
-            line_begun: false,
-        };
-        loader.say(board, &format!("{HEADER}\r\n"));
-        loader.deaf_until = board.uart.finished_at();
-        loader.prompt(board);
-        loader
+    /// Starts the loader: it says who it is and what it wants. `may_leave` says that there is an application it could
+    /// start instead.
+    pub fn start(kind: LoaderKind, board: &mut Board<'_>, may_leave: bool) -> Self {
+        match kind {
+            LoaderKind::G1 => Bootloader::G1(g1::Loader::start(board)),
+            LoaderKind::G3 => Bootloader::G3(g3::Loader::start(board, may_leave)),
+        }
     }
 
     /// A character has come.
     pub fn receive(&mut self, board: &mut Board<'_>, character: u8) {
-        match &mut self.activity {
-            Activity::Writing { overrun, .. } => *overrun = true,
-            Activity::Leaving => {}
-            // Nothing is decoded behind S7, but the line is not silent.
-            Activity::AwaitingSilence(Then::Finish) => self.heard_at = board.now,
-            Activity::Listening | Activity::AwaitingSilence(Then::TakeUp(_)) => {
-                if board.now < self.deaf_until {
-                    return;
-                }
-                self.heard_at = board.now;
-                match self.decoder.take(character, self.load.is_some()) {
-                    Ok(None) => {}
-                    Ok(Some(record)) => self.take(board, record),
-                    Err(fault) => self.fail(board, fault),
-                }
-            }
+        match self {
+            Bootloader::G1(loader) => loader.receive(board, character),
+            Bootloader::G3(loader) => loader.receive(board, character),
         }
     }
 
     /// When something is due.
     pub fn deadline(&self, flash: &Flash) -> Option<Instant> {
-        match self.activity {
-            Activity::AwaitingSilence(_) => Some(self.heard_at + SILENCE),
-            Activity::Writing { .. } => flash.deadline(),
-            Activity::Listening | Activity::Leaving => None,
+        match self {
+            Bootloader::G1(loader) => loader.deadline(flash),
+            Bootloader::G3(loader) => loader.deadline(flash),
         }
     }
 
     /// Does what is due.
     pub fn step(&mut self, board: &mut Board<'_>) {
-        if self.deadline(board.flash).is_none_or(|due| due > board.now) {
-            return;
-        }
-        match std::mem::replace(&mut self.activity, Activity::Listening) {
-            Activity::AwaitingSilence(then) => self.begin_to_write(board, then),
-            Activity::Writing { then, overrun } => match board.flash.step(board.now, board.stores) {
-                None => self.activity = Activity::Writing { then, overrun },
-                Some(Written::Mismatch) => self.fail(board, Fault::Flash),
-                Some(Written::Good) if overrun => self.fail(board, Fault::Receive),
-                Some(Written::Good) => self.written(board, then),
-            },
-            other @ (Activity::Listening | Activity::Leaving) => self.activity = other,
+        match self {
+            Bootloader::G1(loader) => loader.step(board),
+            Bootloader::G3(loader) => loader.step(board),
         }
     }
 
     /// Whether the sender is stopped.
     pub fn holds_sender(&self) -> bool {
-        self.holds_sender
-    }
-
-    fn take(&mut self, board: &mut Board<'_>, record: Record) {
-        match record {
-            Record::Header => self.begin(board),
-            Record::Data(_) if self.activity != Activity::Listening => self.fail(board, Fault::Overrun),
-            Record::Data(data) => self.collect(board, data),
-            // A record that is parked is lost here, and success is reported all the same.
-            Record::End => self.activity = Activity::AwaitingSilence(Then::Finish),
+        match self {
+            Bootloader::G1(loader) => loader.holds_sender(),
+            Bootloader::G3(loader) => loader.holds_sender(),
         }
-    }
-
-    /// From here on only a complete file brings the application back.
-    fn begin(&mut self, board: &mut Board<'_>) {
-        self.let_go_on(board);
-        self.activity = Activity::Listening;
-        self.load = Some(Load::default());
-        board.parameters.change(board.stores, |values| values.start_delay = StartDelay::WaitsForEver);
-    }
-
-    /// Puts the words of a record into the page buffer; where another page begins, the rest is parked and the sender
-    /// stopped.
-    fn collect(&mut self, board: &mut Board<'_>, data: DataRecord) {
-        let Some(load) = &mut self.load else { return };
-        let map = board.flash.map();
-        for (number, &word) in data.words.iter().enumerate() {
-            let address = data.address.wrapping_add(number as u32);
-            match place(address, map.program_words) {
-                Place::Nowhere => {}
-                Place::Data => load.data_words += 1,
-                Place::Program(word_address) => {
-                    let page = word_address / map.page_words;
-                    let buffer = load.page.get_or_insert_with(|| PageBuffer { page, words: board.flash.page(page) });
-                    if buffer.page != page {
-                        let rest = DataRecord { address, words: data.words[number..].to_vec() };
-                        self.activity = Activity::AwaitingSilence(Then::TakeUp(rest));
-                        self.holds_sender = true;
-                        board.uart.send(board.now, &[XOFF]);
-                        return;
-                    }
-                    buffer.words[(word_address % map.page_words) as usize] = word;
-                    load.program_words += 1;
-                }
-            }
-        }
-    }
-
-    fn begin_to_write(&mut self, board: &mut Board<'_>, then: Then) {
-        match self.load.as_mut().and_then(|load| load.page.take()) {
-            Some(buffer) => {
-                board.flash.write_page(board.now, buffer.page, buffer.words);
-                self.activity = Activity::Writing { then, overrun: false };
-            }
-            None => self.go_on(board, then),
-        }
-    }
-
-    fn written(&mut self, board: &mut Board<'_>, then: Then) {
-        self.say(board, ".");
-        self.line_begun = true;
-        self.go_on(board, then);
-    }
-
-    fn go_on(&mut self, board: &mut Board<'_>, then: Then) {
-        self.let_go_on(board);
-        match then {
-            Then::TakeUp(rest) => self.collect(board, rest),
-            Then::Finish => self.finish(board),
-        }
-    }
-
-    fn finish(&mut self, board: &mut Board<'_>) {
-        let load = self.load.take().unwrap_or_default();
-        board.parameters.change(board.stores, |values| {
-            values.start_delay = StartDelay::AtOnce;
-            values.first_start = true;
-        });
-        self.end_line(board);
-        self.say(
-            board,
-            &format!("Loaded 0x{:04X} Program and 0x{:04X} Data words.\r\n", load.program_words, load.data_words),
-        );
-        self.say(board, "Application started.\r\n");
-        self.activity = Activity::Leaving;
-        *board.reset = Some(Reset::Start);
-    }
-
-    /// Says what is wrong and starts over: what is in the page buffer or parked is lost, S0 is wanted again.
-    fn fail(&mut self, board: &mut Board<'_>, fault: Fault) {
-        self.decoder = Decoder::default();
-        self.activity = Activity::Listening;
-        self.load = None;
-        self.end_line(board);
-        self.say(board, &format!("Error # {:04}\r\nRestarting.\r\n", fault.number()));
-        self.deaf_until = board.uart.finished_at();
-        self.let_go_on(board);
-        self.prompt(board);
-    }
-
-    fn let_go_on(&mut self, board: &mut Board<'_>) {
-        if std::mem::take(&mut self.holds_sender) {
-            board.uart.send(board.now, &[XON]);
-        }
-    }
-
-    fn prompt(&mut self, board: &mut Board<'_>) {
-        self.say(board, &format!("{}\r\n", board.product.console.loader_prompt));
-    }
-
-    fn end_line(&mut self, board: &mut Board<'_>) {
-        if std::mem::take(&mut self.line_begun) {
-            self.say(board, "\r\n");
-        }
-    }
-
-    fn say(&mut self, board: &mut Board<'_>, text: &str) {
-        board.uart.send(board.now, text.as_bytes());
-    }
-}
-
-/// Where a word goes: an address of a larger part of the family is folded into this one's flash, an address that
-/// makes no sense is skipped, both without a word.
-fn place(address: u32, program_words: u32) -> Place {
-    let high_half = address >> 16;
-    if address & DATA_FLAG != 0 || high_half == DATA_HIGH_HALF {
-        Place::Data
-    } else if high_half < DATA_HIGH_HALF {
-        Place::Program(address % program_words)
-    } else {
-        Place::Nowhere
     }
 }

@@ -6,12 +6,11 @@
 use std::collections::VecDeque;
 
 use super::super::{Area, Store};
+use crate::device::ERASE_TIME;
 use crate::image::FlashMap;
 use crate::rng::Rng;
 use crate::time::{Duration, Instant};
 
-/// Erasing one page (public data sheet of the 56F83xx, likely the part).
-pub const ERASE_TIME: Duration = Duration::from_millis(20);
 /// Programming one word (public data sheet of the 56F83xx, likely the part).
 pub const PROGRAM_TIME: Duration = Duration::from_micros(20);
 
@@ -29,7 +28,7 @@ pub struct Flash {
     chance: Rng,
 }
 
-/// How a page write ended.
+/// How a write ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Written {
     /// Every word reads back as wanted.
@@ -38,7 +37,7 @@ pub enum Written {
     Mismatch,
 }
 
-/// A page on its way from its old content to the new one.
+/// Words on their way from their old content to the new one.
 #[derive(Debug)]
 struct Operation {
     first_word: u32,
@@ -51,7 +50,7 @@ enum Stage {
     Erasing {
         until: Instant,
     },
-    /// The words (numbers within the page) that are programmed one after the other from `since` on.
+    /// The words (numbers within the operation) that are programmed one after the other from `since` on.
     Programming {
         since: Instant,
         words: Vec<usize>,
@@ -115,6 +114,28 @@ impl Flash {
         self.operation = Some(Operation { first_word: page * self.map.page_words, wanted, stage });
     }
 
+    /// Begins to erase words, whether they need it or not.
+    ///
+    /// # Panics
+    /// If another write still runs or the flash has no such words.
+    pub fn erase(&mut self, now: Instant, first_word: u32, words: u32) {
+        assert!(self.operation.is_none(), "one flash operation at a time");
+        assert!(first_word + words <= self.map.program_words, "no such words to erase");
+        let wanted = vec![ERASED; words as usize];
+        self.operation = Some(Operation { first_word, wanted, stage: Stage::Erasing { until: now + ERASE_TIME } });
+    }
+
+    /// Begins to program words as they are, each in its turn, without erasing anything.
+    ///
+    /// # Panics
+    /// If another write still runs or the flash has no such words.
+    pub fn program_words(&mut self, now: Instant, first_word: u32, wanted: Vec<u16>) {
+        assert!(self.operation.is_none(), "one flash operation at a time");
+        assert!(first_word as usize + wanted.len() <= self.map.program_words as usize, "no such words to program");
+        let words = (0..wanted.len()).collect();
+        self.operation = Some(Operation { first_word, wanted, stage: Stage::Programming { since: now, words } });
+    }
+
     /// When something is due.
     pub fn deadline(&self) -> Option<Instant> {
         self.operation.as_ref().map(|operation| match &operation.stage {
@@ -123,7 +144,7 @@ impl Flash {
         })
     }
 
-    /// Does what is due; says so when the page is done.
+    /// Does what is due; says so when the words are done.
     pub fn step(&mut self, now: Instant, stores: &mut VecDeque<Store>) -> Option<Written> {
         if self.deadline().is_none_or(|due| due > now) {
             return None;
@@ -140,7 +161,7 @@ impl Flash {
             }
             Stage::Programming { words, .. } => {
                 self.program(first_word, &words, &operation.wanted, stores);
-                let good = self.page(first_word / self.map.page_words) == operation.wanted;
+                let good = (first_word..).zip(&operation.wanted).all(|(address, &wanted)| self.word(address) == wanted);
                 Some(if good { Written::Good } else { Written::Mismatch })
             }
         }
@@ -233,6 +254,20 @@ mod tests {
         flash.write_page(at, 1, vec![0xFFFF; 8]);
         assert_eq!(finish(&mut flash, &mut stores).0.since(at), ERASE_TIME, "erased, nothing to program");
         assert_eq!(flash.page(0), vec![0xFFFF; 8], "the other page is as it was");
+    }
+
+    #[test]
+    fn words_are_programmed_without_an_erase_and_a_bit_that_is_cleared_stays_so() {
+        let (mut flash, mut stores) = flash(0xFF);
+        flash.program_words(Instant::ZERO, 6, vec![0x00FF, 0x1234, 0xFFFF]);
+        let (at, written) = finish(&mut flash, &mut stores);
+        assert_eq!((at, written), (Instant::from_micros(60), Written::Good), "3 words at 20 µs");
+        flash.program_words(at, 6, vec![0xFF00]);
+        assert_eq!(finish(&mut flash, &mut stores).1, Written::Mismatch);
+        assert_eq!((flash.word(6), flash.word(7), flash.word(8)), (0x0000, 0x1234, 0xFFFF));
+        flash.erase(at, 6, 1);
+        assert_eq!(finish(&mut flash, &mut stores).1, Written::Good);
+        assert_eq!((flash.word(6), flash.word(7)), (0xFFFF, 0x1234));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod console;
 mod dictionary;
 mod loader;
+mod loader_g3;
 mod rtd;
 
 use axcon::canopen::{ObjectAddress, Value};

@@ -46,8 +46,12 @@ impl Bench {
 
     /// A unit with this flash, just powered on, behind an adapter of this latency.
     pub fn with(flash: Vec<u8>, latency: Duration) -> Self {
-        let product = axtc4co();
-        let setup = Setup { product, loader: LoaderKind::G1, seed: 1, dialect: 0, flash, parameters: Vec::new() };
+        Bench::of(axtc4co(), LoaderKind::G1, flash, latency)
+    }
+
+    /// A unit of a product with this loader and this flash, just powered on, behind an adapter of this latency.
+    pub fn of(product: &'static Product, loader: LoaderKind, flash: Vec<u8>, latency: Duration) -> Self {
+        let setup = Setup { product, loader, seed: 1, dialect: 0, flash, parameters: Vec::new() };
         let mut unit = Unit::new(setup);
         unit.power_on(Instant::ZERO);
         Bench {
@@ -201,14 +205,28 @@ impl Bench {
     }
 }
 
-/// The product under test.
+/// The product of most tests.
 pub fn axtc4co() -> &'static Product {
-    Product::named("AXTC4CO").expect("a product of this name")
+    named("AXTC4CO")
+}
+
+/// The product with eight channels, more flash and another loader.
+pub fn axrtd8co() -> &'static Product {
+    named("AXRTD8CO")
+}
+
+fn named(product: &str) -> &'static Product {
+    Product::named(product).expect("a product of this name")
 }
 
 /// An image small enough for many runs: 3,000 words, 12 pages, the last one partly filled.
 pub fn small_image(product: &str, version: &str) -> CheckedImage {
     checked(product, version, 3000)
+}
+
+/// An image of this many words.
+pub fn image_of(product: &str, version: &str, words: u32) -> CheckedImage {
+    checked(product, version, words)
 }
 
 /// An image of the usual size.
@@ -221,9 +239,10 @@ pub fn factory_flash(version: &str) -> Vec<u8> {
     flash_with(&small_image("AXTC4CO", version))
 }
 
-/// Erased program flash with just this image in it.
+/// Erased program flash, of the image's product, with just this image in it.
 pub fn flash_with(image: &CheckedImage) -> Vec<u8> {
-    let mut flash = vec![0xFF; axtc4co().flash.program_words as usize * 2];
+    let product = named(&image.identity().expect("an image that says what it is").product);
+    let mut flash = vec![0xFF; product.flash.program_words as usize * 2];
     for block in &image.image().blocks {
         let at = block.address as usize * 2;
         flash[at..at + block.data.len()].copy_from_slice(&block.data);
@@ -237,7 +256,7 @@ pub fn order(image: CheckedImage) -> LoadOrder {
 }
 
 fn checked(product: &str, version: &str, words: u32) -> CheckedImage {
-    let product = Product::named(product).expect("a product of this name");
+    let product = named(product);
     let version: Version = version.parse().expect("a version");
     let target = product.target();
     let recipe = make::Recipe { target: &target, version, words, flaw: None };

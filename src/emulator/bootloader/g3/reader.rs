@@ -1,0 +1,325 @@
+//! S-records as the G3 loader reads them: character by character out of its ring, believing the length byte.
+//!
+//! A digit that is none counts as 0, and so do the letters in lower case. Nothing is looked up before it is needed: a
+//! record that ends early is filled with what comes behind it. S0 is read with a four-byte address, so the usual
+//! `S0030000FC` makes the length of its text 3 - 5, which is 254 in a byte: the next records are taken for text.
+//! The words of a data record are handed out before the check sum is read. Whatever stands behind it is skipped up to
+//! the CR, so a file with LF alone is mute for ever; an LF behind the CR is where the next record should begin.
+//!
+//! Public facts (docs/loaders.md), likely but not proven for these units. The types beside S0, S3 and S7 are decided in
+//! errata E-I12.
+
+/// What is wrong with a file, by the bits of the loader's status word (public facts about the loader).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The sum is wrong.
+    Checksum,
+    /// No record, one of a type it does not take, or one out of order.
+    Type,
+    /// A word does not read back as programmed.
+    Program,
+    /// The entry point is not in the application's flash.
+    StartAddress,
+    /// Data outside of the application's flash.
+    AddressRange,
+}
+
+impl Fault {
+    /// Its bit.
+    pub fn bit(self) -> u16 {
+        match self {
+            Fault::Checksum => 0x0001,
+            Fault::Type => 0x0002,
+            Fault::Program => 0x0010,
+            Fault::StartAddress => 0x0020,
+            Fault::AddressRange => 0x0080,
+        }
+    }
+}
+
+/// What a character leads to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Read {
+    /// More characters are wanted.
+    Nothing,
+    /// A character of the header's text.
+    Text(u8),
+    /// Words to program, before anything else is read.
+    Words {
+        /// Address of the first one.
+        address: u32,
+        /// Words, low byte first in the record; half a word is filled up as erased flash reads (a guess).
+        words: Vec<u16>,
+    },
+    /// A record is over, its check sum is right.
+    End(Kind),
+}
+
+/// What a record is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// S0.
+    Header,
+    /// S1, S2, S3.
+    Data,
+    /// S7, S8, S9, with the entry point.
+    Terminator(u32),
+}
+
+/// Takes characters.
+#[derive(Debug, Default)]
+pub struct Reader {
+    place: Place,
+}
+
+/// Where in a record the next character stands.
+#[derive(Debug, Default)]
+enum Place {
+    #[default]
+    Start,
+    Type,
+    Body(Body),
+    /// Behind the check sum.
+    LineEnd(Kind),
+}
+
+#[derive(Debug)]
+struct Body {
+    shape: Shape,
+    high_digit: Option<u8>,
+    part: Part,
+    sum: u8,
+    address: u32,
+    data: Vec<u8>,
+    /// Data bytes that are still to come.
+    data_left: u8,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Length,
+    /// So many bytes of it are still to come.
+    Address(u8),
+    Data,
+    Checksum,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shape {
+    Header,
+    Data,
+    Terminator,
+}
+
+impl Reader {
+    /// Takes the next character. `header_seen` says whether an S0 has come: nothing else is taken before it.
+    ///
+    /// # Errors
+    /// What the loader has against it. The caller starts over with a new reader.
+    pub fn take(&mut self, character: u8, header_seen: bool) -> Result<Read, Fault> {
+        match &mut self.place {
+            Place::Start if character == b'S' => self.place = Place::Type,
+            Place::Start => return Err(Fault::Type),
+            Place::Type => {
+                let (shape, address_bytes) = match character {
+                    b'0' => (Shape::Header, 4),
+                    b'1' if header_seen => (Shape::Data, 2),
+                    b'2' if header_seen => (Shape::Data, 3),
+                    b'3' if header_seen => (Shape::Data, 4),
+                    b'7' if header_seen => (Shape::Terminator, 4),
+                    b'8' if header_seen => (Shape::Terminator, 3),
+                    b'9' if header_seen => (Shape::Terminator, 2),
+                    _ => return Err(Fault::Type),
+                };
+                self.place = Place::Body(Body {
+                    shape,
+                    high_digit: None,
+                    part: Part::Length,
+                    sum: 0,
+                    address: 0,
+                    data: Vec::new(),
+                    // Until the length is known: what it counts beside the data.
+                    data_left: address_bytes,
+                });
+            }
+            Place::Body(body) => {
+                let digit = digit(character);
+                let Some(high) = body.high_digit.take() else {
+                    body.high_digit = Some(digit);
+                    return Ok(Read::Nothing);
+                };
+                let (read, end) = body.take(high << 4 | digit)?;
+                if let Some(kind) = end {
+                    self.place = Place::LineEnd(kind);
+                }
+                return Ok(read);
+            }
+            Place::LineEnd(kind) => {
+                let kind = *kind;
+                if character == b'\r' {
+                    self.place = Place::Start;
+                    return Ok(Read::End(kind));
+                }
+            }
+        }
+        Ok(Read::Nothing)
+    }
+}
+
+impl Body {
+    /// Takes a byte. Gives what follows, and the record's kind behind its check sum.
+    fn take(&mut self, byte: u8) -> Result<(Read, Option<Kind>), Fault> {
+        self.sum = self.sum.wrapping_add(byte);
+        match self.part {
+            Part::Length => {
+                let address_bytes = self.data_left;
+                self.data_left = byte.wrapping_sub(address_bytes + CHECKSUM_BYTES);
+                self.part = Part::Address(address_bytes);
+            }
+            Part::Address(left) => {
+                self.address = self.address << 8 | u32::from(byte);
+                self.part = match left - 1 {
+                    0 if self.data_left == 0 => Part::Checksum,
+                    0 => Part::Data,
+                    left => Part::Address(left),
+                };
+            }
+            Part::Data => {
+                self.data_left -= 1;
+                let is_last = self.data_left == 0;
+                if is_last {
+                    self.part = Part::Checksum;
+                }
+                match self.shape {
+                    Shape::Header => return Ok((Read::Text(byte), None)),
+                    Shape::Data => self.data.push(byte),
+                    Shape::Terminator => {}
+                }
+                if is_last && self.shape == Shape::Data {
+                    return Ok((Read::Words { address: self.address, words: words(&self.data) }, None));
+                }
+            }
+            Part::Checksum if self.sum != 0xFF => return Err(Fault::Checksum),
+            Part::Checksum => {
+                let kind = match self.shape {
+                    Shape::Header => Kind::Header,
+                    Shape::Data => Kind::Data,
+                    Shape::Terminator => Kind::Terminator(self.address),
+                };
+                return Ok((Read::Nothing, Some(kind)));
+            }
+        }
+        Ok((Read::Nothing, None))
+    }
+}
+
+/// Bytes of the check sum, which the length byte counts.
+const CHECKSUM_BYTES: u8 = 1;
+
+fn words(data: &[u8]) -> Vec<u16> {
+    data.chunks(2).map(|pair| u16::from_le_bytes([pair[0], pair.get(1).copied().unwrap_or(0xFF)])).collect()
+}
+
+fn digit(character: u8) -> u8 {
+    match character {
+        b'0'..=b'9' => character - b'0',
+        b'A'..=b'F' => character - b'A' + 10,
+        _ => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "S00700000000414275\r";
+
+    /// What comes of a text, up to the first fault.
+    fn read(text: &str) -> (Vec<Read>, Option<Fault>) {
+        let mut reader = Reader::default();
+        let (mut reads, mut header_seen) = (Vec::new(), false);
+        for character in text.bytes() {
+            match reader.take(character, header_seen) {
+                Ok(Read::Nothing) => {}
+                Ok(read) => {
+                    header_seen |= read == Read::End(Kind::Header);
+                    reads.push(read);
+                }
+                Err(fault) => return (reads, Some(fault)),
+            }
+        }
+        (reads, None)
+    }
+
+    fn fault(text: &str) -> Option<Fault> {
+        read(&(HEADER.to_owned() + text)).1
+    }
+
+    #[test]
+    fn words_come_before_the_check_sum_and_the_end_behind_the_return() {
+        let text = HEADER.to_owned() + "S309000000803412CDABB8";
+        let words = Read::Words { address: 0x80, words: vec![0x1234, 0xABCD] };
+        let header = [Read::Text(b'A'), Read::Text(b'B'), Read::End(Kind::Header)];
+        let expected = [&header[..], &[words]].concat();
+        assert_eq!(read(&text[..text.len() - 2]), (expected.clone(), None), "no check sum yet");
+        assert_eq!(read(&text), (expected.clone(), None), "no return yet");
+        let expected = [&expected[..], &[Read::End(Kind::Data), Read::End(Kind::Terminator(0xA0))]].concat();
+        assert_eq!(read(&(text + "\rS705000000A05A\r")), (expected, None));
+    }
+
+    #[test]
+    fn short_addresses_are_taken_as_well() {
+        for (text, address) in [("S1050102AABB92", 0x102), ("S206010203AABB8E", 0x1_0203)] {
+            let (reads, fault) = read(&(HEADER.to_owned() + text + "\r"));
+            assert_eq!(fault, None, "{text}");
+            assert_eq!(reads[3], Read::Words { address, words: vec![0xBBAA] }, "{text}");
+        }
+        let (reads, _) = read(&(HEADER.to_owned() + "S804010203F5\rS9030102F9\r"));
+        assert_eq!(reads[3..], [Read::End(Kind::Terminator(0x1_0203)), Read::End(Kind::Terminator(0x102))]);
+    }
+
+    #[test]
+    fn lower_case_digits_are_zeros_and_so_the_sum_is_wrong() {
+        let (reads, fault) = read(&(HEADER.to_owned() + "S309000000803412cdabb8\r"));
+        assert_eq!(reads[3], Read::Words { address: 0x80, words: vec![0x1234, 0x0000] });
+        assert_eq!(fault, Some(Fault::Checksum));
+    }
+
+    #[test]
+    fn a_header_with_a_two_byte_address_swallows_what_follows() {
+        let text = "S0030000FC\r".to_owned() + &"S3090000008034120000B1\r".repeat(10);
+        let (reads, fault) = read(&text);
+        assert!(reads.iter().all(|read| matches!(read, Read::Text(_))), "{reads:?}");
+        assert_eq!(fault, None, "it is still reading the text");
+        assert_eq!(read(&"S0030000FC\r".repeat(60)).1, Some(Fault::Checksum), "in the end the sum is wrong");
+    }
+
+    #[test]
+    fn what_is_no_record_is_a_fault_of_type() {
+        for text in ["\n", "\r", "m", "s3", "S4", "S5", "S6", "SA"] {
+            assert_eq!(fault(text), Some(Fault::Type), "{text:?}");
+        }
+        assert_eq!(read("S3").1, Some(Fault::Type), "data before the header");
+        assert_eq!(read("S7").1, Some(Fault::Type), "the end before the header");
+    }
+
+    #[test]
+    fn line_feeds_alone_are_mute_for_ever() {
+        let text = HEADER.replace('\r', "\n") + &"S705000000A05A\n".repeat(100);
+        assert_eq!(read(&text), (vec![Read::Text(b'A'), Read::Text(b'B')], None));
+    }
+
+    #[test]
+    fn nothing_that_comes_makes_it_panic() {
+        let mut rng = crate::rng::Rng::new(1);
+        for _ in 0..2_000 {
+            let mut reader = Reader::default();
+            for _ in 0..1_000 {
+                let character = b"S0123456789ABCDEF\r\n\xffa"[rng.below(21) as usize];
+                if reader.take(character, true).is_err() {
+                    reader = Reader::default();
+                }
+            }
+        }
+    }
+}

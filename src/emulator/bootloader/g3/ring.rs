@@ -1,0 +1,60 @@
+//! The receive ring: the interrupt puts characters in, the loader takes them out, and nobody looks whether it is full.
+
+use crate::device::RING;
+
+/// Characters received and not yet read. One too many takes the place of the oldest, which is then read twice: first
+/// as the new one, and again where that one belongs.
+#[derive(Debug)]
+pub struct Ring {
+    slots: Box<[u8; RING]>,
+    read: usize,
+    unread: usize,
+}
+
+impl Ring {
+    /// An empty ring.
+    pub fn new() -> Self {
+        Ring { slots: Box::new([0; RING]), read: 0, unread: 0 }
+    }
+
+    /// A character has come.
+    pub fn push(&mut self, character: u8) {
+        self.slots[(self.read + self.unread) % RING] = character;
+        self.unread += 1;
+    }
+
+    /// The next character.
+    pub fn pop(&mut self) -> Option<u8> {
+        self.unread = self.unread.checked_sub(1)?;
+        let character = self.slots[self.read];
+        self.read = (self.read + 1) % RING;
+        Some(character)
+    }
+
+    /// Forgets what has not been read.
+    pub fn clear(&mut self) {
+        self.read = (self.read + self.unread) % RING;
+        self.unread = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_ring_gives_back_everything_and_one_more_takes_the_place_of_the_oldest() {
+        let sent: Vec<u8> = (0..RING).map(|number| number as u8).collect();
+        let mut ring = Ring::new();
+        for round in 0..3 {
+            sent.iter().for_each(|&character| ring.push(character));
+            let read: Vec<u8> = std::iter::from_fn(|| ring.pop()).collect();
+            assert_eq!(read, sent, "round {round}");
+        }
+        sent.iter().for_each(|&character| ring.push(character));
+        ring.push(b'!');
+        assert_eq!((ring.pop(), ring.pop()), (Some(b'!'), Some(1)));
+        ring.clear();
+        assert_eq!(ring.pop(), None);
+    }
+}
