@@ -129,6 +129,36 @@ impl DataType {
         })
     }
 
+    /// Reads a value as people write it: decimal, `0x1F`, `1Fh`, with a point or an exponent for a REAL32, `true` or
+    /// `false` for a BOOLEAN.
+    pub fn parse(self, text: &str) -> Option<Value> {
+        let text = text.trim();
+        if self == DataType::Boolean {
+            match text.to_ascii_lowercase().as_str() {
+                "true" => return Some(Value::Boolean(true)),
+                "false" => return Some(Value::Boolean(false)),
+                _ => {}
+            }
+        }
+        let hexadecimal = text
+            .strip_prefix("0x")
+            .or_else(|| text.strip_prefix("0X"))
+            .or_else(|| text.strip_suffix(['h', 'H']))
+            .filter(|digits| !digits.is_empty() && digits.bytes().all(|digit| digit.is_ascii_hexdigit()));
+        if let Some(digits) = hexadecimal {
+            let bits = u32::from_str_radix(digits, 16).ok()?;
+            return if self == DataType::Real32 {
+                Some(Value::Real32(f32::from_bits(bits)))
+            } else {
+                self.integer(i64::from(bits))
+            };
+        }
+        match self {
+            DataType::Real32 => text.parse().ok().filter(|value: &f32| value.is_finite()).map(Value::Real32),
+            _ => text.parse().ok().and_then(|number| self.integer(number)),
+        }
+    }
+
     /// Reads a value as it is on the bus; `None` if the length is not that of the type, or a BOOLEAN is neither 0 nor
     /// 1.
     pub fn decode(self, bytes: &[u8]) -> Option<Value> {
@@ -268,6 +298,27 @@ mod tests {
             assert_eq!(data_type.integer(low).and_then(Value::as_integer), Some(low));
             assert_eq!(data_type.integer(high).and_then(Value::as_integer), Some(high));
             assert_eq!((data_type.integer(low - 1), data_type.integer(high + 1)), (None, None), "{data_type:?}");
+        }
+    }
+
+    #[test]
+    fn values_are_read_as_people_write_them() {
+        let table = [
+            (DataType::Unsigned16, "0x1F", Some(Value::Unsigned16(31))),
+            (DataType::Unsigned16, "1Fh", Some(Value::Unsigned16(31))),
+            (DataType::Integer16, " -200 ", Some(Value::Integer16(-200))),
+            (DataType::Real32, "1.5e2", Some(Value::Real32(150.0))),
+            (DataType::Real32, "0xFFFFFFFF", Some(Value::NOT_A_NUMBER)),
+            (DataType::Boolean, "True", Some(Value::Boolean(true))),
+            (DataType::Boolean, "0", Some(Value::Boolean(false))),
+            (DataType::Unsigned8, "256", None),
+            (DataType::Unsigned8, "1.0", None),
+            (DataType::Unsigned8, "h", None),
+            (DataType::Real32, "inf", None),
+            (DataType::Unsigned32, "", None),
+        ];
+        for (data_type, text, value) in table {
+            assert_eq!(data_type.parse(text), value, "{text} as {data_type:?}");
         }
     }
 

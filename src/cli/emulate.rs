@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use super::Global;
 use super::error::{CliError, Kind};
 use super::output::Output;
+use crate::device::LoaderKind;
 
 /// Arguments of `axcon emulate`.
 ///
-/// While it runs, standard input takes verbs, one a line: `power off`, `power on`, `quit`, `help`; with several units,
-/// a number first says which one (`2 power off`). The end of standard input ends nothing; an interrupt is the normal
-/// end.
+/// While it runs, standard input takes verbs, one a line: `set 1 temperature 250`, `open 3`, `power off`, `read 6100:1`,
+/// `quit`, and what `help` lists; with several units, a number first says which one (`2 power off`), or `all`. The end
+/// of standard input ends nothing; an interrupt is the normal end.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// What to emulate, e.g. axtc4co; several give several units.
@@ -25,6 +26,18 @@ pub struct Args {
     /// Whether bytes take their time on the line; a client at another rate than 115200 then gets garbage.
     #[arg(long, value_name = "on|off", default_value = "on", value_parser = ["on", "off"], hide_possible_values = true)]
     line_rate: String,
+    /// Play FILE: what happens to the inputs, the wires and the supply, and when (docs/emulator.md).
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Word everything that the manuals leave open in another way for each SEED; further units get the next seeds.
+    #[arg(long, value_name = "SEED", value_parser = clap::value_parser!(u64).range(1..))]
+    dialect: Option<u64>,
+    /// Which bootloader is in the unit, if not the product's own.
+    #[arg(long, value_name = "PROFILE", value_parser = loader)]
+    loader: Option<LoaderKind>,
+    /// So many units of each product.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=MOST_UNITS as i64))]
+    count: u16,
     /// Decides everything that chance decides in a unit.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -32,6 +45,13 @@ pub struct Args {
 
 /// Units of one run: each has a pseudo-terminal and a thread.
 const MOST_UNITS: usize = 256;
+
+fn loader(name: &str) -> Result<LoaderKind, String> {
+    LoaderKind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
+        let known = LoaderKind::ALL.map(LoaderKind::name).join(", ");
+        format!("there is no such loader; there is {known}")
+    })
+}
 
 #[cfg(not(unix))]
 /// Says that it cannot be done here.
@@ -48,19 +68,22 @@ pub use hosting::run;
 #[cfg(unix)]
 mod hosting {
     use std::ffi::OsString;
-    use std::io::BufRead;
+    use std::io::{BufRead, Read};
     use std::path::{Path, PathBuf};
     use std::sync::mpsc::{Receiver, SyncSender};
 
     use serde::Serialize;
 
     use super::{Args, CliError, Global, Kind, Output};
+    use crate::device::Complaint;
     use crate::device::Product;
+    use crate::emulator::Unit;
+    use crate::emulator::scenario::{self, LARGEST_FILE, Scenario, Stage, Verb};
     use crate::host::Input;
     use crate::host::pty::{PortLink, PortLinkError};
     use crate::host::signal::Signals;
-    use crate::host::state::{Contents, State};
-    use crate::host::unit::{self, Command, HostError, HostedUnit, Hosting, LineRate};
+    use crate::host::state::{Contents, Opened, State};
+    use crate::host::unit::{self, Answer, HostError, HostedUnit, Hosting, LineRate};
 
     /// One unit, as the first lines of the output tell it.
     #[derive(Serialize)]
@@ -82,49 +105,125 @@ mod hosting {
     enum News {
         Input(Input),
         Line(String),
+        /// A unit has done what it was told, or not.
+        Answered {
+            place: usize,
+            verb: String,
+            answer: Answer,
+        },
         Failed(HostError),
     }
 
-    /// News that wait at most: lines a person types, and ends.
-    const NEWS: usize = 64;
+    /// What a unit answered, in JSON.
+    #[derive(Serialize)]
+    struct Answered<'a> {
+        schema: &'static str,
+        unit: usize,
+        verb: &'a str,
+        ok: bool,
+        said: Option<&'a str>,
+    }
+
+    /// News that wait at most: lines a person types or a script writes, answers, and ends.
+    const NEWS: usize = 256;
 
     /// Hosts units until the user has enough.
     ///
     /// # Errors
     /// If a unit cannot be hosted, at the start or later.
     pub fn run(args: Args, _global: &Global, output: &mut Output) -> Result<(), CliError> {
+        let products = products(&args)?;
+        let scenario = args.scenario.as_deref().map(read_scenario).transpose()?;
         let (news, happened) = std::sync::mpsc::sync_channel(NEWS);
         // Signals first: an interrupt in between would leave links behind.
         let signals = listen_for_signals(news.clone())?;
         let mut units = Vec::new();
-        for (place, name) in args.products.iter().enumerate() {
-            units.push(start(&args, place, name, news.clone())?);
+        for (place, product) in products.into_iter().enumerate() {
+            units.push(start(&args, place, product, scenario.as_ref(), news.clone(), output)?);
         }
         for running in &units {
             announce(running, output)?;
         }
-        listen_for_lines(news)?;
-        let end = serve(&units, &happened, output);
+        listen_for_lines(news.clone())?;
+        let end = serve(&units, &news, &happened, output);
         drop(signals);
         end
     }
 
-    fn start(args: &Args, place: usize, name: &str, news: SyncSender<News>) -> Result<Running, CliError> {
-        let product = Product::named(name).ok_or_else(|| {
-            let known: Vec<String> = Product::all().iter().map(|product| product.name.to_lowercase()).collect();
-            CliError::message(Kind::Usage, format!("there is no emulated '{name}'; there is {}", known.join(", ")))
+    /// The products of all units, in their order.
+    fn products(args: &Args) -> Result<Vec<&'static Product>, CliError> {
+        let mut products = Vec::new();
+        for name in &args.products {
+            let product = Product::named(name).ok_or_else(|| {
+                let known: Vec<String> = Product::all().iter().map(|product| product.name.to_lowercase()).collect();
+                CliError::message(Kind::Usage, format!("there is no emulated '{name}'; there is {}", known.join(", ")))
+            })?;
+            products.extend(std::iter::repeat_n(product, usize::from(args.count)));
+        }
+        if products.len() > super::MOST_UNITS {
+            let message = format!("{} units are more than {}", products.len(), super::MOST_UNITS);
+            return Err(CliError::message(Kind::Usage, message).hint("start 'axcon emulate' several times"));
+        }
+        Ok(products)
+    }
+
+    /// A scenario's file: its name and its text.
+    fn read_scenario(file: &Path) -> Result<(String, String), CliError> {
+        let name = file.display().to_string();
+        let failed = |error| {
+            CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the scenario '{name}'")))
+        };
+        let mut text = Vec::new();
+        std::fs::File::open(file)
+            .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut text))
+            .map_err(failed)?;
+        if text.len() as u64 > LARGEST_FILE {
+            let message = format!("the scenario '{name}' is larger than {} MiB", LARGEST_FILE >> 20);
+            return Err(CliError::message(Kind::Usage, message));
+        }
+        let text = String::from_utf8(text).map_err(|error| {
+            CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("'{name}' is no text")))
         })?;
+        Ok((name, text))
+    }
+
+    fn start(
+        args: &Args,
+        place: usize,
+        product: &'static Product,
+        scenario: Option<&(String, String)>,
+        news: SyncSender<News>,
+        output: &mut Output,
+    ) -> Result<Running, CliError> {
+        let scenario = match scenario {
+            None => Scenario::default(),
+            Some((file, text)) => Scenario::read(file, text, product)
+                .map_err(|complaints| {
+                    let list = Complaint::list(&complaints);
+                    CliError::message(Kind::Usage, format!("the scenario cannot be played:\n{list}"))
+                        .hint("docs/emulator.md describes the format")
+                })?
+                .unwrap_or_default(),
+        };
         let seed = args.seed.wrapping_add(place as u64);
-        let fresh = unit::factory_unit(product, seed);
-        let factory = Contents { flash: fresh.flash().to_vec(), parameters: fresh.parameters().to_vec() };
-        let (state, emulated) = match &args.state {
-            None => (None, fresh),
+        let mut setup = unit::factory_setup(product, seed);
+        setup.dialect = args.dialect.map_or(0, |dialect| dialect.wrapping_add(place as u64));
+        setup.loader = args.loader.unwrap_or(setup.loader);
+        let state = match &args.state {
+            None => None,
             Some(folder) => {
-                let (state, contents) = State::open(&numbered(folder, place), &factory)
+                let fresh = Unit::new(setup.clone());
+                let factory = Contents { flash: fresh.flash().to_vec(), parameters: fresh.parameters().to_vec() };
+                let Opened { state, contents, damaged } = State::open(&numbered(folder, place), product, &factory)
                     .map_err(|error| CliError::new(Kind::Failed, error))?;
-                (Some(state), unit::unit(product, seed, contents.flash, contents.parameters))
+                for file in damaged {
+                    output.remark(&format!("axcon: {file}"));
+                }
+                (setup.flash, setup.parameters) = (contents.flash, contents.parameters);
+                Some(state)
             }
         };
+        let emulated = Stage::new(Unit::new(setup), scenario);
         let hosting = Hosting {
             line_rate: if args.line_rate == "off" { LineRate::Off } else { LineRate::Real },
             state,
@@ -162,23 +261,61 @@ mod hosting {
         }
     }
 
-    fn serve(units: &[Running], happened: &Receiver<News>, output: &mut Output) -> Result<(), CliError> {
+    fn serve(
+        units: &[Running],
+        news: &SyncSender<News>,
+        happened: &Receiver<News>,
+        output: &mut Output,
+    ) -> Result<(), CliError> {
         loop {
             match happened.recv() {
-                Ok(News::Line(line)) => match Verb::read(&line, units.len()) {
-                    Ok(None) => {}
-                    Ok(Some(Verb::Quit)) => return Ok(()),
-                    Ok(Some(Verb::Help)) => output.remark(HELP),
-                    Ok(Some(Verb::Tell { place, command })) => {
-                        if !units[place].unit.command(command) {
-                            output.remark("the unit takes no more commands at the moment");
+                Ok(News::Line(line)) => {
+                    let products: Vec<&Product> = units.iter().map(|running| running.product).collect();
+                    match Order::read(&line, &products) {
+                        Ok(None) => {}
+                        Ok(Some(Order::Quit)) => return Ok(()),
+                        Ok(Some(Order::Help)) => output.remark(&help()),
+                        Ok(Some(Order::Tell(verbs))) => {
+                            for (place, verb) in verbs {
+                                tell(&units[place], place, verb, line.trim(), news, output);
+                            }
                         }
+                        Err(complaint) => output.remark(&complaint),
                     }
-                    Err(complaint) => output.remark(&complaint),
-                },
+                }
+                Ok(News::Answered { place, verb, answer }) => report(place, &verb, &answer, units.len(), output)?,
                 Ok(News::Failed(error)) => return Err(CliError::new(Kind::Failed, error)),
                 Ok(News::Input(Input::Signal(_))) | Err(_) => return Ok(()),
                 Ok(News::Input(_)) => {}
+            }
+        }
+    }
+
+    fn tell(running: &Running, place: usize, verb: Verb, line: &str, news: &SyncSender<News>, output: &mut Output) {
+        let (news, line) = (news.clone(), line.to_owned());
+        let answered = move |answer| {
+            // The unit's thread must not wait for us: an answer that nobody can take is dropped.
+            let _ = news.try_send(News::Answered { place, verb: line, answer });
+        };
+        if !running.unit.order(verb, answered) {
+            output.remark("the unit takes no more orders at the moment");
+        }
+    }
+
+    /// Says what came of a verb: data to standard output, refusals to standard error.
+    fn report(place: usize, verb: &str, answer: &Answer, units: usize, output: &mut Output) -> Result<(), CliError> {
+        if output.json {
+            let said = answer.as_ref().map_or_else(|refused| Some(refused.as_str()), Option::as_deref);
+            let schema = "axcon.emulate-answer/1";
+            return output.object(&Answered { schema, unit: place + 1, verb, ok: answer.is_ok(), said });
+        }
+        let unit = if units > 1 { format!("{}: ", place + 1) } else { String::new() };
+        match answer {
+            Ok(None) => Ok(()),
+            Ok(Some(said)) => output.data(format!("{unit}{said}\n").as_bytes()),
+            Err(refused) => {
+                output.remark(&format!("{unit}{refused}"));
+                Ok(())
             }
         }
     }
@@ -219,46 +356,48 @@ mod hosting {
     }
 
     /// What standard input can say.
-    #[derive(Debug, PartialEq, Eq)]
-    enum Verb {
+    #[derive(Debug, PartialEq)]
+    enum Order {
         Quit,
         Help,
-        Tell { place: usize, command: Command },
+        /// Verbs with the places of their units.
+        Tell(Vec<(usize, Verb)>),
     }
 
-    const HELP: &str = "power on     switch the unit's supply on
-power off    switch it off: all but flash and parameters is lost
-quit         end
-help         this text
-With several units, a number first says which one: 2 power off";
+    fn help() -> String {
+        format!(
+            "{}\nquit                       end\nhelp                       this text\n\
+             With several units, a number first says which one: 2 power off; 'all' means every one",
+            scenario::HELP
+        )
+    }
 
-    impl Verb {
+    impl Order {
         /// Reads a line; an empty one is nothing. The complaint says what exists.
-        fn read(line: &str, units: usize) -> Result<Option<Verb>, String> {
-            let words: Vec<String> = line.split_whitespace().map(str::to_ascii_lowercase).collect();
-            let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
-            let mut place = 0;
-            if let Some(number) = words.first().and_then(|word| word.parse::<usize>().ok()) {
-                if number == 0 || number > units {
-                    return Err(format!("there is no unit {number}: they are numbered 1 to {units}"));
-                }
-                place = number - 1;
-                words.remove(0);
-                if words.is_empty() {
-                    return Err(format!("what should unit {number} do? 'help' says what there is"));
-                }
+        fn read(line: &str, products: &[&Product]) -> Result<Option<Order>, String> {
+            let trimmed = line.trim();
+            match trimmed.to_ascii_lowercase().as_str() {
+                "" => return Ok(None),
+                "quit" => return Ok(Some(Order::Quit)),
+                "help" => return Ok(Some(Order::Help)),
+                _ => {}
             }
-            match words.as_slice() {
-                [] => Ok(None),
-                ["quit"] => Ok(Some(Verb::Quit)),
-                ["help"] => Ok(Some(Verb::Help)),
-                ["power", "on"] => Ok(Some(Verb::Tell { place, command: Command::PowerOn })),
-                ["power", "off"] => Ok(Some(Verb::Tell { place, command: Command::PowerOff })),
-                _ => {
-                    let line = crate::wire::visible::line(line.as_bytes());
-                    Err(format!("'{line}' is not known; there is: power on, power off, quit, help"))
+            let (first, rest) = trimmed.split_once(char::is_whitespace).unwrap_or((trimmed, ""));
+            let (places, verb) = if first.eq_ignore_ascii_case("all") {
+                ((0..products.len()).collect(), rest)
+            } else if let Ok(number) = first.parse::<usize>() {
+                if number == 0 || number > products.len() {
+                    return Err(format!("there is no unit {number}: they are numbered 1 to {}", products.len()));
                 }
-            }
+                (vec![number - 1], rest)
+            } else {
+                (vec![0], trimmed)
+            };
+            let verbs = places.into_iter().map(|place| Ok((place, Verb::read(verb, products[place])?)));
+            let verbs: Result<Vec<_>, scenario::VerbError> = verbs.collect();
+            verbs.map(|verbs| Some(Order::Tell(verbs))).map_err(|error| {
+                format!("{}: {error} ('help' says what there is)", crate::wire::visible::line(verb.as_bytes()))
+            })
         }
     }
 
@@ -277,15 +416,22 @@ With several units, a number first says which one: 2 power off";
         use super::*;
 
         #[test]
-        fn verbs_are_read_in_any_case_and_bad_ones_name_the_good() {
-            let read = |line: &str| Verb::read(line, 2);
-            assert_eq!(read(" Power  OFF "), Ok(Some(Verb::Tell { place: 0, command: Command::PowerOff })));
-            assert_eq!(read("2 power on"), Ok(Some(Verb::Tell { place: 1, command: Command::PowerOn })));
+        fn orders_name_their_units_and_bad_ones_name_the_good() {
+            let products: Vec<&Product> = Product::all().iter().collect();
+            let read = |line: &str| Order::read(line, &products);
+            let tell = |verbs: &[(usize, Verb)]| Ok(Some(Order::Tell(verbs.to_vec())));
+            assert_eq!(read(" Power  OFF "), tell(&[(0, Verb::Power(false))]));
+            assert_eq!(read("2 power on"), tell(&[(1, Verb::Power(true))]));
+            assert_eq!(read("ALL status"), tell(&[(0, Verb::Status), (1, Verb::Status)]));
             assert_eq!(read(""), Ok(None));
-            assert_eq!(read("quit"), Ok(Some(Verb::Quit)));
+            assert_eq!(read("Quit"), Ok(Some(Order::Quit)));
             assert_eq!(read("3 quit"), Err("there is no unit 3: they are numbered 1 to 2".into()));
             let complaint = read("explode\x1b[2J").expect_err("no such verb");
-            assert_eq!(complaint, "'explode^[[2J' is not known; there is: power on, power off, quit, help");
+            assert!(
+                complaint.starts_with("explode^[[2J: column 1: 'explode^[[2J' is not known; there is: set"),
+                "{complaint}"
+            );
+            assert!(read("2").expect_err("nothing to do").contains("a verb is missing"));
         }
 
         #[test]

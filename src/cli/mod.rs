@@ -4,6 +4,7 @@ pub mod confirm;
 pub mod console;
 pub mod defaults;
 pub mod diagnostics;
+pub mod eds;
 pub mod emulate;
 pub mod error;
 pub mod identify;
@@ -76,6 +77,8 @@ enum Command {
     Load(load::Args),
     /// A plain terminal: keys out, bytes in.
     Terminal(terminal::Args),
+    /// Write a product's electronic data sheet.
+    Eds(eds::Args),
     /// Host emulated units on pseudo-terminals.
     Emulate(emulate::Args),
     /// Work on S-record images without a unit.
@@ -107,6 +110,7 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Defaults(args)) => defaults::run(args, global, output),
         Some(Command::Load(args)) => load::run(args, global, output),
         Some(Command::Terminal(args)) => terminal::run(args, global, output),
+        Some(Command::Eds(args)) => eds::run(args, output),
         Some(Command::Emulate(args)) => emulate::run(args, global, output),
         Some(Command::Image(args)) => image::run(args, global, output),
     }

@@ -289,7 +289,7 @@ fn csv_value(source: Source, reading: Reading) -> String {
     match reading {
         Reading::Value(value) if source == Source::ProcessValue => format!("{value:.0}"),
         Reading::Value(value) => format!("{value:.3}"),
-        Reading::Disabled | Reading::Open | Reading::Short => state(reading).to_owned(),
+        Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => state(reading).to_owned(),
     }
 }
 
@@ -297,7 +297,7 @@ fn json_value(channel: &str, source: Source, reading: Reading) -> ValueObject<'_
     let value = match reading {
         Reading::Value(value) if source == Source::ProcessValue => Some(serde_json::Number::from(value as i64)),
         Reading::Value(value) => serde_json::Number::from_f64(value),
-        Reading::Disabled | Reading::Open | Reading::Short => None,
+        Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => None,
     };
     ValueObject { channel, value, state: state(reading) }
 }
@@ -308,6 +308,7 @@ fn state(reading: Reading) -> &'static str {
         Reading::Disabled => "disabled",
         Reading::Open => "open",
         Reading::Short => "short",
+        Reading::Error => "error",
     }
 }
 

@@ -3,10 +3,13 @@
 //! Shared by both ends of the cable, so it holds only what a manual (or a public fact) says, never what one side does
 //! about it. What is not known is left out here and treated as unknown there.
 
+mod complaint;
 pub mod dictionary;
+pub mod eds;
 mod loader;
 pub mod schema;
 
+pub use complaint::{Complaint, Complaints};
 pub use dictionary::Dictionary;
 pub use loader::{ERASE_TIME, LoaderKind, Pacing, RING, longest_erase};
 
@@ -160,8 +163,7 @@ impl Product {
             FILES
                 .iter()
                 .map(|(name, text)| {
-                    schema::read(name, text)
-                        .unwrap_or_else(|complaints| panic!("{}", schema::Complaint::list(&complaints)))
+                    schema::read(name, text).unwrap_or_else(|complaints| panic!("{}", Complaint::list(&complaints)))
                 })
                 .collect()
         })
@@ -193,8 +195,8 @@ mod tests {
     #[test]
     fn every_product_file_is_sound() {
         for (file, text) in FILES {
-            let product = schema::read(file, text)
-                .unwrap_or_else(|complaints| panic!("{}", schema::Complaint::list(&complaints)));
+            let product =
+                schema::read(file, text).unwrap_or_else(|complaints| panic!("{}", Complaint::list(&complaints)));
             assert_eq!(file, format!("{}.toml", product.name.to_lowercase()));
             for (at, object, entry) in product.dictionary.entries() {
                 assert!(!object.name.is_empty() && !entry.name.is_empty(), "{file}: {at} has no name");

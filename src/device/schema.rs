@@ -4,47 +4,16 @@
 //! complaint; everything that can be read is then checked as a whole, and every fault is reported, each with file, line,
 //! column, key, what was found and what is allowed.
 
-use std::fmt;
-
 use serde::Deserialize;
 use toml::{Spanned, Value as Toml};
 
+use super::complaint::{Complaint, Complaints};
 use super::dictionary::{Access, Bound, Dictionary, Entry, FactoryValue, Limits, Meaning, Object, ObjectKind};
 use super::{Cable, Can, Console, Loader, Measurement, Product};
 use crate::canopen::{DataType, ObjectAddress, Value};
 use crate::image::FlashMap;
 use crate::image::identity::LONGEST_NAME;
 use crate::wire::stream;
-
-/// One thing that is wrong with a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Complaint {
-    /// Name of the file.
-    pub file: String,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column, from 1.
-    pub column: usize,
-    /// The key it is about, e.g. `object 6126h, entry 1, default`; empty if the file is no TOML.
-    pub key: String,
-    /// What was found, and what is allowed.
-    pub message: String,
-}
-
-impl Complaint {
-    /// Complaints one below the other.
-    pub fn list(complaints: &[Complaint]) -> String {
-        complaints.iter().map(Complaint::to_string).collect::<Vec<_>>().join("\n")
-    }
-}
-
-impl fmt::Display for Complaint {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Complaint { file, line, column, key, message } = self;
-        let colon = if key.is_empty() { "" } else { ": " };
-        write!(f, "{file}:{line}:{column}: {key}{colon}{message}")
-    }
-}
 
 /// A file as it is written.
 #[derive(Deserialize)]
@@ -126,36 +95,23 @@ const COUNT_NAME: &str = "Number of entries";
 /// # Errors
 /// If it is no TOML or no product's file, with one complaint; otherwise with everything that is wrong with it.
 pub fn read(file: &str, text: &str) -> Result<Product, Vec<Complaint>> {
-    let mut reader = Reader { file, text, complaints: Vec::new() };
+    let complaints = Complaints::about(file, text);
     let raw: RawProduct = match toml::from_str(text) {
         Ok(raw) => raw,
-        Err(error) => {
-            let at = error.span().map_or(0, |span| span.start);
-            reader.complain(at, "", error.message().trim_end().replace('\n', "; "));
-            return Err(reader.complaints);
-        }
+        Err(error) => return Err(complaints.and_the_end(&error)),
     };
+    let mut reader = Reader { complaints };
     let product = reader.product(raw);
-    if reader.complaints.is_empty() { Ok(product) } else { Err(reader.complaints) }
+    reader.complaints.or(product)
 }
 
 struct Reader<'a> {
-    file: &'a str,
-    text: &'a str,
-    complaints: Vec<Complaint>,
+    complaints: Complaints<'a>,
 }
 
 impl Reader<'_> {
     fn complain(&mut self, at: usize, key: impl Into<String>, message: impl Into<String>) {
-        let before = self.text.get(..at).unwrap_or_default();
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        self.complaints.push(Complaint {
-            file: self.file.to_owned(),
-            line: before.matches('\n').count() + 1,
-            column: before[line_start..].chars().count() + 1,
-            key: key.into(),
-            message: message.into(),
-        });
+        self.complaints.add(at, key, message);
     }
 
     fn product(&mut self, raw: RawProduct) -> Product {
@@ -229,7 +185,8 @@ impl Reader<'_> {
                 self.complain(at, format!("{key}.widths"), "there is no width");
                 continue;
             };
-            for word in [Some(&format.disabled), Some(&format.open), format.short.as_ref()].into_iter().flatten() {
+            let words = [Some(&format.disabled), Some(&format.open), format.short.as_ref(), format.error.as_ref()];
+            for word in words.into_iter().flatten() {
                 if word.is_empty() || word.len() > width {
                     self.complain(at, key.clone(), format!("'{word}' is not a word of 1 to {width} characters"));
                 }

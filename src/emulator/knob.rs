@@ -61,12 +61,16 @@ pub enum KnobError {
         /// What was to be turned.
         what: &'static str,
     },
-    /// The number is none.
-    #[error("{what} cannot be {value}")]
+    /// The number is none it can have.
+    #[error("{what} cannot be {value}: it is from {low} to {high}")]
     Value {
         /// What was to be turned.
         what: &'static str,
         /// The number.
         value: f64,
+        /// The lowest it can have.
+        low: f64,
+        /// The highest it can have.
+        high: f64,
     },
 }

@@ -11,18 +11,24 @@
 mod bootloader;
 pub mod cable;
 mod dialect;
+pub mod faults;
 mod firmware;
+pub mod its90;
 pub mod knob;
+pub mod measurement;
 pub mod memory;
+pub mod network;
 pub mod objects;
 pub mod rtd_curve;
+pub mod scenario;
 pub mod sensors;
 mod uart;
 
-pub use dialect::NetworkState;
+pub use network::{NetworkState, NmtCommand};
 
 use std::collections::VecDeque;
 
+use crate::canopen::{Abort, ObjectAddress, Value};
 use crate::device::{LoaderKind, Product};
 use crate::endpoint::{Endpoint, Transmit};
 use crate::image::Identity;
@@ -31,6 +37,7 @@ use crate::time::{Duration, Instant};
 use bootloader::Bootloader;
 use dialect::Dialect;
 use firmware::Firmware;
+use knob::{Knob, KnobError};
 use memory::{Flash, ParameterStore, Parameters, StartDelay};
 use sensors::Sensors;
 use uart::Uart;
@@ -50,6 +57,8 @@ pub struct Setup {
     pub loader: LoaderKind,
     /// Decides everything that chance decides: noise, the simulated process, serial number.
     pub seed: u64,
+    /// How it words its prose: 0 for the plain way, another seed for another dialect.
+    pub dialect: u64,
     /// Program flash, bytes in S-record order; as long as the product's flash, FFh where erased.
     pub flash: Vec<u8>,
     /// Non-volatile memory as [`Unit::parameters`] gave it; empty for a unit fresh from the factory. One that cannot
@@ -77,6 +86,17 @@ pub enum Area {
     Parameters,
 }
 
+/// Why the network gets nothing from the unit's object dictionary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// Nobody answers: no power, another program, the node is stopped, or its view is open.
+    #[error("the unit does not answer")]
+    NoAnswer,
+    /// It refuses.
+    #[error("{0}")]
+    Abort(Abort),
+}
+
 /// What a unit is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Running {
@@ -96,6 +116,7 @@ pub struct Unit {
     product: &'static Product,
     loader: LoaderKind,
     serial_number: u32,
+    dialect: u64,
     flash: Flash,
     parameters: ParameterStore,
     sensors: Sensors,
@@ -139,7 +160,7 @@ struct Board<'a> {
     serial_number: u32,
     flash: &'a mut Flash,
     parameters: &'a mut ParameterStore,
-    sensors: &'a mut Sensors,
+    sensors: &'a Sensors,
     uart: &'a mut Uart,
     stores: &'a mut VecDeque<Store>,
     reset: &'a mut Option<Reset>,
@@ -151,15 +172,16 @@ impl Unit {
     /// # Panics
     /// If the flash is not as long as the product's.
     pub fn new(setup: Setup) -> Self {
-        let Setup { product, loader, seed, flash, parameters } = setup;
+        let Setup { product, loader, seed, dialect, flash, parameters } = setup;
         let mut stores = VecDeque::new();
         Unit {
             product,
             loader,
             serial_number: Rng::new(seed).fork("serial number").next_u64() as u32,
+            dialect,
             flash: Flash::new(product.flash, flash, seed),
             parameters: ParameterStore::new(product, parameters, &mut stores),
-            sensors: Sensors::new(seed),
+            sensors: Sensors::new(product, seed),
             uart: Uart::new(),
             stores,
             power: Power::Off,
@@ -223,14 +245,13 @@ impl Unit {
         }
     }
 
-    /// The process at its inputs.
-    pub fn sensors(&self) -> &Sensors {
-        &self.sensors
-    }
-
-    /// The process at its inputs, to turn its knobs; the unit notices at its next scan.
-    pub fn sensors_mut(&mut self) -> &mut Sensors {
-        &mut self.sensors
+    /// Turns a knob at the unit's terminals; the unit notices at its next reading.
+    ///
+    /// # Errors
+    /// If this unit has no such thing, or the number is none it can have.
+    pub fn turn(&mut self, now: Instant, knob: Knob) -> Result<(), KnobError> {
+        self.run_until(now);
+        self.sensors.turn(knob)
     }
 
     /// Makes one word of program flash refuse what is programmed, or none: a worn-out cell.
@@ -238,11 +259,53 @@ impl Unit {
         self.flash.wear_out(word);
     }
 
-    /// Puts the CANopen node into a state, as a network master would. Without effect unless the application runs.
-    pub fn set_network_state(&mut self, now: Instant, state: NetworkState) {
+    /// State of the CANopen node; `None` unless the application runs.
+    pub fn network_state(&self) -> Option<NetworkState> {
+        self.application().map(Firmware::network_state)
+    }
+
+    /// The network master orders something. Without effect unless the application runs and listens.
+    pub fn nmt(&mut self, now: Instant, command: NmtCommand) {
         self.run_until(now);
-        if let Power::On { program: Program::Application(firmware), .. } = &mut self.power {
-            firmware.set_network_state(state);
+        self.with_program(now, |program, board| {
+            if let Program::Application(firmware) = program {
+                firmware.nmt(board, command);
+            }
+        });
+    }
+
+    /// The network reads an entry of the object dictionary.
+    ///
+    /// # Errors
+    /// If the unit does not answer, or refuses.
+    pub fn read_object(&self, at: ObjectAddress) -> Result<Value, Refusal> {
+        self.application().ok_or(Refusal::NoAnswer)?.read_object(at)
+    }
+
+    /// The network writes an entry of the object dictionary, with the bytes as they are on the bus.
+    ///
+    /// # Errors
+    /// If the unit does not answer, or refuses.
+    pub fn write_object(&mut self, now: Instant, at: ObjectAddress, data: &[u8]) -> Result<(), Refusal> {
+        self.run_until(now);
+        let mut result = Err(Refusal::NoAnswer);
+        self.with_program(now, |program, board| {
+            if let Program::Application(firmware) = program {
+                result = firmware.write_object(board, at, data);
+            }
+        });
+        result
+    }
+
+    /// What the unit is.
+    pub fn product(&self) -> &'static Product {
+        self.product
+    }
+
+    fn application(&self) -> Option<&Firmware> {
+        match &self.power {
+            Power::On { program: Program::Application(firmware), .. } => Some(firmware),
+            Power::On { .. } | Power::Off => None,
         }
     }
 
@@ -288,10 +351,12 @@ impl Unit {
             Reset::Start => startable,
             Reset::StayInLoader => None,
         };
-        let loader = self.loader;
+        let (loader, dialect) = (self.loader, self.dialect);
         self.with_program(now, |program, board| {
             *program = match may_start {
-                Some(identity) => Program::Application(Box::new(Firmware::start(board, identity, Dialect::plain()))),
+                Some(identity) => {
+                    Program::Application(Box::new(Firmware::start(board, identity, Dialect::drawn(dialect))))
+                }
                 None => Program::Loader(Box::new(Bootloader::start(loader, board, may_leave))),
             }
         });
@@ -306,7 +371,7 @@ impl Unit {
             serial_number: self.serial_number,
             flash: &mut self.flash,
             parameters: &mut self.parameters,
-            sensors: &mut self.sensors,
+            sensors: &self.sensors,
             uart: &mut self.uart,
             stores: &mut self.stores,
             reset,

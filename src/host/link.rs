@@ -235,7 +235,9 @@ impl Connection {
         clock: Clock,
         inputs: SyncSender<Input>,
     ) -> Result<Self, LinkError> {
-        use super::unit::{HostedUnit, Hosting, Power, factory_unit};
+        use super::unit::{HostedUnit, Hosting, Power, factory_setup};
+        use crate::emulator::Unit;
+        use crate::emulator::scenario::Stage;
 
         let failed = |error: anyhow::Error| LinkError {
             port: spec.to_string(),
@@ -243,7 +245,8 @@ impl Connection {
             cause: Cause::Io(io::Error::other(error)),
         };
         let hosting = Hosting { power: Power::AtFirstClient, ..Hosting::default() };
-        let unit = HostedUnit::start(factory_unit(product, 0), hosting).map_err(|error| failed(error.into()))?;
+        let unit = Stage::bare(Unit::new(factory_setup(product, 0)));
+        let unit = HostedUnit::start(unit, hosting).map_err(|error| failed(error.into()))?;
         let (lines, outgoing) = serial::open(unit.serial(), options, clock, inputs)?;
         let mut connection = Connection::new(spec, options, lines, outgoing, Some("emulator".into()));
         connection.unit = Some(unit);

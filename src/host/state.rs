@@ -2,14 +2,17 @@
 //!
 //! `flash.bin` is the program flash, bytes in S-record order; it is written in place, as flash is, so a power cut in
 //! the middle of an upload leaves half an image, as in life. `parameters.bin` is the non-volatile memory; it is
-//! replaced as a whole, so that it is the old one or the new one at any moment. A file that does not fit is an error
-//! and never replaced: it may be somebody's only copy.
+//! replaced as a whole, so that it is the old one or the new one at any moment. A file that cannot be used is kept aside
+//! under another name and reported, never replaced in silence: it may be somebody's only copy. A directory of another
+//! product is an error, and nothing in it is touched.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
+use crate::device::Product;
+use crate::emulator::memory::{Parameters, ParametersError};
 use crate::emulator::{Area, Store};
 
 /// A unit's state directory, locked for this process.
@@ -30,6 +33,40 @@ pub struct Contents {
     pub parameters: Vec<u8>,
 }
 
+/// A file that could not be used and was kept aside.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Damaged {
+    /// The file.
+    pub file: PathBuf,
+    /// What is wrong with it.
+    pub what: String,
+    /// Where it lies now.
+    pub kept: PathBuf,
+}
+
+impl std::fmt::Display for Damaged {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Damaged { file, what, kept } = self;
+        write!(
+            f,
+            "'{}' cannot be used: {what}; it is kept as '{}', and the unit starts without it",
+            file.display(),
+            kept.display()
+        )
+    }
+}
+
+/// What opening a state directory gives.
+#[derive(Debug)]
+pub struct Opened {
+    /// The directory.
+    pub state: State,
+    /// What lies in it.
+    pub contents: Contents,
+    /// What had to be kept aside.
+    pub damaged: Vec<Damaged>,
+}
+
 /// Why a state directory cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StateError {
@@ -39,15 +76,14 @@ pub enum StateError {
         /// The directory.
         folder: PathBuf,
     },
-    /// A file has not the size of the product's memory.
-    #[error("'{}' has {found} bytes, this product's has {expected}; it is left as it is", file.display())]
-    WrongSize {
-        /// The file.
-        file: PathBuf,
-        /// Bytes the product has.
-        expected: usize,
-        /// Bytes the file has.
-        found: usize,
+    /// It belongs to a unit of another product.
+    #[error("the state directory '{}' is of another product: {source}; nothing in it has been touched", folder.display())]
+    OtherProduct {
+        /// The directory.
+        folder: PathBuf,
+        /// Which.
+        #[source]
+        source: ParametersError,
     },
     /// The system refused.
     #[error("cannot {operation} '{}'", path.display())]
@@ -67,20 +103,33 @@ const PARAMETERS: &str = "parameters.bin";
 const LOCK: &str = "lock";
 
 impl State {
-    /// Opens a state directory and gives what lies in it; where nothing does, `initial` is written. The sizes of
-    /// `initial` are those of the product's memories.
+    /// Opens a unit's state directory and gives what lies in it; where nothing usable does, `initial` is written. The
+    /// sizes of `initial` are those of the product's memories.
     ///
     /// # Errors
-    /// If another emulator uses the directory, a file does not fit, or the system refuses.
-    pub fn open(folder: &Path, initial: &Contents) -> Result<(Self, Contents), StateError> {
+    /// If another emulator uses the directory, it belongs to another product, or the system refuses.
+    pub fn open(folder: &Path, product: &Product, initial: &Contents) -> Result<Opened, StateError> {
         fs::create_dir_all(folder).map_err(failed("create", folder))?;
         let lock = lock(folder)?;
-        let flash = load(&folder.join(FLASH), &initial.flash)?;
-        let parameters = load(&folder.join(PARAMETERS), &initial.parameters)?;
-        let file = folder.join(FLASH);
-        let open = File::options().read(true).write(true).open(&file).map_err(failed("write", &file))?;
+        let (flash_file, parameters_file) = (folder.join(FLASH), folder.join(PARAMETERS));
+        let (flash, parameters) = (read(&flash_file)?, read(&parameters_file)?);
+        let unfit = match parameters.as_deref().map(|bytes| Parameters::read(product, bytes)) {
+            Some(Err(source @ ParametersError::Product { .. })) => {
+                return Err(StateError::OtherProduct { folder: folder.to_owned(), source });
+            }
+            Some(Err(error)) => Some(error.to_string()),
+            Some(Ok(_)) | None => None,
+        };
+        let mut damaged = Vec::new();
+        let expected = initial.flash.len();
+        let wrong_size = flash.as_ref().filter(|bytes| bytes.len() != expected).map(|bytes| {
+            format!("it has {} bytes, the program flash of an {} has {expected}", bytes.len(), product.name)
+        });
+        let flash = settle(&flash_file, flash, wrong_size, &initial.flash, &mut damaged)?;
+        let parameters = settle(&parameters_file, parameters, unfit, &initial.parameters, &mut damaged)?;
+        let open = File::options().read(true).write(true).open(&flash_file).map_err(failed("write", &flash_file))?;
         let state = State { folder: folder.to_owned(), flash: open, parameters: parameters.clone(), _lock: lock };
-        Ok((state, Contents { flash, parameters }))
+        Ok(Opened { state, contents: Contents { flash, parameters }, damaged })
     }
 
     /// Carries out writes of the unit, in their order.
@@ -121,16 +170,44 @@ fn lock(folder: &Path) -> Result<File, StateError> {
     }
 }
 
-fn load(file: &Path, initial: &[u8]) -> Result<Vec<u8>, StateError> {
+fn read(file: &Path) -> Result<Option<Vec<u8>>, StateError> {
     match fs::read(file) {
-        Ok(bytes) if bytes.len() == initial.len() => Ok(bytes),
-        Ok(bytes) => Err(StateError::WrongSize { file: file.to_owned(), expected: initial.len(), found: bytes.len() }),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            replace(file, initial)?;
-            Ok(initial.to_vec())
-        }
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(failed("read", file)(error)),
     }
+}
+
+/// What lies in the file; if there is none, or something is wrong with it, `initial` from now on.
+fn settle(
+    file: &Path,
+    found: Option<Vec<u8>>,
+    wrong: Option<String>,
+    initial: &[u8],
+    damaged: &mut Vec<Damaged>,
+) -> Result<Vec<u8>, StateError> {
+    match (found, wrong) {
+        (Some(bytes), None) => return Ok(bytes),
+        (Some(_), Some(what)) => {
+            let kept = keep_aside(file)?;
+            damaged.push(Damaged { file: file.to_owned(), what, kept });
+        }
+        (None, _) => {}
+    }
+    replace(file, initial)?;
+    Ok(initial.to_vec())
+}
+
+/// Gives a file a name that is free: `flash.bin.damaged-1`.
+fn keep_aside(file: &Path) -> Result<PathBuf, StateError> {
+    let named = |number: u32| {
+        let mut name = file.as_os_str().to_owned();
+        name.push(format!(".damaged-{number}"));
+        PathBuf::from(name)
+    };
+    let kept = (1..).map(named).find(|name| !name.exists()).unwrap_or_else(|| named(0));
+    fs::rename(file, &kept).map_err(failed("rename", file))?;
+    Ok(kept)
 }
 
 /// Writes a whole file so that the old or the new content is there at any moment.
@@ -150,46 +227,78 @@ fn failed(operation: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Sta
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::unit;
 
-    fn initial() -> Contents {
-        Contents { flash: vec![0xFF; 64], parameters: vec![1, 2, 3, 4] }
+    fn product(name: &str) -> &'static Product {
+        Product::named(name).expect("built in")
+    }
+
+    fn initial(name: &str) -> Contents {
+        let unit = crate::emulator::Unit::new(unit::factory_setup(product(name), 1));
+        Contents { flash: unit.flash().to_vec(), parameters: unit.parameters().to_vec() }
+    }
+
+    fn open(folder: &Path, name: &str) -> Result<Opened, StateError> {
+        State::open(folder, product(name), &initial(name))
     }
 
     #[test]
     fn what_a_unit_writes_is_there_at_the_next_start() {
         let folder = tempfile::tempdir().expect("a folder");
-        let (mut state, contents) = State::open(folder.path(), &initial()).expect("created");
-        assert_eq!(contents, initial());
+        let Opened { mut state, contents, damaged } = open(folder.path(), "AXTC4CO").expect("created");
+        assert_eq!((contents, damaged), (initial("AXTC4CO"), vec![]));
         let store = |area, offset, bytes: &[u8]| Store { area, offset, bytes: bytes.to_vec() };
+        // The second slot of the parameters holds nothing yet.
         state
             .write(&[
                 store(Area::Flash, 10, b"abc"),
-                store(Area::Parameters, 1, b"x"),
-                store(Area::Parameters, 3, b"y"),
+                store(Area::Parameters, 2_100, b"x"),
+                store(Area::Parameters, 2_102, b"y"),
                 store(Area::Flash, 11, b"B"),
             ])
             .expect("written");
         drop(state);
-        let (_state, contents) = State::open(folder.path(), &initial()).expect("opened");
-        assert_eq!(&contents.flash[9..14], b"\xffaBc\xff");
-        assert_eq!(contents.parameters, [1, b'x', 3, b'y']);
+        let Opened { contents, damaged, .. } = open(folder.path(), "AXTC4CO").expect("opened");
+        assert_eq!(&contents.flash[10..13], b"aBc");
+        assert_eq!((&contents.parameters[2_100..2_103], damaged.len()), (&[b'x', 0xFF, b'y'][..], 0));
     }
 
     #[test]
     fn two_emulators_cannot_share_a_directory() {
         let folder = tempfile::tempdir().expect("a folder");
-        let (_state, _) = State::open(folder.path(), &initial()).expect("created");
-        let error = State::open(folder.path(), &initial()).expect_err("locked");
+        let _opened = open(folder.path(), "AXTC4CO").expect("created");
+        let error = open(folder.path(), "AXTC4CO").expect_err("locked");
         assert!(matches!(error, StateError::InUse { .. }), "{error}");
     }
 
     #[test]
-    fn a_file_that_does_not_fit_is_named_and_kept() {
+    fn what_cannot_be_used_is_reported_and_kept_aside() {
         let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join(FLASH);
-        fs::write(&file, "too short").expect("written");
-        let error = State::open(folder.path(), &initial()).expect_err("refused").to_string();
-        assert!(error.contains("flash.bin' has 9 bytes, this product's has 64"), "{error}");
-        assert_eq!(fs::read(&file).expect("still there"), b"too short");
+        let (flash, parameters) = (folder.path().join(FLASH), folder.path().join(PARAMETERS));
+        for round in 1..=2 {
+            fs::write(&flash, "too short").expect("written");
+            fs::write(&parameters, vec![0x55; 4_096]).expect("written");
+            let Opened { contents, damaged, .. } = open(folder.path(), "AXTC4CO").expect("opened all the same");
+            assert_eq!(contents, initial("AXTC4CO"), "the factory's");
+            let texts: Vec<String> = damaged.iter().map(Damaged::to_string).collect();
+            assert_eq!(texts.len(), 2);
+            assert!(texts[0].contains("it has 9 bytes, the program flash of an AXTC4CO has 131072"), "{}", texts[0]);
+            assert!(texts[1].contains("neither slot of the parameter memory is intact"), "{}", texts[1]);
+            let kept = folder.path().join(format!("{FLASH}.damaged-{round}"));
+            assert_eq!(fs::read(&kept).expect("kept"), b"too short");
+            assert!(texts[0].contains(&format!("{FLASH}.damaged-{round}")), "{}", texts[0]);
+            assert_eq!(fs::read(&flash).expect("new"), initial("AXTC4CO").flash);
+        }
+    }
+
+    #[test]
+    fn a_directory_of_another_product_is_left_alone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        drop(open(folder.path(), "AXRTD8CO").expect("created"));
+        let before = fs::read(folder.path().join(FLASH)).expect("flash");
+        let error = open(folder.path(), "AXTC4CO").expect_err("refused").to_string();
+        assert!(error.contains("is of AXRTD8CO, not of AXTC4CO") && error.contains("nothing in it"), "{error}");
+        assert_eq!(fs::read(folder.path().join(FLASH)).expect("flash"), before);
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 3, "flash, parameters, lock");
     }
 }

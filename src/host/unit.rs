@@ -24,7 +24,8 @@ use super::state::{State, StateError};
 use super::wait::ready;
 use crate::device::Product;
 use crate::emulator::cable::{Line, Plugged};
-use crate::emulator::{Setup, Store, Unit};
+use crate::emulator::scenario::{Stage, Verb};
+use crate::emulator::{Setup, Store};
 use crate::endpoint::Endpoint;
 use crate::image::make;
 use crate::rng::Rng;
@@ -34,29 +35,35 @@ use crate::time::{Duration, Instant, character_time};
 pub trait Hosted: Endpoint + Send + 'static {
     /// Supply voltage comes.
     fn power_on(&mut self, now: Instant);
-    /// Supply voltage goes.
-    fn power_off(&mut self, now: Instant);
+    /// Does something to the unit; gives what there is to say about it, or why it refuses.
+    ///
+    /// # Errors
+    /// If the unit refuses.
+    fn perform(&mut self, now: Instant, verb: &Verb) -> Answer;
     /// Whether the unit has sent XOFF and not yet XON.
     fn holds_sender(&self) -> bool;
     /// The next write to memory that outlives the power.
     fn poll_store(&mut self) -> Option<Store>;
 }
 
-impl Hosted for Unit {
+/// What a verb brought: something to say, nothing, or a refusal.
+pub type Answer = Result<Option<String>, String>;
+
+impl Hosted for Stage {
     fn power_on(&mut self, now: Instant) {
-        Unit::power_on(self, now);
+        Stage::power_on(self, now);
     }
 
-    fn power_off(&mut self, now: Instant) {
-        Unit::power_off(self, now);
+    fn perform(&mut self, now: Instant, verb: &Verb) -> Answer {
+        Stage::perform(self, now, verb)
     }
 
     fn holds_sender(&self) -> bool {
-        Unit::holds_sender(self)
+        self.unit().holds_sender()
     }
 
     fn poll_store(&mut self) -> Option<Store> {
-        Unit::poll_store(self)
+        Stage::poll_store(self)
     }
 }
 
@@ -65,7 +72,7 @@ impl Hosted for Unit {
 pub struct HostedUnit {
     serial: PathBuf,
     counts: Arc<Counts>,
-    commands: SyncSender<Command>,
+    orders: SyncSender<Order>,
     /// A byte on it says that there is a command; its end says that it is over.
     bell: Option<PipeWriter>,
     thread: Option<JoinHandle<()>>,
@@ -106,13 +113,10 @@ pub enum Power {
     AtFirstClient,
 }
 
-/// What a hosted unit is told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
-    /// Switch its supply on.
-    PowerOn,
-    /// Switch its supply off.
-    PowerOff,
+/// What a hosted unit is told, and who hears the answer.
+struct Order {
+    verb: Verb,
+    answered: Box<dyn FnOnce(Answer) + Send>,
 }
 
 /// Why a unit is not hosted, or no longer.
@@ -160,8 +164,8 @@ const FAREWELL: Duration = Duration::from_millis(500);
 /// How often that is looked at: nobody tells.
 const FAREWELL_STEP: Duration = Duration::from_millis(5);
 
-/// Commands that wait at most: they are a person's.
-const COMMANDS: usize = 16;
+/// Orders that wait at most: they are a person's, or a script's line by line.
+const ORDERS: usize = 64;
 
 impl HostedUnit {
     /// Puts a unit on a new pseudo-terminal and lets time run.
@@ -171,7 +175,7 @@ impl HostedUnit {
     pub fn start<U: Hosted>(unit: U, hosting: Hosting) -> Result<Self, HostError> {
         let pty = Pty::open(BAUD).map_err(|error| HostError::Pty("open", error))?;
         let (ring, bell) = io::pipe().map_err(|error| HostError::Pty("watch", error))?;
-        let (commands, orders) = sync_channel(COMMANDS);
+        let (sender, orders) = sync_channel(ORDERS);
         let counts = Arc::new(Counts::default());
         let serial = pty.path().to_owned();
         let line = match hosting.line_rate {
@@ -205,7 +209,7 @@ impl HostedUnit {
                 }
             })
             .map_err(|error| HostError::Pty("serve", error))?;
-        Ok(HostedUnit { serial, counts, commands, bell: Some(bell), thread: Some(thread) })
+        Ok(HostedUnit { serial, counts, orders: sender, bell: Some(bell), thread: Some(thread) })
     }
 
     /// What a client opens.
@@ -218,9 +222,10 @@ impl HostedUnit {
         &self.counts
     }
 
-    /// Tells the unit's host something; `false` if it does not listen any more.
-    pub fn command(&self, command: Command) -> bool {
-        let queued = match self.commands.try_send(command) {
+    /// Has something done to the unit; `answered` hears what came of it, from the unit's thread. `false` if too much
+    /// waits to be done, or the unit has ended.
+    pub fn order(&self, verb: Verb, answered: impl FnOnce(Answer) + Send + 'static) -> bool {
+        let queued = match self.orders.try_send(Order { verb, answered: Box::new(answered) }) {
             Ok(()) => true,
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
         };
@@ -261,7 +266,7 @@ struct Host<U> {
 }
 
 impl<U: Hosted> Host<U> {
-    fn run(mut self, mut ring: io::PipeReader, orders: &Receiver<Command>) -> Result<(), HostError> {
+    fn run(mut self, mut ring: io::PipeReader, orders: &Receiver<Order>) -> Result<(), HostError> {
         if self.power == Power::AtStart {
             self.plugged.unit_mut().power_on(self.at);
         }
@@ -277,7 +282,7 @@ impl<U: Hosted> Host<U> {
             if rung.is_empty() {
                 continue;
             }
-            let mut rings = [0; COMMANDS];
+            let mut rings = [0; ORDERS];
             if matches!(ring.read(&mut rings), Ok(0)) {
                 self.farewell();
                 return Ok(());
@@ -286,13 +291,12 @@ impl<U: Hosted> Host<U> {
         }
     }
 
-    fn obey(&mut self, orders: &Receiver<Command>) -> Result<(), HostError> {
+    fn obey(&mut self, orders: &Receiver<Order>) -> Result<(), HostError> {
         loop {
             let now = self.clock.now();
             self.catch_up(now)?;
             match orders.try_recv() {
-                Ok(Command::PowerOn) => self.plugged.unit_mut().power_on(now),
-                Ok(Command::PowerOff) => self.plugged.unit_mut().power_off(now),
+                Ok(Order { verb, answered }) => answered(self.plugged.unit_mut().perform(now, &verb)),
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => return Ok(()),
             }
         }
@@ -457,14 +461,10 @@ fn garble(garbage: &mut Rng, bytes: &mut [u8]) {
     }
 }
 
-/// A unit as it leaves the factory, without power.
-pub fn factory_unit(product: &'static Product, seed: u64) -> Unit {
-    unit(product, seed, factory_flash(product), Vec::new())
-}
-
-/// A unit with these memories, without power; empty `parameters` are fresh ones.
-pub fn unit(product: &'static Product, seed: u64, flash: Vec<u8>, parameters: Vec<u8>) -> Unit {
-    Unit::new(Setup { product, loader: product.loader.kind, seed, flash, parameters })
+/// What a unit is made of as it leaves the factory.
+pub fn factory_setup(product: &'static Product, seed: u64) -> Setup {
+    let loader = product.loader.kind;
+    Setup { product, loader, seed, dialect: 0, flash: factory_flash(product), parameters: Vec::new() }
 }
 
 /// The program flash of a unit as it leaves the factory: the sample image of its first version, erased behind it.

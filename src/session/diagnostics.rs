@@ -19,6 +19,9 @@ const FIRST_PAGE: Duration = Duration::from_millis(6500);
 const NEXT_PAGE: Duration = Duration::from_millis(2500);
 /// Silence that ends a page: lines follow each other within a millisecond, an adapter adds some 20.
 const QUIET: Duration = Duration::from_millis(200);
+/// How long a text without a line end must stay as it is to count as a page's last line, and not as a row of the stream
+/// under way.
+const STILL: Duration = Duration::from_millis(40);
 /// Time without a page behind the key that stops them.
 const STOPPED: Duration = Duration::from_millis(1500);
 /// A page that comes so soon behind that key was under way before it.
@@ -39,6 +42,8 @@ pub(super) struct Diagnostics {
     page_at: Instant,
     /// When the page counts as complete.
     page_due: Option<Instant>,
+    /// Where a text without a line end ended when the page was first looked at.
+    unended: Option<u64>,
     deadline: Option<Instant>,
     heard: Option<Span>,
 }
@@ -64,6 +69,7 @@ impl Diagnostics {
             page: Vec::new(),
             page_at: Instant::ZERO,
             page_due: None,
+            unended: None,
             deadline: None,
             heard: None,
         }
@@ -77,13 +83,20 @@ impl Diagnostics {
         }
         self.page_at = now;
         self.page_due = Some(now + QUIET);
+        self.unended = None;
     }
 
     /// Nothing has followed for a while: what has come is a page if it shows numbers.
     fn page_complete(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let unended = desk.pending.map(|text| text.span.end);
+        let looked_at = std::mem::replace(&mut self.unended, unended);
+        if unended.is_some() && looked_at.is_none() {
+            self.page_due = Some(desk.now + STILL);
+            return None;
+        }
         self.page_due = None;
         let mut lines = std::mem::take(&mut self.page);
-        if let Some(text) = desk.pending {
+        if let Some(text) = desk.pending.filter(|_| unended == looked_at) {
             lines.push(text.clone());
             // It has been read: what is painted over it is the next page.
             desk.cut = true;

@@ -121,6 +121,8 @@ pub enum FaultKind {
     Open,
     /// Short circuit.
     Short,
+    /// The unit has no value for another reason.
+    Failed,
 }
 
 /// The upload.
@@ -244,6 +246,7 @@ impl View {
             let fault = match reading {
                 Reading::Open => Some(FaultKind::Open),
                 Reading::Short => Some(FaultKind::Short),
+                Reading::Error => Some(FaultKind::Failed),
                 Reading::Value(_) | Reading::Disabled => None,
             };
             note_fault(&mut self.faults, &channel.name, fault, at);
@@ -359,7 +362,7 @@ fn done(job: Job) -> &'static str {
 fn value_of(reading: Reading) -> Option<f64> {
     match reading {
         Reading::Value(value) => Some(value),
-        Reading::Disabled | Reading::Open | Reading::Short => None,
+        Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => None,
     }
 }
 

@@ -31,6 +31,8 @@ pub struct FieldFormat {
     pub open: String,
     /// Word for a short circuit, where the product has one.
     pub short: Option<String>,
+    /// Word for a value that the unit has not for another reason, where the product has one.
+    pub error: Option<String>,
 }
 
 /// Which value a row carries.
@@ -53,6 +55,8 @@ pub enum Reading {
     Open,
     /// The sensor is shorted.
     Short,
+    /// The unit has no value for another reason: its converter or its computation has failed.
+    Error,
 }
 
 /// One row.
@@ -75,11 +79,20 @@ impl Layout {
                 text.push(';');
             }
             match reading {
-                Reading::Value(value) => text.push_str(&format!("{value:>width$.*}", format.decimals)),
+                Reading::Value(value) => {
+                    // Rounded first: nothing is "-0.0".
+                    let scale = 10f64.powi(format.decimals as i32);
+                    let value = (value * scale).round() / scale + 0.0;
+                    text.push_str(&format!("{value:>width$.*}", format.decimals));
+                }
                 Reading::Disabled => text.push_str(&format!("{:<width$}", format.disabled)),
                 Reading::Open => text.push_str(&format!("{:<width$}", format.open)),
                 Reading::Short => {
                     let word = format.short.as_deref().unwrap_or(&format.open);
+                    text.push_str(&format!("{word:<width$}"));
+                }
+                Reading::Error => {
+                    let word = format.error.as_deref().unwrap_or(&format.open);
                     text.push_str(&format!("{word:<width$}"));
                 }
             }
@@ -129,6 +142,7 @@ impl FieldFormat {
             (Some(self.disabled.as_str()), Reading::Disabled),
             (Some(self.open.as_str()), Reading::Open),
             (self.short.as_deref(), Reading::Short),
+            (self.error.as_deref(), Reading::Error),
         ];
         for (candidate, reading) in words {
             if candidate == Some(word) {
@@ -160,6 +174,7 @@ mod tests {
                 disabled: "Disabled".into(),
                 open: "OpenCct".into(),
                 short: None,
+                error: None,
             },
             process_value: FieldFormat {
                 widths: vec![5],
@@ -167,6 +182,7 @@ mod tests {
                 disabled: "Null".into(),
                 open: "Open".into(),
                 short: None,
+                error: None,
             },
         }
     }
@@ -178,6 +194,7 @@ mod tests {
             disabled: "Null".into(),
             open: "Open".into(),
             short: Some("Short".into()),
+            error: None,
         };
         Layout {
             channels: (1..=2).map(|n| format!("RTD{n}")).collect(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
-use axcon::emulator::sensors::{Channel, Condition};
+use axcon::emulator::knob::Knob;
 use axcon::emulator::{Setup, Unit};
 use axcon::image::make;
 use axcon::time::{Duration, Instant, character_time};
@@ -32,7 +32,8 @@ impl Desk {
     /// Connected to a unit with V1.1.0, just powered on.
     fn new() -> Self {
         let flash = factory_flash("1.1.0");
-        let setup = Setup { product: axtc4co(), loader: LoaderKind::G1, seed: 1, flash, parameters: Vec::new() };
+        let setup =
+            Setup { product: axtc4co(), loader: LoaderKind::G1, seed: 1, dialect: 0, flash, parameters: Vec::new() };
         let mut unit = Unit::new(setup);
         unit.power_on(Instant::ZERO);
         let app = App::new(Options {
@@ -163,8 +164,8 @@ fn t_brings_values_and_a_broken_wire_is_a_fault_with_its_time() {
     let mut desk = Desk::new();
     desk.keys("t500").press(KeyCode::Enter);
     desk.wait_for("every 500 ms");
-    let channel = Channel::new(1).expect("TC1");
-    desk.unit.unit_mut().sensors_mut().set(channel, Condition::Open);
+    let now = desk.now;
+    desk.unit.unit_mut().turn(now, Knob::Open(1, None)).expect("TC1");
     let picture = desk.wait_for("check sensor, wire and connector");
     assert!(picture.contains("1 now, 1 since connecting"), "{picture}");
     let now = desk.now;

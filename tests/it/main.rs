@@ -4,6 +4,7 @@ mod acceptance;
 #[cfg(unix)]
 mod commands;
 mod console;
+mod dialects;
 mod emulator;
 mod images;
 #[cfg(unix)]

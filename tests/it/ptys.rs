@@ -15,11 +15,12 @@ use std::time::Duration;
 use rustix::process::Signal;
 
 use axcon::emulator::Store;
+use axcon::emulator::scenario::Verb;
 use axcon::endpoint::{Endpoint, Transmit};
 use axcon::host::clock::Clock;
 use axcon::host::link::{Cause, Connection, LinkSpec, Options};
 use axcon::host::pty::Pty;
-use axcon::host::unit::{AHEAD, Hosted, HostedUnit, Hosting, LineRate, Power};
+use axcon::host::unit::{AHEAD, Answer, Hosted, HostedUnit, Hosting, LineRate, Power};
 use axcon::host::{Input, channel};
 use axcon::time::Instant;
 
@@ -91,7 +92,9 @@ impl Hosted for Fake {
         self.outgoing.extend_from_slice(self.greeting);
     }
 
-    fn power_off(&mut self, _now: Instant) {}
+    fn perform(&mut self, _now: Instant, verb: &Verb) -> Answer {
+        Err(format!("{verb:?} is nothing this one can do"))
+    }
 
     fn holds_sender(&self) -> bool {
         self.holding_until.is_some()
@@ -526,11 +529,47 @@ fn an_emulator_goes_on_when_its_input_ends_and_answers_what_it_does_not_know() {
     let mut emulator = world.start(&["emulate", "axtc4co"]);
     emulator.wait_out("serial: /dev/pts/");
     emulator.input(b"help\npower off\nexplode\n");
-    emulator.wait_err("'explode' is not known; there is: power on, power off, quit, help");
+    emulator.wait_err("'explode' is not known; there is: set, process, open");
     emulator.end_input();
     thread::sleep(Duration::from_millis(50));
     emulator.signal(Signal::TERM);
     assert_eq!(emulator.wait().code, Some(0));
+}
+
+#[test]
+fn verbs_and_scenarios_do_to_a_unit_what_they_say() {
+    let world = World::new();
+    fs::write(
+        world.path("day.toml"),
+        "product = 'axtc4co'\n[[at]]\nseconds = 0\ndo = ['set 2 temperature 77.5', 'write 6112:4 0']\n",
+    )
+    .expect("written");
+    let mut emulator = world.start(&["emulate", "axtc4co", "axrtd8co", "--scenario", "day.toml"]);
+    emulator.wait_out("serial: ");
+    // A unit answers nobody in its first moments.
+    thread::sleep(Duration::from_millis(200));
+    emulator.input(b"set 1 temperature 250\n2 set 3 resistance 100\n");
+    emulator.input(b"all status\n1 write 6126:1 18.0\n1 read 6126:1\n2 read 3000:1\n2 write 3000:1 7\n");
+    let said = emulator.wait_out("2: 3000:01 = 1 (IEC 0.00385)");
+    assert!(said.contains("1: AXTC4CO ") && said.contains("2: AXRTD8CO "), "{said}");
+    emulator.wait_err("2: 3000:01 <- 7: the value is above the high limit (abort 06090031h)");
+    emulator.input(b"quit\n");
+    assert_eq!(emulator.wait().code, Some(0));
+}
+
+#[test]
+fn a_scenario_that_cannot_be_played_is_refused_with_every_fault() {
+    let world = World::new();
+    fs::write(world.path("bad.toml"), "[[at]]\nseconds = 1\ndo = ['opne 3']\n[[at]]\nseconds = -2\ndo = []\n")
+        .expect("written");
+    let ran = world.run(&["emulate", "axtc4co", "--scenario", "bad.toml"], b"");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    for complaint in ["bad.toml:3:8: at.do: 'opne' is not known", "bad.toml:5:11: at.seconds: -2 is not 0 to 604800"] {
+        assert!(ran.err.contains(complaint), "{}", ran.err);
+    }
+    let ran = world.run(&["emulate", "axtc4co", "--scenario", "nowhere.toml"], b"");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("cannot read the scenario 'nowhere.toml'"), "{}", ran.err);
 }
 
 #[test]
@@ -571,9 +610,19 @@ fn a_state_directory_is_kept_and_belongs_to_one_emulator() {
     assert_eq!(emulator.wait().code, Some(0));
 
     fs::write(world.path("state-of-unit/flash.bin"), "short").expect("spoilt");
-    let third = world.run(&["emulate", "axtc4co", "--state", "state-of-unit"], b"");
-    assert_eq!(third.code, Some(1));
-    assert!(third.err.contains("flash.bin' has 5 bytes, this product's has 131072"), "{}", third.err);
+    fs::write(world.path("state-of-unit/parameters.bin"), [7; 4096]).expect("spoilt");
+    let third = world.start(&["emulate", "axtc4co", "--state", "state-of-unit"]);
+    third.wait_out("serial: ");
+    let said = third.wait_err("parameters.bin.damaged-1");
+    assert!(said.contains("flash.bin' cannot be used: it has 5 bytes"), "{said}");
+    assert!(said.contains("kept as 'state-of-unit/flash.bin.damaged-1'"), "{said}");
+    assert_eq!(fs::read(world.path("state-of-unit/flash.bin.damaged-1")).expect("kept"), b"short");
+    third.signal(Signal::TERM);
+    assert_eq!(third.wait().code, Some(0));
+
+    let other = world.run(&["emulate", "axrtd8co", "--state", "state-of-unit"], b"");
+    assert_eq!(other.code, Some(1));
+    assert!(other.err.contains("is of AXTC4CO, not of AXRTD8CO"), "{}", other.err);
 }
 
 #[test]

@@ -1,28 +1,32 @@
-//! The application: banner, main menu and its dialogues, data stream, diagnostics (AXTC4CO manual, chapter 4).
+//! The application: banner, main menu and its dialogues, data stream, diagnostics (manuals, chapter 4).
 //!
-//! What it says is worded by [`Dialect`]; who it is stands in the program flash it was started from. Keys come one by
+//! What it says is worded by [`Dialect`]; who it is stands in the program flash it was started from; what it measures and
+//! is set to lies in its object dictionary ([`Objects`]). Keys come one by
 //! one; while the port has more to send than [`BLOCKED_AT`] characters, the program is stuck in printing and keys
 //! wait, as many as the receiver can keep.
 
 mod prompt;
-mod scanner;
 mod view;
 
 use std::collections::VecDeque;
 
-use super::dialect::{Diagnosis, Dialect, NetworkState, Sentence};
+use super::dialect::{ChannelDiagnosis, Diagnosis, Dialect, Sentence};
+use super::faults::{FaultEvent, Faults};
+use super::measurement::{self, Measurement};
 use super::memory::StreamSetting;
-use super::sensors::Channel;
+use super::network::{Network, NetworkState, NmtCommand};
+use super::objects::{Effect, Objects};
 use super::uart::{XOFF, XON};
-use super::{Board, Reset};
+use super::{Board, Refusal, Reset};
+use crate::canopen::{ObjectAddress, Value};
+use crate::device::SensorKind;
+use crate::device::dictionary::Object;
 use crate::image::Identity;
 use crate::time::{Duration, Instant};
-use crate::wire::stream::Source;
+use crate::version::Version;
+use crate::wire::stream::{Reading, Row, Source};
 use prompt::{Echo, Line, Typed};
-use scanner::{FieldValue, SCAN_TIME, Scanner};
 
-/// No measured values before the converters have settled (AXTC4CO manual, section 1.1; errata B-199).
-pub const FIRST_DATA_AFTER: Duration = Duration::from_secs(3);
 /// A diagnostics page comes at this interval (section 4.1.4).
 pub const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
 /// Repetition rate that an empty answer takes (errata E-105).
@@ -49,22 +53,26 @@ pub struct Firmware {
     keys: VecDeque<u8>,
     /// The last key was CR: an LF behind it belongs to it.
     after_return: bool,
-    scanner: Scanner,
-    scan_at: Instant,
+    objects: Objects,
+    measurement: Measurement,
+    faults: Faults,
+    network: Network,
     /// When the next row is due, if the stream is on.
     row_at: Option<Instant>,
     /// The row of the last scan, once it has been asked for: fast streams repeat it many times.
     row: Option<String>,
     /// When the next diagnostics page is due, if they are on.
     page_at: Option<Instant>,
-    network: NetworkState,
 }
 
 /// Who gets the keys.
 #[derive(Debug)]
 enum Dialogue {
     Menu,
-    StreamSource,
+    /// The source that was chosen, where the question wants Enter behind its key.
+    StreamSource {
+        chosen: Option<Source>,
+    },
     StreamPeriod {
         source: Source,
         line: Line,
@@ -86,6 +94,9 @@ enum Dialogue {
 impl Firmware {
     /// Starts the application that lies in flash: first-start text if it is new, banner, menu.
     pub fn start(board: &mut Board<'_>, identity: Identity, dialect: Dialect) -> Self {
+        let mut objects = board.parameters.objects();
+        identify(&mut objects, &identity, board.serial_number);
+        let autonomous = objects.get(0x5555, 0) == Value::Boolean(true);
         let mut firmware = Firmware {
             dialect,
             identity,
@@ -93,12 +104,13 @@ impl Firmware {
             dialogue: Dialogue::Menu,
             keys: VecDeque::new(),
             after_return: false,
-            scanner: Scanner::default(),
-            scan_at: board.now,
+            measurement: Measurement::start(board.now, board.product, &mut objects),
+            objects,
+            faults: Faults::default(),
+            network: Network::start(board.now, board.product, autonomous),
             row_at: None,
             row: None,
             page_at: None,
-            network: NetworkState::PreOperational,
         };
         if board.parameters.values().first_start {
             // The manual prints one ellipsis character, an ASCII port can only send dots (errata E-114).
@@ -110,7 +122,7 @@ impl Firmware {
         let banner = firmware.dialect.banner(&firmware.identity, &board.product.title);
         firmware.say(board, &banner);
         firmware.print_menu(board);
-        firmware.arm_stream(board.now, board.parameters.values().stream);
+        firmware.arm_stream(board, board.parameters.values().stream);
         firmware
     }
 
@@ -125,41 +137,117 @@ impl Firmware {
         self.take_keys(board);
     }
 
-    /// When something is due.
+    /// When something is due. While the view is open scanning and CAN are halted (AXTC4CO manual, section 4.1.1).
     pub fn deadline(&self) -> Instant {
-        [self.row_at, self.page_at].into_iter().flatten().fold(self.scan_at, Instant::min)
+        let halted = self.is_viewing();
+        let measurement = (!halted).then(|| self.measurement.deadline());
+        let network = self.network.deadline().filter(|_| !halted);
+        let due = [self.row_at, self.page_at, measurement, network];
+        due.into_iter().flatten().min().unwrap_or(Instant::NEVER)
     }
 
-    /// Does what is due: a scan first, so that a row of the same moment carries it.
+    /// Does what is due: a reading first, so that a row of the same moment carries it.
     pub fn step(&mut self, board: &mut Board<'_>) {
         self.take_keys(board);
         let now = board.now;
-        if self.scan_at <= now {
-            self.scan_at += SCAN_TIME;
-            if !self.is_viewing() {
-                self.scanner.scan(now, board.sensors);
+        if !self.is_viewing() {
+            self.network.step(now);
+            if self.measurement.step(now, board.sensors, &mut self.objects, &mut self.faults) {
                 self.row = None;
             }
+            self.react();
         }
         if self.row_at.is_some_and(|due| due <= now) {
             let stream = board.parameters.values().stream;
             self.row_at = self.row_at.map(|due| due + period(stream));
-            let scanner = &self.scanner;
-            let emit = || format!("{}\r\n", board.product.stream.emit(&scanner.row(stream.source)));
-            let row = self.row.take().unwrap_or_else(emit);
+            let objects = &self.objects;
+            let row = self.row.take().unwrap_or_else(|| {
+                let row = board.product.stream.emit(&measurement::row(objects, stream.source));
+                row + self.dialect.line_end()
+            });
             self.repeat(board, &row);
             self.row = Some(row);
         }
         if self.page_at.is_some_and(|due| due <= now) {
             self.page_at = self.page_at.map(|due| due + DIAGNOSTICS_PERIOD);
-            let page = self.dialect.diagnostics(&self.diagnosis(board));
+            let page = self.with_line_ends(self.dialect.diagnostics(&self.diagnosis(board)));
             self.repeat(board, &page);
         }
     }
 
+    /// Object 1029h: what an error that has become active does to the node's state.
+    fn react(&mut self) {
+        while let Some(event) = self.faults.poll_event() {
+            if let FaultEvent::Raised(fault) = event {
+                let class = fault.class(self.objects.product().measurement.sensors);
+                let reaction = self.objects.integer(0x1029, class.sub_index());
+                self.network.react(reaction);
+            }
+        }
+    }
+
     /// State of the CANopen node.
-    pub fn set_network_state(&mut self, state: NetworkState) {
-        self.network = state;
+    pub fn network_state(&self) -> NetworkState {
+        self.network.state()
+    }
+
+    /// The network orders something. While the view is open nobody listens.
+    pub fn nmt(&mut self, board: &mut Board<'_>, command: NmtCommand) {
+        if self.is_viewing() || matches!(self.dialogue, Dialogue::Leaving) {
+            return;
+        }
+        self.network.command(board.now, command);
+        match command {
+            NmtCommand::ResetNode => {
+                self.dialogue = Dialogue::Leaving;
+                *board.reset = Some(Reset::Start);
+            }
+            NmtCommand::ResetCommunication => self.reload_communication(board),
+            NmtCommand::Start | NmtCommand::Stop | NmtCommand::PreOperational => {}
+        }
+    }
+
+    /// The network reads an entry.
+    ///
+    /// # Errors
+    /// If nobody answers, or the entry cannot be read.
+    pub fn read_object(&self, at: ObjectAddress) -> Result<Value, Refusal> {
+        self.check_answers()?;
+        self.objects.read(at).map_err(Refusal::Abort)
+    }
+
+    /// The network writes an entry; what that brings about has happened when this returns.
+    ///
+    /// # Errors
+    /// If nobody answers, or the value is refused.
+    pub fn write_object(&mut self, board: &mut Board<'_>, at: ObjectAddress, data: &[u8]) -> Result<(), Refusal> {
+        self.check_answers()?;
+        match self.objects.write(at, data).map_err(Refusal::Abort)? {
+            Effect::None => {}
+            Effect::Save(group) => board.parameters.save(board.stores, group, &self.objects),
+            Effect::Restore(group) => board.parameters.restore(board.stores, group),
+            Effect::ClearErrors => self.faults.clear_list(&mut self.objects),
+        }
+        Ok(())
+    }
+
+    /// A node that is stopped or whose view is open answers no SDO (CiA 301; section 4.1.1).
+    fn check_answers(&self) -> Result<(), Refusal> {
+        let silent = self.is_viewing()
+            || matches!(self.dialogue, Dialogue::Leaving)
+            || self.network.state() == NetworkState::Stopped;
+        if silent { Err(Refusal::NoAnswer) } else { Ok(()) }
+    }
+
+    /// The communication parameters as they are kept (errata E-93, E-G4).
+    fn reload_communication(&mut self, board: &mut Board<'_>) {
+        let kept = board.parameters.objects();
+        for (at, _, entry) in board.product.dictionary.entries() {
+            let is_parameter = entry.access == crate::device::dictionary::Access::ReadWrite && at.index != 0x1003;
+            if at.index < 0x2000 && is_parameter {
+                self.objects.set(at.index, at.sub, kept.get(at.index, at.sub));
+            }
+        }
     }
 
     fn take_keys(&mut self, board: &mut Board<'_>) {
@@ -177,7 +265,7 @@ impl Firmware {
     fn key(&mut self, board: &mut Board<'_>, key: u8) {
         self.dialogue = match std::mem::replace(&mut self.dialogue, Dialogue::Menu) {
             Dialogue::Menu => self.menu_key(board, key.to_ascii_lowercase()),
-            Dialogue::StreamSource => self.source_key(board, key),
+            Dialogue::StreamSource { chosen } => self.source_key(board, key, chosen),
             Dialogue::StreamPeriod { source, line } => self.line_key(
                 board,
                 key,
@@ -210,7 +298,7 @@ impl Firmware {
                 self.print(board, Sentence::StreamOff);
                 Dialogue::Menu
             }
-            b't' => self.ask(board, Sentence::AskSource, Dialogue::StreamSource),
+            b't' => self.ask(board, Sentence::AskSource, Dialogue::StreamSource { chosen: None }),
             b's' => {
                 self.toggle_diagnostics(board);
                 Dialogue::Menu
@@ -220,15 +308,23 @@ impl Firmware {
         }
     }
 
-    fn source_key(&mut self, board: &mut Board<'_>, key: u8) -> Dialogue {
-        let source = match key.to_ascii_lowercase() {
-            b'f' => Source::FieldValue,
-            b'p' => Source::ProcessValue,
-            b'\r' | ESCAPE => return self.cancel(board),
-            _ => return Dialogue::StreamSource,
+    fn source_key(&mut self, board: &mut Board<'_>, key: u8, chosen: Option<Source>) -> Dialogue {
+        let stay = Dialogue::StreamSource { chosen };
+        let source = match (self.dialect.source_of(key), key, chosen) {
+            (Some(source), _, _) if self.dialect.source_wants_enter() => {
+                self.echo(board, &[key]);
+                return Dialogue::StreamSource { chosen: Some(source) };
+            }
+            (Some(source), _, _) => {
+                self.echo(board, &[key]);
+                source
+            }
+            (None, b'\r', Some(source)) => source,
+            (None, b'\r' | ESCAPE, _) => return self.cancel(board),
+            (None, _, _) => return stay,
         };
-        board.uart.send(board.now, &[key]);
-        let prompt = self.dialect.ask_period(DEFAULT_PERIOD_MS);
+        let limits = board.product.measurement.stream_period_ms;
+        let prompt = self.dialect.ask_period(limits, DEFAULT_PERIOD_MS);
         self.say(board, &prompt);
         Dialogue::StreamPeriod { source, line: Line::new(Echo::Plain) }
     }
@@ -243,8 +339,8 @@ impl Firmware {
         answered: impl FnOnce(&mut Self, &mut Board<'_>, String) -> Dialogue,
     ) -> Dialogue {
         match line.take(key) {
-            Typed::More(echo) => board.uart.send(board.now, echo),
-            Typed::Character(character) => board.uart.send(board.now, &[character]),
+            Typed::More(echo) => self.echo(board, echo),
+            Typed::Character(character) => self.echo(board, &[character]),
             Typed::Answer(answer) => return answered(self, board, answer),
             Typed::Cancelled => return self.cancel(board),
         }
@@ -253,14 +349,15 @@ impl Firmware {
 
     fn stream_on(&mut self, board: &mut Board<'_>, source: Source, answer: &str) -> Dialogue {
         let Some(period_ms) = parse_period(answer, board.product.measurement.stream_period_ms) else {
-            self.print(board, Sentence::BadPeriod);
+            let text = self.dialect.bad_period(board.product.measurement.stream_period_ms);
+            self.say(board, &text);
             return Dialogue::Menu;
         };
         let stream = StreamSetting { on: true, source, period_ms };
         board.parameters.change(board.stores, |values| values.stream = stream);
         let text = self.dialect.stream_on(source, period_ms);
         self.say(board, &text);
-        self.arm_stream(board.now, stream);
+        self.arm_stream(board, stream);
         Dialogue::Menu
     }
 
@@ -269,7 +366,7 @@ impl Firmware {
             return self.cancel(board);
         }
         // Stream settings, node-ID and bit rate are kept apart from the object dictionary (errata E-106).
-        board.sensors.restore_defaults();
+        board.parameters.restore(board.stores, None);
         self.print(board, Sentence::DefaultsRestored);
         *board.reset = Some(Reset::Start);
         Dialogue::Leaving
@@ -293,34 +390,34 @@ impl Firmware {
             self.print(board, Sentence::DiagnosticsOff);
         } else {
             self.print(board, Sentence::DiagnosticsOn);
-            self.page_at = Some(board.now.max(self.started_at + FIRST_DATA_AFTER));
+            self.page_at = Some(board.now.max(self.first_data_at(board)));
         }
     }
 
     fn open_view(&mut self, board: &mut Board<'_>) -> Dialogue {
-        if self.network != NetworkState::PreOperational {
+        if self.network.state() != NetworkState::PreOperational {
             self.print(board, Sentence::ViewRefused);
             return Dialogue::Menu;
         }
         self.print(board, Sentence::ViewTitle);
-        let lines = view::pdo_block(&self.sources(board));
-        self.say_lines(board, &lines);
+        self.say_objects(board, view::pdo_block(board.product));
         self.print(board, Sentence::ViewNext);
         Dialogue::View { place: 0 }
     }
 
     fn view_key(&mut self, board: &mut Board<'_>, key: u8, place: usize) -> Dialogue {
         let next = match key {
-            b'\r' => view::object(&self.sources(board), place),
+            b'\r' => view::object(board.product, place),
             b'x' | b'X' => None,
             _ => return Dialogue::View { place },
         };
-        let Some(lines) = next else {
+        let Some(object) = next else {
+            self.measurement.resume(board.now);
             self.print(board, Sentence::ViewEnd);
             self.print_menu(board);
             return Dialogue::Menu;
         };
-        self.say_lines(board, &lines);
+        self.say_objects(board, std::iter::once(object));
         Dialogue::View { place: place + 1 }
     }
 
@@ -335,10 +432,15 @@ impl Firmware {
     }
 
     /// Rows come at whole periods from now, but not before the first valid data.
-    fn arm_stream(&mut self, now: Instant, stream: StreamSetting) {
+    fn arm_stream(&mut self, board: &Board<'_>, stream: StreamSetting) {
         self.row = None;
-        let first_data_at = self.started_at + FIRST_DATA_AFTER;
-        self.row_at = stream.on.then(|| first_data_at.max(now + period(stream)));
+        let first_data_at = self.first_data_at(board);
+        self.row_at = stream.on.then(|| first_data_at.max(board.now + period(stream)));
+    }
+
+    /// No measured values before the converters have settled (section 1.1; errata B-199, C-15).
+    fn first_data_at(&self, board: &Board<'_>) -> Instant {
+        self.started_at + Duration::from_millis(u64::from(board.product.measurement.first_data_ms))
     }
 
     /// A row or page: only while nothing else is asked or shown (errata E-117) and the line keeps up; otherwise it is
@@ -354,37 +456,35 @@ impl Firmware {
     }
 
     fn diagnosis(&self, board: &Board<'_>) -> Diagnosis {
-        let format = board.product.stream.format(Source::FieldValue);
-        let channels = Channel::all().map(|channel| {
-            let value = match self.scanner.field_value(channel) {
-                FieldValue::Celsius(celsius) => format!("{celsius:8.3}"),
-                FieldValue::Disabled => format!("{:<8}", format.disabled),
-                FieldValue::Open => format!("{:<8}", format.open),
-            };
-            (value, self.scanner.microvolts(channel))
+        let objects = &self.objects;
+        let layout = &board.product.stream;
+        let row = measurement::row(objects, Source::FieldValue);
+        let is_rtd = board.product.measurement.sensors == SensorKind::Rtd;
+        let mut unit = vec![("Supply Voltage", objects.number(0x5000, 0), 2, "V")];
+        unit.push(match board.product.measurement.sensors {
+            SensorKind::Thermocouple => ("Cold Junction", objects.number(0x3100, 0), 3, "C"),
+            SensorKind::Rtd => ("Source Current", objects.number(0x5001, 0), 3, "mA"),
+        });
+        let first = layout.channels.len() - usize::from(board.product.measurement.channels);
+        let channels = (1u8..).zip(&row.readings[first..]).map(|(number, reading)| ChannelDiagnosis {
+            name: layout.channels[first + usize::from(number) - 1].clone(),
+            field_value: layout.emit(&one(*reading)),
+            process_value: objects.integer(0x7130, number),
+            status: objects.integer(0x6150, number) as u8,
+            microvolts: objects.integer(0x2010, number),
+            ohm: is_rtd.then(|| objects.number(0x2000, number)),
         });
         Diagnosis {
-            supply: self.scanner.supply(),
-            cold_junction: self.scanner.cold_junction(),
-            channels: channels.to_vec(),
-            errors: self.scanner.errors(),
+            unit,
+            channels: channels.collect(),
+            errors: self.faults.count(),
             uptime: board.now.since(self.started_at),
-            network: self.network,
-        }
-    }
-
-    fn sources<'a>(&'a self, board: &'a Board<'_>) -> view::Sources<'a> {
-        view::Sources {
-            product: board.product,
-            identity: &self.identity,
-            parameters: board.parameters.values(),
-            scanner: &self.scanner,
-            serial_number: board.serial_number,
+            network: self.network.state(),
         }
     }
 
     fn print_menu(&mut self, board: &mut Board<'_>) {
-        let menu = self.dialect.menu(&self.identity, board.parameters.values(), self.network);
+        let menu = self.dialect.menu(&self.identity, board.parameters.values(), self.network.state());
         self.say(board, &menu);
     }
 
@@ -393,14 +493,68 @@ impl Firmware {
         self.say(board, &text);
     }
 
-    fn say_lines(&mut self, board: &mut Board<'_>, lines: &[super::dialect::ViewLine]) {
-        let text: String = lines.iter().map(|line| self.dialect.view_line(line)).collect();
-        self.say(board, &format!("\r\n{text}"));
+    fn say_objects(&mut self, board: &mut Board<'_>, shown: impl Iterator<Item = &'static Object>) {
+        let mut text = String::from("\r\n");
+        for object in shown {
+            text.push_str(&self.dialect.view_object(object, view::entries(object, &self.objects)));
+        }
+        self.say(board, &text);
+    }
+
+    fn echo(&mut self, board: &mut Board<'_>, bytes: &[u8]) {
+        if self.dialect.echoes() {
+            board.uart.send(board.now, bytes);
+        }
     }
 
     fn say(&mut self, board: &mut Board<'_>, text: &str) {
+        let text = self.with_line_ends(text.to_owned());
         board.uart.send(board.now, text.as_bytes());
     }
+
+    fn with_line_ends(&self, text: String) -> String {
+        if self.dialect.line_end() == "\r\n" { text } else { text.replace("\r\n", self.dialect.line_end()) }
+    }
+}
+
+/// What the software knows of itself: objects 1018h and 1020h (sections 3.2.11 and 3.2.12).
+fn identify(objects: &mut Objects, identity: &Identity, serial_number: u32) {
+    objects.set(0x1018, 3, Value::Unsigned32(revision(identity.version)));
+    objects.set(0x1018, 4, Value::Unsigned32(serial_number));
+    objects.set(0x1020, 1, Value::Unsigned32(build_date(identity)));
+    objects.set(0x1020, 2, Value::Unsigned32(build_time(identity)));
+}
+
+/// 1018h:3, bits 31-16: revision of the object dictionary, and bits 15-8: of the hardware (errata E-21).
+const DICTIONARY_AND_HARDWARE_REVISION: u32 = 0x0001_0100;
+
+/// 1018h:3: software version in the lowest byte, a digit for the major and one for the minor number.
+fn revision(version: Version) -> u32 {
+    DICTIONARY_AND_HARDWARE_REVISION | u32::from(version.major & 0xF) << 4 | u32::from(version.minor & 0xF)
+}
+
+/// 1020h:1: day, month and year, their decimal digits read as hexadecimal ones (errata E-22).
+fn build_date(identity: &Identity) -> u32 {
+    let mut parts = identity.build_date.split('-');
+    let mut next = || digits(parts.next());
+    let (year, month, day) = (next(), next(), next());
+    day << 24 | month << 16 | year
+}
+
+/// 1020h:2: hour and minute in the same way.
+fn build_time(identity: &Identity) -> u32 {
+    let mut parts = identity.build_time.split(':');
+    let mut next = || digits(parts.next());
+    next() << 8 | next()
+}
+
+fn digits(text: Option<&str>) -> u32 {
+    text.and_then(|text| u32::from_str_radix(text, 16).ok()).unwrap_or_default()
+}
+
+/// A row of one field.
+fn one(reading: Reading) -> Row {
+    Row { source: Source::FieldValue, readings: vec![reading] }
 }
 
 const ESCAPE: u8 = 0x1B;
@@ -430,6 +584,29 @@ mod tests {
         }
         for answer in ["0", "60001", "-5", "1.5", "x", "99999999999", "1 0"] {
             assert_eq!(parse_period(answer, (1, 60_000)), None, "{answer:?}");
+        }
+    }
+
+    // B-006, B-007, B-5, B-4, B-005
+    #[test]
+    fn the_software_says_itself_when_it_was_compiled_and_which_version_it_is() {
+        for product in crate::device::Product::all() {
+            let mut objects = Objects::factory(product, 127);
+            let identity = Identity {
+                product: product.name.clone(),
+                version: Version::new(1, 2, 3),
+                build_date: "2010-08-10".into(),
+                build_time: "16:20:00".into(),
+                program_words: 0,
+                crc: 0,
+            };
+            identify(&mut objects, &identity, 7);
+            assert_eq!(objects.get(0x1020, 1), Value::Unsigned32(0x1008_2010));
+            assert_eq!(objects.get(0x1020, 2), Value::Unsigned32(0x0000_1620));
+            assert_eq!(objects.get(0x1018, 3), Value::Unsigned32(0x0001_0112));
+            assert_eq!(objects.get(0x1018, 4), Value::Unsigned32(7));
+            assert_eq!(objects.get(0x1018, 1), Value::Unsigned32(0x55));
+            assert_eq!(objects.get(0x1018, 2), Value::Unsigned32(product.can.product_code));
         }
     }
 }

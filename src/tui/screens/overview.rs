@@ -242,6 +242,7 @@ fn value_row(
         Reading::Disabled => ("-   ".into(), "disabled", theme.quiet()),
         Reading::Open => ("-   ".into(), "open circuit", theme.bad()),
         Reading::Short => ("-   ".into(), "short circuit", theme.bad()),
+        Reading::Error => ("-   ".into(), "no reading", theme.bad()),
     };
     let span = LEAST_SPAN[usize::from(source == Source::ProcessValue)];
     let newest = channel.history.len().saturating_sub(room);
@@ -293,6 +294,7 @@ fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
     let kind = match fault.kind {
         FaultKind::Open => "open circuit",
         FaultKind::Short => "short circuit",
+        FaultKind::Failed => "no reading",
     };
     let name = Span::raw(format!("    {:<8}", fault.channel));
     match fault.until {

@@ -1,8 +1,8 @@
 //! The application: banner, menu, dialogues, stream, diagnostics, flow control.
 
+use axcon::emulator::knob::Knob;
 use axcon::emulator::memory::{Parameters, StreamSetting};
-use axcon::emulator::sensors::{Channel, Condition};
-use axcon::emulator::{Area, NetworkState, Running, Setup, Unit};
+use axcon::emulator::{Area, NetworkState, NmtCommand, Running, Setup, Unit};
 use axcon::endpoint::Endpoint;
 use axcon::time::{Duration, Instant};
 use axcon::wire::stream::{Reading, Row, Source};
@@ -145,10 +145,9 @@ fn both_limits_of_the_repetition_rate_are_taken() {
 #[test]
 fn rows_have_the_manuals_widths_in_every_condition() {
     let mut bench = Bench::at_menu();
-    let [tc1, tc2, tc3, _] = Channel::all();
-    bench.unit().sensors_mut().set(tc1, Condition::Temperature(250.0));
-    bench.unit().sensors_mut().set(tc2, Condition::Open);
-    bench.unit().sensors_mut().set_enabled(tc3, false);
+    bench.turn(Knob::Temperature(1, 250.0));
+    bench.turn(Knob::Open(2, None));
+    assert_eq!(bench.write("6112:3", 0.0), Ok(()));
     bench.keys(b"tf200\r");
     bench.run_ms(4_000);
     let text = bench.take();
@@ -282,13 +281,14 @@ fn yes_restores_the_defaults_and_resets() {
     for key in [b"d", b"D"] {
         let mut bench = Bench::at_menu();
         bench.keys(b"tp250\r");
-        bench.unit().sensors_mut().set_enabled(Channel::all()[1], false);
+        assert_eq!(bench.write("6112:2", 0.0), Ok(()));
+        bench.save();
         let question = bench.keys(key);
         assert!(question.contains("Yes"), "{question}");
         let text = bench.keys(b"Yes\r");
         assert!(text.starts_with("Yes"), "echo: {text}");
         assert!(text.contains("Software Version V1.2.3") && text.contains("Main Menu"), "banner again: {text}");
-        assert!(bench.unit().sensors().is_enabled(Channel::all()[1]), "object 6112h is back at its default");
+        assert_eq!(bench.read("6112:2"), Ok(1.0), "back at its default");
         assert!(stream_of(&mut bench).on, "stream settings survive");
         assert_eq!((bench.unit().settings().node_id, bench.unit().settings().kbps), (127, 125));
     }
@@ -297,12 +297,12 @@ fn yes_restores_the_defaults_and_resets() {
 #[test]
 fn any_other_answer_leaves_everything_as_it_is() {
     let mut bench = Bench::at_menu();
-    bench.unit().sensors_mut().set_enabled(Channel::all()[1], false);
+    assert_eq!(bench.write("6112:2", 0.0), Ok(()));
     for answer in [&b"dyes\r"[..], b"dYES\r", b"dYes \r", b"d\r", b"dY\r", b"dYesYes\r", b"dYes\x1b"] {
         let text = bench.keys(answer);
         assert!(text.contains("Cancelled"), "{:?}: {text}", answer.escape_ascii());
         assert!(!text.contains("V1.2.3"), "{:?}: no reset: {text}", answer.escape_ascii());
-        assert!(!bench.unit().sensors().is_enabled(Channel::all()[1]));
+        assert_eq!(bench.read("6112:2"), Ok(0.0));
     }
     assert!(bench.keys(b"m").contains("Main Menu"));
 }
@@ -338,7 +338,7 @@ fn the_view_ends_by_itself_and_freezes_the_values_meanwhile() {
     bench.take();
     let (mut objects, mut text) = (0, String::new());
     while !text.contains("Main Menu") {
-        bench.unit().sensors_mut().set(Channel::all()[0], Condition::Temperature(500.0));
+        bench.turn(Knob::Temperature(1, 500.0));
         text = bench.keys(b"\r");
         objects += 1;
         if text.contains("6100h") {
@@ -357,9 +357,11 @@ fn the_view_ends_by_itself_and_freezes_the_values_meanwhile() {
 #[test]
 fn the_view_is_refused_outside_pre_operational() {
     let mut bench = Bench::at_menu();
-    for state in [NetworkState::Operational, NetworkState::Stopped] {
-        let now = bench.now;
-        bench.unit().set_network_state(now, state);
+    bench.run_ms(3_000);
+    for (command, state) in [(NmtCommand::Start, NetworkState::Operational), (NmtCommand::Stop, NetworkState::Stopped)]
+    {
+        bench.nmt(command);
+        assert_eq!(bench.unit().network_state(), Some(state));
         let text = bench.keys(b"v");
         assert!(!text.contains("1400h") && text.lines().count() < 4, "{text}");
         assert!(bench.keys(b"m").contains("Main Menu"));
@@ -407,7 +409,7 @@ fn output_is_paced_at_the_line_rate() {
     let start = bench.now;
     bench.send(b"m");
     bench.run_ms(300);
-    let menu: Vec<Instant> = bench.heard[bench.read..].iter().map(|&(at, _)| at).collect();
+    let menu: Vec<Instant> = bench.heard[bench.taken..].iter().map(|&(at, _)| at).collect();
     let expected = Duration::from_nanos(86_805) * (menu.len() as u32 + 1);
     let took = menu.last().expect("a menu").since(start);
     assert_eq!(took, expected, "one character for the key, one for each of the menu");

@@ -31,7 +31,7 @@ fn flash_with(program: &[u8]) -> Vec<u8> {
 }
 
 fn setup(flash: Vec<u8>) -> Setup {
-    Setup { product: rtd8(), loader: LoaderKind::G3, seed: 1, flash, parameters: Vec::new() }
+    Setup { product: rtd8(), loader: LoaderKind::G3, seed: 1, dialect: 0, flash, parameters: Vec::new() }
 }
 
 fn old_program() -> Vec<u8> {
@@ -244,7 +244,7 @@ fn each_record_is_acknowledged_by_a_short_hold() {
     bench.send(record.as_bytes());
     let last = bench.now + character_time(BAUD) * record.len() as u32;
     bench.run_ms(20);
-    let heard: Vec<(Instant, u8)> = bench.heard[bench.read..].to_vec();
+    let heard: Vec<(Instant, u8)> = bench.heard[bench.taken..].to_vec();
     assert_eq!(heard.iter().map(|&(_, byte)| byte).collect::<Vec<_>>(), [XOFF, b'.', XON]);
     // The words are programmed before the check sum is read: 16 of 20 µs, while its digits and the CR come.
     let took = heard[2].0.since(last);
@@ -373,7 +373,8 @@ fn a_program_that_is_not_intact_is_called_loaded_and_does_not_start() {
 fn a_loader_without_texts_of_a_product_prints_the_public_ones() {
     let product = Product::named("AXTC4CO").expect("built in");
     let flash = vec![0xFF; product.flash.program_words as usize * 2];
-    let mut bench = Bench::new(Setup { product, loader: LoaderKind::G3, seed: 1, flash, parameters: Vec::new() });
+    let mut bench =
+        Bench::new(Setup { product, loader: LoaderKind::G3, seed: 1, dialect: 0, flash, parameters: Vec::new() });
     bench.run_ms(500);
     assert!(bench.take().ends_with("Waiting for application S-Record.\r\n"), "no key: its manual has none");
     let program = program("AXTC4CO", Version::new(1, 3, 0), 1500);

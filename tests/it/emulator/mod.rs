@@ -1,12 +1,16 @@
 //! The emulated unit alone, driven in virtual time over a line at 115200 baud.
 
 mod console;
+mod dictionary;
 mod loader;
 mod loader_g3;
+mod rtd;
 
+use axcon::canopen::{ObjectAddress, Value};
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
-use axcon::emulator::{Setup, Unit};
+use axcon::emulator::knob::Knob;
+use axcon::emulator::{NmtCommand, Refusal, Setup, Unit};
 use axcon::image::Identity;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::version::Version;
@@ -44,7 +48,7 @@ fn flash_with(program: &[u8]) -> Vec<u8> {
 }
 
 fn setup(flash: Vec<u8>) -> Setup {
-    Setup { product: product(), loader: LoaderKind::G1, seed: 1, flash, parameters: Vec::new() }
+    Setup { product: product(), loader: LoaderKind::G1, seed: 1, dialect: 0, flash, parameters: Vec::new() }
 }
 
 /// What a unit of a test runs before anything is loaded.
@@ -58,7 +62,7 @@ struct Bench {
     now: Instant,
     /// Each character with the moment of the release it came with.
     heard: Vec<(Instant, u8)>,
-    read: usize,
+    taken: usize,
 }
 
 impl Bench {
@@ -66,7 +70,7 @@ impl Bench {
     fn new(setup: Setup) -> Self {
         let unit = Unit::new(setup);
         let plugged = Plugged::new(unit, Line::new(character_time(BAUD), Duration::ZERO));
-        let mut bench = Bench { plugged, now: Instant::ZERO, heard: Vec::new(), read: 0 };
+        let mut bench = Bench { plugged, now: Instant::ZERO, heard: Vec::new(), taken: 0 };
         bench.power_on();
         bench
     }
@@ -77,6 +81,52 @@ impl Bench {
         bench.run_ms(500);
         bench.take();
         bench
+    }
+
+    /// A unit of a product, with a program of V1.2.3 in it and a dialect, its menu printed.
+    fn of(name: &str, dialect: u64) -> Self {
+        let product = Product::named(name).expect("built in");
+        let mut flash = program(name, Version::new(1, 2, 3), 1024);
+        flash.resize(product.flash.program_words as usize * 2, 0xFF);
+        let setup = Setup { product, loader: product.loader.kind, seed: 1, dialect, flash, parameters: Vec::new() };
+        let mut bench = Bench::new(setup);
+        bench.run_ms(500);
+        bench.take();
+        bench
+    }
+
+    /// Turns a knob.
+    fn turn(&mut self, knob: Knob) {
+        let now = self.now;
+        self.unit().turn(now, knob).expect("a knob of this unit");
+    }
+
+    /// The network writes an entry, as `6112:1` names it.
+    fn write(&mut self, entry: &str, number: f64) -> Result<(), Refusal> {
+        let at: ObjectAddress = entry.parse().expect("an entry");
+        let data_type = self.unit().product().dictionary.entry(at).expect("an entry").data_type;
+        let value = match data_type.range() {
+            None => Value::Real32(number as f32),
+            Some(_) => data_type.integer(number as i64).expect("a value of the type"),
+        };
+        let now = self.now;
+        self.unit().write_object(now, at, &value.encode())
+    }
+
+    /// The network writes "save" to 1010h sub-index 1.
+    fn save(&mut self) {
+        assert_eq!(self.write("1010:1", f64::from(0x6576_6173)), Ok(()));
+    }
+
+    /// The network reads an entry.
+    fn read(&mut self, entry: &str) -> Result<f64, Refusal> {
+        self.unit().read_object(entry.parse().expect("an entry")).map(Value::as_f64)
+    }
+
+    /// The network master orders something.
+    fn nmt(&mut self, command: NmtCommand) {
+        let now = self.now;
+        self.unit().nmt(now, command);
     }
 
     fn unit(&mut self) -> &mut Unit {
@@ -117,8 +167,8 @@ impl Bench {
 
     /// What has been heard since the last time.
     fn take(&mut self) -> String {
-        let new = self.heard[self.read..].iter().map(|&(_, byte)| byte).collect();
-        self.read = self.heard.len();
+        let new = self.heard[self.taken..].iter().map(|&(_, byte)| byte).collect();
+        self.taken = self.heard.len();
         String::from_utf8(new).expect("the port speaks ASCII")
     }
 

@@ -51,7 +51,16 @@ impl Bench {
 
     /// A unit of a product with this loader and this flash, just powered on, behind an adapter of this latency.
     pub fn of(product: &'static Product, loader: LoaderKind, flash: Vec<u8>, latency: Duration) -> Self {
-        let setup = Setup { product, loader, seed: 1, flash, parameters: Vec::new() };
+        Bench::made_of(Setup { product, loader, seed: 1, dialect: 0, flash, parameters: Vec::new() }, latency)
+    }
+
+    /// A unit that words its prose in a dialect of its own, with a small V1.1.0 in flash, just powered on.
+    pub fn in_dialect(product: &'static Product, dialect: u64) -> Self {
+        let (loader, flash) = (product.loader.kind, flash_with(&small_image(&product.name, "1.1.0")));
+        Bench::made_of(Setup { product, loader, seed: 1, dialect, flash, parameters: Vec::new() }, Duration::ZERO)
+    }
+
+    fn made_of(setup: Setup, latency: Duration) -> Self {
         let mut unit = Unit::new(setup);
         unit.power_on(Instant::ZERO);
         Bench {

@@ -1,0 +1,36 @@
+//! `axcon eds`: a product's electronic data sheet.
+
+use std::path::PathBuf;
+
+use super::error::{CliError, Kind};
+use super::image::product;
+use super::output::Output;
+use crate::device::{Product, eds};
+
+/// Arguments of `axcon eds`.
+///
+/// The data sheet (CiA 306) lists every entry of the product's object dictionary for configuration tools.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Which product, e.g. axtc4co.
+    #[arg(value_name = "PRODUCT", value_parser = product)]
+    product: &'static Product,
+    /// Write to FILE instead of standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Writes the data sheet.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn run(args: Args, output: &mut Output) -> Result<(), CliError> {
+    let text = eds::write(args.product);
+    match &args.out {
+        None => output.data(text.as_bytes()),
+        Some(file) => std::fs::write(file, text).map_err(|error| {
+            let context = format!("cannot write '{}'", file.display());
+            CliError::new(Kind::Failed, anyhow::Error::new(error).context(context))
+        }),
+    }
+}

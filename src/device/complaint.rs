@@ -1,0 +1,76 @@
+//! What is wrong with a file that a person has written: where, which key, what was found, what is allowed.
+
+use std::fmt;
+
+/// One thing that is wrong with a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Complaint {
+    /// Name of the file.
+    pub file: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1.
+    pub column: usize,
+    /// The key it is about, e.g. `object 6126h, entry 1, default`; empty if the file is no TOML.
+    pub key: String,
+    /// What was found, and what is allowed.
+    pub message: String,
+}
+
+impl Complaint {
+    /// Complaints one below the other.
+    pub fn list(complaints: &[Complaint]) -> String {
+        complaints.iter().map(Complaint::to_string).collect::<Vec<_>>().join("\n")
+    }
+}
+
+impl fmt::Display for Complaint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Complaint { file, line, column, key, message } = self;
+        let colon = if key.is_empty() { "" } else { ": " };
+        write!(f, "{file}:{line}:{column}: {key}{colon}{message}")
+    }
+}
+
+/// The complaints about one file.
+#[derive(Debug)]
+pub struct Complaints<'a> {
+    file: &'a str,
+    text: &'a str,
+    found: Vec<Complaint>,
+}
+
+impl<'a> Complaints<'a> {
+    /// None yet, about a file with this text.
+    pub fn about(file: &'a str, text: &'a str) -> Self {
+        Complaints { file, text, found: Vec::new() }
+    }
+
+    /// One more, about what stands at a byte of the text.
+    pub fn add(&mut self, at: usize, key: impl Into<String>, message: impl Into<String>) {
+        let before = self.text.get(..at).unwrap_or_default();
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        self.found.push(Complaint {
+            file: self.file.to_owned(),
+            line: before.matches('\n').count() + 1,
+            column: before[line_start..].chars().count() + 1,
+            key: key.into(),
+            message: message.into(),
+        });
+    }
+
+    /// The last one: the text is no TOML, or not of the shape that is wanted.
+    pub fn and_the_end(mut self, error: &toml::de::Error) -> Vec<Complaint> {
+        let at = error.span().map_or(0, |span| span.start);
+        self.add(at, "", error.message().trim_end().replace('\n', "; "));
+        self.found
+    }
+
+    /// The complaints, or what was read if there are none.
+    ///
+    /// # Errors
+    /// If there are complaints.
+    pub fn or<T>(self, read: T) -> Result<T, Vec<Complaint>> {
+        if self.found.is_empty() { Ok(read) } else { Err(self.found) }
+    }
+}

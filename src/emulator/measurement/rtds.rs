@@ -1,0 +1,213 @@
+//! How the AXRTD8CO reads: one channel after the other, 100 ms each, and the current source once in a sweep (manual,
+//! section 1.1).
+//!
+//! The wires of 3- and 4-wire sensors take a second reading. It is made in the first sweep, after a change of the type or
+//! mode of a channel, and then once in 600 readings of the converter, which is once a minute; one channel in a sweep,
+//! so that each is still updated once a second (errata E-C4 to E-C6).
+
+use super::super::objects::Objects;
+use super::super::rtd_curve::Curve;
+use super::super::sensors::{Sensors, Wiring};
+use super::Reading;
+use crate::canopen::Value;
+use crate::time::{Duration, Instant};
+
+/// One reading of the converter.
+const READING_TIME: Duration = Duration::from_millis(100);
+/// Readings between two of the same wires.
+const READINGS_BETWEEN_WIRES: u64 = 600;
+/// Below this the sensor is shorted, above that the circuit is open (appendix A, errata E-C11).
+const SHORT_BELOW_OHM: f64 = 5.0;
+const OPEN_ABOVE_OHM: f64 = 600.0;
+/// One step of the converter in V: 24 bits over 5 V (a guess, finer than 0.001 ohm).
+const STEP_V: f64 = 5.0 / 8_388_608.0;
+/// Sweeps without new data that make a frozen converter (errata E-C24).
+const FROZEN_SWEEPS: u32 = 2;
+
+/// The converter's state.
+#[derive(Clone, Debug)]
+pub(super) struct Rtds {
+    reading_at: Instant,
+    next: Slot,
+    /// Readings made so far.
+    readings: u64,
+    /// Current through the sensors in A, as last measured.
+    ampere: f64,
+    /// A wire has been read in this sweep already.
+    wire_read: bool,
+    /// Sweeps that have ended since the converter stopped.
+    frozen_sweeps: u32,
+    channels: Vec<Input>,
+}
+
+/// What is read next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Slot {
+    Current,
+    Channel(u8),
+    /// The wire of a channel whose sensor has just been read.
+    Wire(u8),
+}
+
+#[derive(Clone, Debug, Default)]
+struct Input {
+    /// Voltage of the sensor in V; `None` while the input is saturated.
+    volts: Option<f64>,
+    wire_ohm: f64,
+    /// The reading at which the wires were read.
+    wires_at: Option<u64>,
+    /// Type and mode of that time.
+    settings: (i64, i64),
+}
+
+impl Rtds {
+    pub(super) fn start(now: Instant, channels: u8) -> Self {
+        Rtds {
+            reading_at: now + READING_TIME,
+            next: Slot::Current,
+            readings: 0,
+            ampere: 0.0,
+            wire_read: false,
+            frozen_sweeps: 0,
+            channels: vec![Input::default(); usize::from(channels)],
+        }
+    }
+
+    pub(super) fn deadline(&self) -> Instant {
+        self.reading_at
+    }
+
+    pub(super) fn resume(&mut self, now: Instant) {
+        self.reading_at = now + READING_TIME;
+    }
+
+    /// Makes one reading. Says which channel has a new value; 0 for none.
+    pub(super) fn step(
+        &mut self,
+        sensors: &Sensors,
+        objects: &mut Objects,
+        read: &mut impl FnMut(u8, Reading),
+    ) -> Option<u8> {
+        let now = self.reading_at;
+        self.reading_at += READING_TIME;
+        self.readings += 1;
+        let slot = self.next;
+        if !sensors.is_frozen() {
+            self.frozen_sweeps = 0;
+            match slot {
+                Slot::Current => {
+                    let milliampere = sensors.current(now);
+                    self.ampere = milliampere / 1_000.0;
+                    objects.set(0x5001, 0, Value::Real32(milliampere as f32));
+                }
+                Slot::Channel(number) => {
+                    let terminals = sensors.rtd(now, number, wiring(objects, number), curve(objects, number));
+                    self.input(number).volts = terminals.main.map(quantised);
+                    if let Some(volts) = terminals.main {
+                        let microvolts = (quantised(volts) * 1e6).round() as i32;
+                        objects.set(0x2010, number, Value::Integer32(microvolts));
+                    }
+                }
+                Slot::Wire(number) => {
+                    let terminals = sensors.rtd(now, number, wiring(objects, number), curve(objects, number));
+                    let (readings, ampere, settings) = (self.readings, self.ampere, settings(objects, number));
+                    let input = self.input(number);
+                    input.wire_ohm = quantised(terminals.wire) / ampere;
+                    input.wires_at = Some(readings);
+                    input.settings = settings;
+                    self.wire_read = true;
+                }
+            }
+        }
+        let channel = match slot {
+            Slot::Current => None,
+            Slot::Channel(number) if self.wants_wire(objects, number) => {
+                self.next = Slot::Wire(number);
+                return Some(0);
+            }
+            Slot::Channel(number) | Slot::Wire(number) => Some(number),
+        };
+        self.next = self.following(objects, channel.unwrap_or(0));
+        if self.next == Slot::Current {
+            self.wire_read = false;
+            self.frozen_sweeps += u32::from(sensors.is_frozen());
+        }
+        if let Some(number) = channel {
+            let reading = self.evaluate(objects, number);
+            read(number, reading);
+        }
+        Some(channel.unwrap_or(0))
+    }
+
+    /// Resistance and temperature from what has been read.
+    fn evaluate(&mut self, objects: &mut Objects, number: u8) -> Reading {
+        if self.frozen_sweeps >= FROZEN_SWEEPS {
+            return Reading::Frozen;
+        }
+        let (ampere, wiring, curve) = (self.ampere, wiring(objects, number), curve(objects, number));
+        let Input { volts, wire_ohm, .. } = *self.input(number);
+        let Some(volts) = volts else {
+            objects.set(0x2000, number, Value::NOT_A_NUMBER);
+            return Reading::Open;
+        };
+        let wires = match wiring {
+            Wiring::Two => 0.0,
+            Wiring::Three => 2.0 * wire_ohm,
+            Wiring::Four => wire_ohm,
+        };
+        let ohm = volts / ampere - wires;
+        objects.set(0x2000, number, Value::Real32(ohm as f32));
+        if ohm > OPEN_ABOVE_OHM {
+            Reading::Open
+        } else if ohm < SHORT_BELOW_OHM {
+            Reading::Short
+        } else {
+            curve.temperature(ohm).map_or(Reading::MathError, Reading::Celsius)
+        }
+    }
+
+    /// Whether the wires of a channel are due.
+    fn wants_wire(&self, objects: &Objects, number: u8) -> bool {
+        let input = &self.channels[usize::from(number) - 1];
+        match input.wires_at {
+            _ if wiring(objects, number) == Wiring::Two => false,
+            None => true,
+            Some(_) if input.settings != settings(objects, number) => true,
+            Some(at) => !self.wire_read && self.readings - at >= READINGS_BETWEEN_WIRES,
+        }
+    }
+
+    /// The next channel that is on, or the current source: the sweep is over.
+    fn following(&self, objects: &Objects, number: u8) -> Slot {
+        let channels = self.channels.len() as u8;
+        let next = (number + 1..=channels).find(|&next| objects.integer(0x6112, next) != 0);
+        next.map_or(Slot::Current, Slot::Channel)
+    }
+
+    fn input(&mut self, number: u8) -> &mut Input {
+        &mut self.channels[usize::from(number) - 1]
+    }
+}
+
+fn quantised(volts: f64) -> f64 {
+    (volts / STEP_V).round() * STEP_V
+}
+
+/// Object 6110h.
+fn wiring(objects: &Objects, number: u8) -> Wiring {
+    match objects.integer(0x6110, number) {
+        10_000 => Wiring::Two,
+        10_002 => Wiring::Four,
+        _ => Wiring::Three,
+    }
+}
+
+/// Type and mode of a channel: after a change its wires are read anew.
+fn settings(objects: &Objects, number: u8) -> (i64, i64) {
+    (objects.integer(0x6110, number), objects.integer(0x6112, number))
+}
+
+/// Objects 3010h, 3020h and 3030h.
+fn curve(objects: &Objects, number: u8) -> Curve {
+    Curve::from_objects([0x3010, 0x3020, 0x3030].map(|index| objects.number(index, number)))
+}

@@ -1,0 +1,447 @@
+//! Scenarios: what happens to a unit, and when, as a file says it.
+//!
+//! A file is TOML with deeds at moments and ramps between moments; `docs/emulator.md` describes it. A [`Scenario`] is
+//! what was read, the [`Stage`] is a unit with its scenario playing: an endpoint like the unit alone.
+
+mod verb;
+
+pub use verb::{HELP, Verb, VerbError};
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{NetworkState, Running, Store, Unit};
+use crate::device::{Complaint, Complaints, Product};
+use crate::endpoint::{Endpoint, Transmit};
+use crate::time::{Duration, Instant};
+
+/// What happens to a unit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scenario {
+    /// Deeds with their moments, in order.
+    deeds: Vec<(Duration, Verb)>,
+    /// After this time it begins anew.
+    repeat: Option<Duration>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawScenario {
+    product: Option<Spanned<String>>,
+    repeat: Option<Spanned<f64>>,
+    #[serde(default)]
+    at: Vec<RawMoment>,
+    #[serde(default)]
+    ramp: Vec<RawRamp>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMoment {
+    seconds: Spanned<f64>,
+    #[serde(rename = "do")]
+    deeds: Vec<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawRamp {
+    from: Spanned<f64>,
+    to: Spanned<f64>,
+    what: Spanned<String>,
+    start: f64,
+    end: f64,
+}
+
+/// Largest file that is read; a scenario of a day with a deed every second has half of it.
+pub const LARGEST_FILE: u64 = 4 << 20;
+/// Longest scenario.
+const LONGEST_S: f64 = 7.0 * 86_400.0;
+/// Time between two steps of a ramp: the fastest scan of any unit.
+const RAMP_STEP: Duration = Duration::from_millis(100);
+/// Deeds of one scenario at most, the steps of its ramps included.
+const MOST_DEEDS: usize = 1_000_000;
+
+impl Scenario {
+    /// Reads a file for a unit of a product. `None` if the file is for another product.
+    ///
+    /// # Errors
+    /// If it is none, with everything that is wrong with it.
+    pub fn read(file: &str, text: &str, product: &Product) -> Result<Option<Scenario>, Vec<Complaint>> {
+        let mut complaints = Complaints::about(file, text);
+        let raw: RawScenario = match toml::from_str(text) {
+            Ok(raw) => raw,
+            Err(error) => return Err(complaints.and_the_end(&error)),
+        };
+        if let Some(named) = &raw.product {
+            match Product::named(named.get_ref()) {
+                None => {
+                    let known: Vec<String> = Product::all().iter().map(|known| known.name.to_lowercase()).collect();
+                    let message = format!("'{}' is no product; there is {}", named.get_ref(), known.join(", "));
+                    complaints.add(named.span().start, "product", message);
+                    return complaints.or(None);
+                }
+                Some(named) if named.name != product.name => return Ok(None),
+                Some(_) => {}
+            }
+        }
+        let mut deeds = Vec::new();
+        for moment in &raw.at {
+            let at = seconds(&moment.seconds, "at.seconds", &mut complaints);
+            for deed in &moment.deeds {
+                match act(deed.get_ref(), product) {
+                    Ok(verb) => deeds.push((at, verb)),
+                    // Behind the opening quotation mark.
+                    Err(error) => complaints.add(deed.span().start + error.column, "at.do", error.message),
+                }
+            }
+        }
+        for ramp in &raw.ramp {
+            let from = seconds(&ramp.from, "ramp.from", &mut complaints);
+            let to = seconds(&ramp.to, "ramp.to", &mut complaints);
+            if to <= from {
+                complaints.add(ramp.to.span().start, "ramp.to", "a ramp ends later than it begins");
+                continue;
+            }
+            let steps = ramp_steps(to - from);
+            for step in 0..=steps {
+                let part = f64::from(step) / f64::from(steps);
+                let value = ramp.start + (ramp.end - ramp.start) * part;
+                match act(&format!("set {} {value}", ramp.what.get_ref()), product) {
+                    Ok(verb) => deeds.push((from + (to - from).mul_f64(part), verb)),
+                    Err(error) => {
+                        complaints.add(ramp.what.span().start, "ramp.what", error.message);
+                        break;
+                    }
+                }
+                if deeds.len() > MOST_DEEDS {
+                    complaints.add(ramp.from.span().start, "ramp", format!("more than {MOST_DEEDS} steps in all"));
+                    return complaints.or(None);
+                }
+            }
+        }
+        deeds.sort_by_key(|(at, _)| *at);
+        let last = deeds.last().map_or(Duration::ZERO, |(at, _)| *at);
+        let repeat = raw.repeat.as_ref().map(|repeat| {
+            let after = seconds(repeat, "repeat", &mut complaints);
+            if after < last || after.is_zero() {
+                let message = format!("{} s is before the last deed, at {} s", repeat.get_ref(), last.as_secs_f64());
+                complaints.add(repeat.span().start, "repeat", message);
+            }
+            after
+        });
+        complaints.or(Some(Scenario { deeds, repeat }))
+    }
+}
+
+/// Steps of a ramp of this length.
+fn ramp_steps(length: Duration) -> u32 {
+    (length.as_nanos() / RAMP_STEP.as_nanos()).clamp(1, u128::from(u32::MAX)) as u32
+}
+
+fn seconds(raw: &Spanned<f64>, key: &str, complaints: &mut Complaints<'_>) -> Duration {
+    let value = *raw.get_ref();
+    if !(0.0..=LONGEST_S).contains(&value) {
+        complaints.add(raw.span().start, key, format!("{value} is not 0 to {LONGEST_S} seconds"));
+        return Duration::ZERO;
+    }
+    Duration::from_secs_f64(value)
+}
+
+/// A verb that does something; a file has nobody to answer.
+fn act(line: &str, product: &Product) -> Result<Verb, VerbError> {
+    match Verb::read(line, product)? {
+        Verb::Read(_) | Verb::Status => {
+            Err(VerbError { column: 1, message: "a scenario does things; nobody would hear the answer".into() })
+        }
+        verb => Ok(verb),
+    }
+}
+
+/// A unit with its scenario playing.
+#[derive(Debug)]
+pub struct Stage {
+    unit: Unit,
+    scenario: Scenario,
+    /// When the present round began.
+    began: Instant,
+    /// The next deed.
+    next: usize,
+    /// When the supply comes back.
+    power_at: Option<Instant>,
+}
+
+impl Stage {
+    /// A unit to which only happens what is done by hand.
+    pub fn bare(unit: Unit) -> Self {
+        Stage::new(unit, Scenario::default())
+    }
+
+    /// A unit whose scenario begins at time zero.
+    pub fn new(unit: Unit, scenario: Scenario) -> Self {
+        Stage { unit, scenario, began: Instant::ZERO, next: 0, power_at: None }
+    }
+
+    /// The unit.
+    pub fn unit(&self) -> &Unit {
+        &self.unit
+    }
+
+    /// Supply voltage comes.
+    pub fn power_on(&mut self, now: Instant) {
+        self.power_at = None;
+        self.unit.power_on(now);
+    }
+
+    /// Supply voltage goes.
+    pub fn power_off(&mut self, now: Instant) {
+        self.power_at = None;
+        self.unit.power_off(now);
+    }
+
+    /// The next write to memory that outlives the power.
+    pub fn poll_store(&mut self) -> Option<Store> {
+        self.unit.poll_store()
+    }
+
+    /// Does something to the unit; gives what there is to say about it.
+    ///
+    /// # Errors
+    /// If the unit refuses, with its reason.
+    pub fn perform(&mut self, now: Instant, verb: &Verb) -> Result<Option<String>, String> {
+        self.handle_timeout(now);
+        self.act(now, verb)
+    }
+
+    fn act(&mut self, now: Instant, verb: &Verb) -> Result<Option<String>, String> {
+        match verb {
+            Verb::Turn(knob) => self.unit.turn(now, *knob).map_err(|error| error.to_string())?,
+            Verb::Power(true) => self.power_on(now),
+            Verb::Power(false) => self.power_off(now),
+            Verb::PowerCycle(off) => {
+                self.unit.power_off(now);
+                self.power_at = Some(now + *off);
+            }
+            Verb::Nmt(order) => self.unit.nmt(now, *order),
+            Verb::Write(at, value) => {
+                let refused = |refusal| format!("{at} <- {value}: {refusal}");
+                self.unit.write_object(now, *at, &value.encode()).map_err(refused)?;
+            }
+            Verb::Read(at) => {
+                let value = self.unit.read_object(*at).map_err(|refusal| format!("{at}: {refusal}"))?;
+                let entry = self.unit.product().dictionary.entry(*at);
+                let meaning = entry.and_then(|entry| entry.meaning(value)).map(|text| format!(" ({text})"));
+                let unit = entry.and_then(|entry| entry.unit.as_deref()).map(|unit| format!(" {unit}"));
+                return Ok(Some(format!("{at} = {value}{}{}", unit.unwrap_or_default(), meaning.unwrap_or_default())));
+            }
+            Verb::Status => return Ok(Some(self.status())),
+        }
+        Ok(None)
+    }
+
+    fn status(&self) -> String {
+        let product = &self.unit.product().name;
+        let state = match self.unit.running() {
+            Running::Off => "has no power",
+            Running::Starting => "starts",
+            Running::Loader => "waits in its loader",
+            Running::Application => match self.unit.network_state() {
+                Some(NetworkState::Operational) => "runs, operational",
+                Some(NetworkState::Stopped) => "runs, stopped",
+                Some(NetworkState::PreOperational) | None => "runs, pre-operational",
+            },
+        };
+        format!("{product} {state}")
+    }
+
+    /// When the scenario has something to do.
+    fn due(&self) -> Option<Instant> {
+        let deed = self.scenario.deeds.get(self.next).map(|(at, _)| *at);
+        deed.or(self.scenario.repeat).map(|at| self.began + at)
+    }
+
+    /// Does what the scenario says for this moment.
+    fn play(&mut self, now: Instant) {
+        while self.due().is_some_and(|due| due <= now) {
+            let Some((_, verb)) = self.scenario.deeds.get(self.next) else {
+                self.began += self.scenario.repeat.unwrap_or_default();
+                self.next = 0;
+                continue;
+            };
+            let verb = verb.clone();
+            self.next += 1;
+            // A unit that refuses (no such input, an entry that is read-only) is what a scenario may want to see.
+            let _ = self.act(now, &verb);
+        }
+    }
+
+    /// The next moment of the stage's own.
+    fn own_deadline(&self) -> Option<Instant> {
+        [self.due(), self.power_at].into_iter().flatten().min()
+    }
+}
+
+impl Endpoint for Stage {
+    fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
+        self.handle_timeout(now);
+        self.unit.handle_bytes(now, bytes);
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        while let Some(due) = self.own_deadline().filter(|&due| due <= now) {
+            self.unit.handle_timeout(due);
+            if self.power_at.is_some_and(|at| at <= due) {
+                self.power_on(due);
+            }
+            if self.due().is_some_and(|at| at <= due) {
+                self.play(due);
+            }
+        }
+        self.unit.handle_timeout(now);
+    }
+
+    fn poll_transmit(&mut self) -> Option<Transmit> {
+        self.unit.poll_transmit()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        [self.own_deadline(), self.unit.poll_timeout()].into_iter().flatten().min()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::canopen::ObjectAddress;
+    use crate::image::make;
+    use crate::version::Version;
+
+    fn product() -> &'static Product {
+        Product::named("AXTC4CO").expect("built in")
+    }
+
+    fn stage(text: &str) -> Stage {
+        let scenario = Scenario::read("test.toml", text, product()).expect("a scenario").expect("for this product");
+        let mut flash = vec![0xFF; product().flash.program_words as usize * 2];
+        let recipe =
+            make::Recipe { target: &product().target(), version: Version::new(1, 1, 0), words: 1024, flaw: None };
+        let program = make::program(&recipe);
+        flash[..program.len()].copy_from_slice(&program);
+        let setup = crate::emulator::Setup {
+            product: product(),
+            loader: product().loader.kind,
+            seed: 1,
+            dialect: 0,
+            flash,
+            parameters: Vec::new(),
+        };
+        let mut stage = Stage::new(Unit::new(setup), scenario);
+        stage.power_on(Instant::ZERO);
+        stage
+    }
+
+    fn celsius(stage: &Stage, channel: u8) -> f64 {
+        stage.unit.read_object(ObjectAddress::new(0x6100, channel)).expect("it runs").as_f64()
+    }
+
+    fn at(millis: u64) -> Instant {
+        Instant::from_millis(millis)
+    }
+
+    #[test]
+    fn deeds_happen_at_their_moments_and_ramps_in_between() {
+        let mut stage = stage(
+            r#"
+            product = "axtc4co"
+            [[at]]
+            seconds = 10
+            do = ["set 1 temperature 250.0", "open 3"]
+            [[ramp]]
+            from = 20.0
+            to = 80.0
+            what = "2 temperature"
+            start = 25.0
+            end = 145.0
+            "#,
+        );
+        stage.handle_timeout(at(9_900));
+        assert!(celsius(&stage, 1) < 120.0 && celsius(&stage, 3) > 70.0);
+        stage.handle_timeout(at(12_500));
+        assert!((celsius(&stage, 1) - 250.0).abs() < 0.01);
+        assert!(celsius(&stage, 3).is_nan());
+        for (seconds, expected) in [(20u64, 25.0), (50, 85.0), (80, 145.0), (90, 145.0)] {
+            stage.handle_timeout(at(seconds * 1_000 + 300));
+            let found = celsius(&stage, 2);
+            assert!((found - expected).abs() < 1.0, "at {seconds} s: {found}");
+        }
+    }
+
+    #[test]
+    fn a_scenario_begins_anew_and_asking_often_changes_nothing() {
+        let text = "repeat = 20\n[[at]]\nseconds = 5\ndo = ['set 1 temperature 50']\n[[at]]\nseconds = 15\n\
+                    do = ['set 1 temperature 90', 'power cycle 0.5']\n";
+        let (mut once, mut often) = (stage(text), stage(text));
+        for second in 1..=70u64 {
+            for step in 0..10 {
+                often.handle_timeout(at(second * 1_000 + step * 100));
+            }
+            once.handle_timeout(at(second * 1_000 + 900));
+            assert_eq!(once.unit.running(), often.unit.running(), "{second} s");
+        }
+        assert!((celsius(&once, 1) - 50.0).abs() < 0.1, "in the fourth round, 5 s after its begin");
+        assert_eq!(celsius(&once, 1), celsius(&often, 1));
+    }
+
+    #[test]
+    fn a_power_cycle_loses_what_was_not_saved() {
+        let mut stage = stage("");
+        stage.handle_timeout(at(1_000));
+        let verb = |line: &str| Verb::read(line, product()).expect(line);
+        assert_eq!(stage.perform(at(1_000), &verb("write 6126:1 18")), Ok(None));
+        assert_eq!(stage.perform(at(1_000), &verb("read 6110:1")), Ok(Some("6110:01 = 1 (type J)".into())));
+        assert_eq!(stage.perform(at(1_000), &verb("read 6127:1")), Ok(Some("6127:01 = 4368.0".into())));
+        let refused = stage.perform(at(1_000), &verb("write 4020:1 100")).expect_err("too low");
+        assert_eq!(refused, "4020:01 <- 100: the value is below the low limit (abort 06090032h)");
+        assert_eq!(stage.perform(at(1_000), &verb("status")), Ok(Some("AXTC4CO runs, pre-operational".into())));
+        assert_eq!(stage.perform(at(2_000), &verb("power cycle 0.5")), Ok(None));
+        assert_eq!(stage.perform(at(2_100), &verb("status")), Ok(Some("AXTC4CO has no power".into())));
+        assert_eq!(stage.perform(at(2_200), &verb("read 6126:1")), Err("6126:01: the unit does not answer".into()));
+        stage.handle_timeout(at(3_000));
+        assert_eq!(stage.perform(at(3_000), &verb("read 6126:1")), Ok(Some("6126:01 = 16.0".into())));
+        let refused = stage.perform(at(3_000), &verb("set 9 temperature 20")).expect_err("no such input");
+        assert_eq!(refused, "there is no input 9: this unit has inputs 1 to 4");
+    }
+
+    #[test]
+    fn each_fault_of_a_file_is_named_with_line_column_and_what_is_allowed() {
+        let table = [
+            ("[[at]]\nseconds = -1\ndo = []", "test.toml:2:11: at.seconds: -1 is not 0 to 604800 seconds"),
+            ("[[at]]\nseconds = 1\ndo = [\"opne 3\"]", "test.toml:3:8: at.do: 'opne' is not known; there is: set"),
+            (
+                "[[at]]\nseconds = 1\ndo = ['open 3', 'open 3 X']",
+                "test.toml:3:25: at.do: 'X' is not known; there is: A",
+            ),
+            ("[[at]]\nseconds = 1\ndo = ['status']", "test.toml:3:8: at.do: a scenario does things"),
+            ("[[at]]\nsecond = 1\ndo = []", "test.toml:2:1: unknown field `second`, expected `seconds` or `do`"),
+            ("[[ramp]]\nfrom = 5\nto = 2\nwhat = 'supply'\nstart = 1\nend = 2", "test.toml:3:6: ramp.to: a ramp ends"),
+            (
+                "[[ramp]]\nfrom = 1\nto = 2\nwhat = '1 pressure'\nstart = 1\nend = 2",
+                "test.toml:4:8: ramp.what: 'pressure' is not known",
+            ),
+            ("product = 'axtc5'", "test.toml:1:11: product: 'axtc5' is no product; there is axtc4co, axrtd8co"),
+            (
+                "repeat = 1\n[[at]]\nseconds = 2\ndo = []\n[[at]]\nseconds = 3\ndo = ['freeze']",
+                "test.toml:1:10: repeat: 1 s is",
+            ),
+            ("[[at", "test.toml:1:5: "),
+        ];
+        for (text, expected) in table {
+            let complaints = Scenario::read("test.toml", text, product()).expect_err(text);
+            let found: Vec<String> = complaints.iter().map(Complaint::to_string).collect();
+            assert!(found.iter().any(|complaint| complaint.starts_with(expected)), "{text}:\n{}", found.join("\n"));
+        }
+        let two = Scenario::read("test.toml", "[[at]]\nseconds = -1\ndo = ['x', 'y']", product()).expect_err("three");
+        assert_eq!(two.len(), 3, "none hides another");
+        assert_eq!(Scenario::read("test.toml", "product = 'axrtd8co'", product()), Ok(None), "for another product");
+    }
+}

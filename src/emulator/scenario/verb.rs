@@ -1,0 +1,353 @@
+//! What can be done to an emulated unit from outside its serial port, one line each: on standard input, and in scenario
+//! files.
+
+use std::fmt;
+
+use crate::canopen::{ObjectAddress, Value};
+use crate::device::Product;
+use crate::emulator::NmtCommand;
+use crate::emulator::knob::{Knob, Lead};
+use crate::time::Duration;
+
+/// One deed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verb {
+    /// Turn a knob at the terminals.
+    Turn(Knob),
+    /// Switch the supply on or off.
+    Power(bool),
+    /// Switch the supply off and on again after this time.
+    PowerCycle(Duration),
+    /// Order something as the network's master.
+    Nmt(NmtCommand),
+    /// Write an entry of the object dictionary as the network does.
+    Write(ObjectAddress, Value),
+    /// Read an entry of the object dictionary as the network does.
+    Read(ObjectAddress),
+    /// Say what the unit does.
+    Status,
+}
+
+/// What is wrong with a line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct VerbError {
+    /// Column of the word it is about, from 1.
+    pub column: usize,
+    /// What was found, and what is allowed.
+    pub message: String,
+}
+
+impl fmt::Display for VerbError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "column {}: {}", self.column, self.message)
+    }
+}
+
+impl std::error::Error for VerbError {}
+
+/// All verbs with what they do, for help texts.
+pub const HELP: &str = "set N temperature C        the sensor of input N has this temperature in °C, exactly
+set N resistance OHM       it has this resistance (RTD)
+set N microvolts UV        the input gets this voltage (thermocouple)
+set N lead OHM             each of its wires has this resistance (RTD)
+set cold-junction C        also: set supply V, set current MA
+process N                  back to the default process; also: process cold-junction, supply, current
+open N [A|B|C|GND]         break the sensor's circuit, or one lead (RTD)
+short N                    short the sensor
+repair N                   make the wires whole again
+freeze, thaw               the converter delivers no new data, or does again
+power on, power off        switch the supply; off loses all but flash and parameters
+power cycle [SECONDS]      off and on again, after 1 second if not said
+nmt start|stop|pre-operational|reset|reset-communication
+write INDEX:SUB VALUE      write an entry as the network does, e.g. write 6112:1 0
+read INDEX:SUB             read one
+status                     what the unit does";
+
+/// Longest time a power cycle takes.
+const LONGEST_CYCLE_S: f64 = 86_400.0;
+/// How long the supply is off if nothing is said.
+const USUAL_CYCLE: Duration = Duration::from_secs(1);
+
+/// Words with their columns.
+struct Words<'a> {
+    words: Vec<(usize, &'a str)>,
+    next: usize,
+    /// Column behind the last word.
+    end: usize,
+}
+
+impl Verb {
+    /// Reads a line for a unit of a product, in any case of its letters.
+    ///
+    /// # Errors
+    /// If it is none, with the column.
+    pub fn read(line: &str, product: &Product) -> Result<Verb, VerbError> {
+        let mut words = Words::of(line);
+        let verb = Verb::parse(&mut words, product)?;
+        match words.take() {
+            None => Ok(verb),
+            Some((column, word)) => Err(VerbError {
+                column,
+                message: format!("'{}' is too much: the line is complete before it", shown(word)),
+            }),
+        }
+    }
+
+    fn parse(words: &mut Words<'_>, product: &Product) -> Result<Verb, VerbError> {
+        let verbs = "set, process, open, short, repair, freeze, thaw, power, nmt, write, read, status";
+        let (column, word) = words.expect("a verb", verbs)?;
+        match word.to_ascii_lowercase().as_str() {
+            "set" => Verb::set(words),
+            "process" => match words.expect("an input or a quantity", "1, cold-junction, supply, current")? {
+                (_, word) if word.eq_ignore_ascii_case("cold-junction") => Ok(Verb::Turn(Knob::ColdJunction(None))),
+                (_, word) if word.eq_ignore_ascii_case("supply") => Ok(Verb::Turn(Knob::Supply(None))),
+                (_, word) if word.eq_ignore_ascii_case("current") => Ok(Verb::Turn(Knob::SourceCurrent(None))),
+                (column, word) => input(column, word).map(Knob::Process).map(Verb::Turn),
+            },
+            "open" => {
+                let number = words.input()?;
+                let lead = words.take().map(|(column, word)| lead(column, word)).transpose()?;
+                Ok(Verb::Turn(Knob::Open(number, lead)))
+            }
+            "short" => words.input().map(Knob::Short).map(Verb::Turn),
+            "repair" => words.input().map(Knob::Repair).map(Verb::Turn),
+            "freeze" => Ok(Verb::Turn(Knob::Freeze(true))),
+            "thaw" => Ok(Verb::Turn(Knob::Freeze(false))),
+            "power" => {
+                let (column, word) = words.expect("what to do with the supply", "on, off, cycle")?;
+                match word.to_ascii_lowercase().as_str() {
+                    "on" => Ok(Verb::Power(true)),
+                    "off" => Ok(Verb::Power(false)),
+                    "cycle" => words.cycle().map(Verb::PowerCycle),
+                    _ => Err(unknown(column, word, "on, off, cycle")),
+                }
+            }
+            "nmt" => {
+                let orders = "start, stop, pre-operational, reset, reset-communication";
+                let (column, word) = words.expect("an order", orders)?;
+                match word.to_ascii_lowercase().as_str() {
+                    "start" => Ok(Verb::Nmt(NmtCommand::Start)),
+                    "stop" => Ok(Verb::Nmt(NmtCommand::Stop)),
+                    "pre-operational" => Ok(Verb::Nmt(NmtCommand::PreOperational)),
+                    "reset" => Ok(Verb::Nmt(NmtCommand::ResetNode)),
+                    "reset-communication" => Ok(Verb::Nmt(NmtCommand::ResetCommunication)),
+                    _ => Err(unknown(column, word, orders)),
+                }
+            }
+            "write" => {
+                let at = words.entry(product)?;
+                let data_type = product.dictionary.entry(at).map(|entry| entry.data_type);
+                let (column, word) = words.expect("a value", "a number, true, false")?;
+                let value = data_type
+                    .and_then(|data_type| data_type.parse(word))
+                    .ok_or_else(|| VerbError { column, message: format!("'{}' is no value of {at}", shown(word)) })?;
+                Ok(Verb::Write(at, value))
+            }
+            "read" => words.entry(product).map(Verb::Read),
+            "status" => Ok(Verb::Status),
+            _ => Err(unknown(column, word, verbs)),
+        }
+    }
+
+    fn set(words: &mut Words<'_>) -> Result<Verb, VerbError> {
+        let what = "1, cold-junction, supply, current";
+        let (column, word) = words.expect("an input or a quantity", what)?;
+        let knob = match word.to_ascii_lowercase().as_str() {
+            "cold-junction" => Knob::ColdJunction(Some(words.number("a temperature in °C")?)),
+            "supply" => Knob::Supply(Some(words.number("a voltage in V")?)),
+            "current" => Knob::SourceCurrent(Some(words.number("a current in mA")?)),
+            _ => {
+                let number = input(column, word)?;
+                let quantities = "temperature, resistance, microvolts, lead";
+                let (column, word) = words.expect("a quantity", quantities)?;
+                match word.to_ascii_lowercase().as_str() {
+                    "temperature" => Knob::Temperature(number, words.number("a temperature in °C")?),
+                    "resistance" => Knob::Resistance(number, words.number("a resistance in ohm")?),
+                    "microvolts" => Knob::Microvolts(number, words.number("a voltage in µV")?),
+                    "lead" => Knob::LeadResistance(number, words.number("a resistance in ohm")?),
+                    _ => return Err(unknown(column, word, quantities)),
+                }
+            }
+        };
+        Ok(Verb::Turn(knob))
+    }
+}
+
+impl<'a> Words<'a> {
+    fn of(line: &'a str) -> Self {
+        let mut words = Vec::new();
+        let mut rest = line;
+        let mut column = 1;
+        while let Some(begin) = rest.find(|c: char| !c.is_whitespace()) {
+            column += rest[..begin].chars().count();
+            rest = &rest[begin..];
+            let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
+            words.push((column, &rest[..end]));
+            column += rest[..end].chars().count();
+            rest = &rest[end..];
+        }
+        Words { words, next: 0, end: column }
+    }
+
+    fn take(&mut self) -> Option<(usize, &'a str)> {
+        let word = self.words.get(self.next).copied();
+        self.next += 1;
+        word
+    }
+
+    fn expect(&mut self, what: &str, allowed: &str) -> Result<(usize, &'a str), VerbError> {
+        self.take().ok_or_else(|| VerbError { column: self.end, message: format!("{what} is missing: {allowed}") })
+    }
+
+    fn input(&mut self) -> Result<u8, VerbError> {
+        let (column, word) = self.expect("an input", "its number, from 1")?;
+        input(column, word)
+    }
+
+    fn number(&mut self, what: &str) -> Result<f64, VerbError> {
+        let (column, word) = self.expect(what, "a number")?;
+        word.parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(|| VerbError {
+            column,
+            message: format!("'{}' is not {what}: write a number like 23.5", shown(word)),
+        })
+    }
+
+    fn cycle(&mut self) -> Result<Duration, VerbError> {
+        let Some(&(column, word)) = self.words.get(self.next) else { return Ok(USUAL_CYCLE) };
+        let seconds = self.number("a time in seconds")?;
+        if !(0.0..=LONGEST_CYCLE_S).contains(&seconds) {
+            let message = format!("'{}' is not 0 to {LONGEST_CYCLE_S} seconds", shown(word));
+            return Err(VerbError { column, message });
+        }
+        Ok(Duration::from_secs_f64(seconds))
+    }
+
+    fn entry(&mut self, product: &Product) -> Result<ObjectAddress, VerbError> {
+        let (column, word) = self.expect("an entry", "index and sub-index, e.g. 6112:1")?;
+        let at: ObjectAddress = word
+            .parse()
+            .map_err(|error| VerbError { column, message: format!("{error}").replace(word, &shown(word)) })?;
+        if product.dictionary.entry(at).is_none() {
+            return Err(VerbError { column, message: format!("an {} has no entry {at}", product.name) });
+        }
+        Ok(at)
+    }
+}
+
+fn input(column: usize, word: &str) -> Result<u8, VerbError> {
+    word.parse().ok().filter(|&number| number > 0).ok_or_else(|| VerbError {
+        column,
+        message: format!("'{}' is no input: write its number, from 1", shown(word)),
+    })
+}
+
+fn lead(column: usize, word: &str) -> Result<Lead, VerbError> {
+    match word.to_ascii_lowercase().as_str() {
+        "a" => Ok(Lead::A),
+        "b" => Ok(Lead::B),
+        "c" => Ok(Lead::C),
+        "gnd" => Ok(Lead::Ground),
+        _ => Err(unknown(column, word, "A, B, C, GND")),
+    }
+}
+
+fn unknown(column: usize, word: &str, allowed: &str) -> VerbError {
+    VerbError { column, message: format!("'{}' is not known; there is: {allowed}", shown(word)) }
+}
+
+/// A word of the user's as an error quotes it.
+fn shown(word: &str) -> String {
+    crate::wire::visible::line(word.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn read(line: &str) -> Result<Verb, String> {
+        let product = Product::named("AXRTD8CO").expect("built in");
+        Verb::read(line, product).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn every_verb_is_read_in_any_case() {
+        let at = |index, sub| ObjectAddress::new(index, sub);
+        let table = [
+            ("set 1 temperature 250.0", Verb::Turn(Knob::Temperature(1, 250.0))),
+            ("SET 8 Resistance 1e2", Verb::Turn(Knob::Resistance(8, 100.0))),
+            ("set 2 microvolts -500", Verb::Turn(Knob::Microvolts(2, -500.0))),
+            ("set 2 lead 2", Verb::Turn(Knob::LeadResistance(2, 2.0))),
+            ("set cold-junction 25", Verb::Turn(Knob::ColdJunction(Some(25.0)))),
+            ("set supply 24", Verb::Turn(Knob::Supply(Some(24.0)))),
+            ("set current 4", Verb::Turn(Knob::SourceCurrent(Some(4.0)))),
+            ("process 3", Verb::Turn(Knob::Process(3))),
+            ("process supply", Verb::Turn(Knob::Supply(None))),
+            ("  open   3 ", Verb::Turn(Knob::Open(3, None))),
+            ("open 3 gnd", Verb::Turn(Knob::Open(3, Some(Lead::Ground)))),
+            ("short 1", Verb::Turn(Knob::Short(1))),
+            ("repair 1", Verb::Turn(Knob::Repair(1))),
+            ("freeze", Verb::Turn(Knob::Freeze(true))),
+            ("thaw", Verb::Turn(Knob::Freeze(false))),
+            ("power OFF", Verb::Power(false)),
+            ("power cycle", Verb::PowerCycle(Duration::from_secs(1))),
+            ("power cycle 0.5", Verb::PowerCycle(Duration::from_millis(500))),
+            ("nmt start", Verb::Nmt(NmtCommand::Start)),
+            ("nmt pre-operational", Verb::Nmt(NmtCommand::PreOperational)),
+            ("write 6112:1 0", Verb::Write(at(0x6112, 1), Value::Unsigned8(0))),
+            ("write 5555 true", Verb::Write(at(0x5555, 0), Value::Boolean(true))),
+            ("write 6126h:2 18.5", Verb::Write(at(0x6126, 2), Value::Real32(18.5))),
+            ("write 4000:1 -300", Verb::Write(at(0x4000, 1), Value::Integer16(-300))),
+            ("write 1010:1 0x65766173", Verb::Write(at(0x1010, 1), Value::Unsigned32(0x6576_6173))),
+            ("read 6100:1", Verb::Read(at(0x6100, 1))),
+            ("status", Verb::Status),
+        ];
+        for (line, verb) in table {
+            assert_eq!(read(line), Ok(verb), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_bad_line_is_answered_with_the_column_and_what_there_is() {
+        let table = [
+            ("", "column 1: a verb is missing: set, process, open"),
+            ("explode", "column 1: 'explode' is not known; there is: set, process, open"),
+            ("open\x1b[2J", "column 1: 'open^[[2J' is not known"),
+            ("open", "column 5: an input is missing"),
+            ("open 0", "column 6: '0' is no input: write its number, from 1"),
+            ("open 3 D", "column 8: 'D' is not known; there is: A, B, C, GND"),
+            ("set 1", "column 6: a quantity is missing: temperature, resistance, microvolts, lead"),
+            ("set 1 pressure 3", "column 7: 'pressure' is not known; there is: temperature"),
+            ("set 1 temperature", "column 18: a temperature in °C is missing: a number"),
+            ("set 1 temperature hot", "column 19: 'hot' is not a temperature in °C: write a number like 23.5"),
+            ("set 1 temperature inf", "column 19: 'inf' is not a temperature in °C"),
+            ("set 1 temperature 20 C", "column 22: 'C' is too much: the line is complete before it"),
+            ("power", "column 6: what to do with the supply is missing: on, off, cycle"),
+            ("power cycle -1", "column 13: '-1' is not 0 to 86400 seconds"),
+            ("nmt go", "column 5: 'go' is not known; there is: start, stop, pre-operational, reset"),
+            ("write 6112", "column 11: a value is missing"),
+            ("write 6112:1 x", "column 14: 'x' is no value of 6112:01"),
+            ("write 6112:1 300", "column 14: '300' is no value of 6112:01"),
+            ("write 6112:9 1", "column 7: an AXRTD8CO has no entry 6112:09"),
+            ("read zzz", "column 6: 'zzz' is no entry of an object dictionary"),
+        ];
+        for (line, complaint) in table {
+            let found = read(line).expect_err(line);
+            assert!(found.starts_with(complaint), "{line:?}: {found}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_line_is_read_or_refused(line in "\\PC{0,80}") {
+            let _ = read(&line);
+        }
+
+        #[test]
+        fn any_words_behind_a_verb_are_read_or_refused(
+            verb in "set|open|power cycle|nmt|write|read|process", rest in "[ 0-9a-z:.x-]{0,30}"
+        ) {
+            let _ = read(&format!("{verb} {rest}"));
+        }
+    }
+}

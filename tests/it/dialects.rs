@@ -1,0 +1,115 @@
+//! The console against units that word and lay out everything in their own way, within what the manuals fix: the same
+//! facts and the same deeds for every dialect.
+
+use axcon::device::Product;
+use axcon::session::{Command, Event, Job, Outcome, UnitState};
+use axcon::time::Duration;
+use axcon::version::Version;
+use axcon::wire::stream::Source;
+
+use crate::support::bench::Bench;
+
+/// Dialects that are tried; the environment may ask for more, or for a single one.
+fn seeds() -> Vec<u64> {
+    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    match number("AXCON_SEED") {
+        Some(seed) => vec![seed],
+        None => (0..number("AXCON_SEEDS").unwrap_or(150)).collect(),
+    }
+}
+
+/// Runs a story with both products in every dialect and says in which ones it failed.
+fn in_every_dialect(story: impl Fn(&mut Bench, &'static Product) -> Result<(), String>) {
+    let mut failed = Vec::new();
+    let seeds = seeds();
+    for &seed in &seeds {
+        for product in Product::all() {
+            let mut bench = Bench::in_dialect(product, seed);
+            bench.run_for(Duration::from_secs(6));
+            if let Err(what) = story(&mut bench, product) {
+                let heard = bench.transcript();
+                let end = heard.char_indices().rev().nth(700).map_or(0, |(at, _)| at);
+                failed.push(format!("AXCON_SEED={seed}, {}: {what}\n{}", product.name, &heard[end..]));
+            }
+        }
+    }
+    assert!(
+        failed.is_empty(),
+        "{} of {} failed:\n{}",
+        failed.len(),
+        2 * seeds.len(),
+        failed[..failed.len().min(3)].join("\n\n")
+    );
+}
+
+#[test]
+fn every_dialect_is_identified() {
+    in_every_dialect(|bench, product| {
+        bench.reconnect();
+        bench.ask(Command::Identify);
+        let facts = bench.session.facts();
+        let said = (
+            facts.state,
+            facts.product.as_ref().map(|known| known.value.clone()),
+            facts.node_id.as_ref().map(|known| known.value),
+            facts.can_kbps.as_ref().map(|known| known.value),
+            facts.nmt_state.as_ref().map(|known| known.value.clone()),
+        );
+        // A menu that does not name the product leaves it to the banner.
+        let named = said.1.is_none() || said.1.as_deref() == Some(product.name.as_str());
+        let right = said.0 == UnitState::Application
+            && named
+            && (said.2, said.3, said.4.as_deref()) == (Some(127), Some(125), Some("pre-operational"));
+        if right { Ok(()) } else { Err(format!("{said:?}")) }
+    });
+}
+
+#[test]
+fn every_dialects_banner_says_product_and_version() {
+    in_every_dialect(|bench, product| {
+        bench.power_cycle(Duration::from_secs(1));
+        bench.run_for(Duration::from_secs(2));
+        let facts = bench.session.facts();
+        let said =
+            (facts.product.as_ref().map(|known| known.value.as_str()), facts.version.as_ref().map(|known| known.value));
+        let expected = (Some(product.name.as_str()), Some(Version::new(1, 1, 0)));
+        if said == expected { Ok(()) } else { Err(format!("{said:?}")) }
+    });
+}
+
+#[test]
+fn every_dialects_stream_is_switched_on_and_off() {
+    in_every_dialect(|bench, _| {
+        for source in [Source::FieldValue, Source::ProcessValue] {
+            let outcome = bench.ask(Command::StreamOn { source, period: Duration::from_millis(200) });
+            if !matches!(outcome, Outcome::StreamRuns { was_on: false }) {
+                return Err(format!("{source:?}: {outcome:?}"));
+            }
+            let off = bench.ask(Command::StreamOff);
+            if off != Outcome::Done(Job::StreamOff) {
+                return Err(format!("{source:?} off: {off:?}"));
+            }
+            let end = bench.now + Duration::from_secs(1);
+            if bench.run_until(end, |event| matches!(event, Event::Row { .. })).is_some() {
+                return Err(format!("{source:?}: a row behind the end"));
+            }
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn every_dialects_diagnostics_are_read_and_stopped() {
+    in_every_dialect(|bench, _| {
+        let outcome = bench.ask(Command::Diagnostics { pages: Some(2) });
+        if outcome == Outcome::Done(Job::Diagnostics) { Ok(()) } else { Err(format!("{outcome:?}")) }
+    });
+}
+
+#[test]
+fn every_dialects_defaults_are_restored() {
+    in_every_dialect(|bench, _| {
+        let outcome = bench.ask(Command::RestoreDefaults);
+        if outcome == Outcome::Done(Job::RestoreDefaults) { Ok(()) } else { Err(format!("{outcome:?}")) }
+    });
+}
