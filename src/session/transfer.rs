@@ -76,8 +76,9 @@ pub(super) struct Transfer {
     /// When the last character has left of each record let go and not taken.
     left_at: VecDeque<Instant>,
     pacing: Pacing,
-    /// The loader has stopped us since the record taken last.
-    stopped: bool,
+    /// Since when a loader that stops us behind every record does so. The transmitter's own knowledge will not do: it
+    /// takes a header that names a unit, and is echoed, for a unit that starts and has forgotten that it stopped us.
+    stopped_since: Option<Instant>,
     /// How long it may erase behind the header.
     longest_erase: Duration,
     /// Behind a record that crosses: when its last character has left.
@@ -121,7 +122,7 @@ impl Transfer {
             bytes_taken: 0,
             left_at: VecDeque::new(),
             pacing,
-            stopped: false,
+            stopped_since: None,
             longest_erase: longest_erase(flash),
             crossing: None,
             alive: false,
@@ -137,7 +138,7 @@ impl Transfer {
     pub(super) fn advance(&mut self, now: Instant, transmitter: &mut Transmitter) -> Result<bool, Stall> {
         self.begun.get_or_insert(now);
         self.deadline = None;
-        if let Some(since) = transmitter.held_since() {
+        if let Some(since) = transmitter.held_since().or(self.stopped_since) {
             let limit = since + self.longest_hold();
             self.deadline = Some(limit);
             return if limit <= now { Err(Stall::Held) } else { Ok(false) };
@@ -168,7 +169,7 @@ impl Transfer {
     }
 
     /// The loader has sent XOFF (`true`) or XON.
-    pub(super) fn hold(&mut self, held: bool) {
+    pub(super) fn hold(&mut self, now: Instant, held: bool) {
         if self.pacing == Pacing::Pages && held && self.crossing.is_none() && self.taken == 0 && self.sent > 0 {
             // Nothing was to be written yet: this is the hold behind the header.
             self.pacing = Pacing::Records;
@@ -184,12 +185,16 @@ impl Transfer {
             }
             Pacing::Records => {
                 self.alive = true;
+                let was_stopped = self.stopped_since.is_some();
+                self.stopped_since = held.then(|| self.stopped_since.unwrap_or(now));
                 // Only both together count: what is damaged on the line must not count twice.
-                if std::mem::replace(&mut self.stopped, held) && !held && self.taken < self.sent {
+                if was_stopped && !held {
                     self.alive = false;
-                    self.bytes_taken += self.records[self.taken].text.len();
-                    self.taken += 1;
-                    self.left_at.pop_front();
+                    self.take_one();
+                    // Behind a long hold the ring may have had more in it. It is empty now.
+                    while self.left_at.front().is_some_and(|&left_at| left_at + HOLD_EXPECTED <= now) {
+                        self.take_one();
+                    }
                 }
             }
         }
@@ -202,12 +207,12 @@ impl Transfer {
 
     /// Whether the loader has shown by its flow control that it takes the records.
     pub(super) fn is_taken(&self) -> bool {
-        self.taken > 0 || (self.pacing == Pacing::Records && self.stopped)
+        self.taken > 0 || self.stopped_since.is_some()
     }
 
     /// Whether the loader must be erasing all of its flash.
     pub(super) fn is_erasing(&self) -> bool {
-        self.pacing == Pacing::Records && self.taken == 0 && self.stopped
+        self.taken == 0 && self.stopped_since.is_some()
     }
 
     /// Whether a loader that has lost its place in a record waits in silence for the rest of it.
@@ -278,6 +283,13 @@ impl Transfer {
             self.crossing = Some(left_at);
         }
         self.sent += 1;
+    }
+
+    fn take_one(&mut self) {
+        if self.left_at.pop_front().is_some() {
+            self.bytes_taken += self.records[self.taken].text.len();
+            self.taken += 1;
+        }
     }
 
     /// No XOFF came where one should have. A loader of another kind may do without, if it shows in another way that it

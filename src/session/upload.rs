@@ -596,9 +596,11 @@ impl Upload {
         })))
     }
 
-    /// Something is heard: what was to be sent to a loader that is not heard need not be, or not to its end.
-    fn listen(&mut self, desk: &mut Desk<'_>) {
+    /// Something is heard: what was to be sent to a loader that is not heard need not be, or not to its end. The marks
+    /// of records before are not it: without a line end they are heard late.
+    fn listen(&mut self, message: &Message, desk: &mut Desk<'_>) {
         match self.stage {
+            _ if matches!(message, Message::Loader(LoaderText::Progress)) => {}
             Stage::Finish | Stage::Failing { .. } => {
                 self.unheard = None;
                 if std::mem::take(&mut self.filled) {
@@ -635,7 +637,7 @@ impl Work for Upload {
             Signal::LinkLost => self.link_lost(desk),
             Signal::Hold(held) => {
                 if let (Stage::Transfer, Some(transfer)) = (&self.stage, &mut self.transfer) {
-                    transfer.hold(held);
+                    transfer.hold(desk.now, held);
                 }
                 self.report_progress(desk);
                 None
@@ -643,7 +645,7 @@ impl Work for Upload {
             Signal::Tick => self.tick(desk),
             Signal::Heard(text, message) => {
                 self.quote(text, message);
-                self.listen(desk);
+                self.listen(message, desk);
                 let is_news = text.span.start >= self.mark;
                 match &mut self.stage {
                     Stage::Check(identify) | Stage::AskVersion(identify) => {

@@ -2,12 +2,13 @@
 
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::Running;
-use axcon::image::Identity;
+use axcon::image::{Identity, make, srecord};
 use axcon::rng::Rng;
 use axcon::secret::Secret;
-use axcon::session::{Command, Event, Outcome, Phase, UnitNow, Verdict};
+use axcon::session::{Command, Event, Outcome, Phase, UnitNow, UnitState, Verdict};
 use axcon::time::Duration;
 use axcon::version::Version;
+use axcon::wire::{LoaderText, Message};
 
 use crate::support::bench::{
     Bench, axrtd8co, axtc4co, factory_flash, flash_with, full_image, image_of, order, small_image,
@@ -202,6 +203,146 @@ fn a_loader_that_wants_a_key_and_erases_everything_gets_its_key_and_its_time() {
     let steps = [Phase::EnterLoader, Phase::Transfer, Phase::Erase, Phase::Transfer, Phase::Finish, Phase::Verify];
     assert_eq!(phases, steps, "{}", bench.transcript());
     assert!(bench.unit.unit().flash() == flash_with(&image), "and nothing else is left in the flash");
+}
+
+#[test]
+fn a_unit_with_another_loader_than_its_product_file_says_is_uploaded_to_all_the_same() {
+    let units = [(axrtd8co(), LoaderKind::G1, "2.1.1", "2.2.0"), (axtc4co(), LoaderKind::G3, "1.1.0", "1.2.0")];
+    for (product, loader, before, after) in units {
+        for latency in [0, 16] {
+            let flash = flash_with(&small_image(&product.name, before));
+            let mut bench = Bench::of(product, loader, flash, Duration::from_millis(latency));
+            bench.run_for(Duration::from_secs(6));
+            let report = bench.load(order(small_image(&product.name, after)));
+            assert_eq!(report.verdict, Verdict::Done, "{} {loader:?} {latency} ms: {report:?}", product.name);
+        }
+    }
+}
+
+#[test]
+fn a_key_prompt_in_words_nobody_knows_gets_its_key_as_well() {
+    let mut bench = rtd8(Duration::ZERO);
+    // Of "Hit any key to continue" nothing is left but the number of its letters.
+    let mut said = Vec::new();
+    bench.disturb_answers(move |_, byte| {
+        said.push(byte);
+        let garbled = said.windows(20).rev().take(24).any(|window| window.ends_with(b"v2.0\r\n"));
+        vec![if garbled && byte.is_ascii_alphabetic() { b'x' } else { byte }]
+    });
+    let report = bench.load(order(small_image("AXRTD8CO", "2.2.0")));
+    assert_eq!(report.verdict, Verdict::Done, "{report:?}\n{}", bench.transcript());
+    assert!(bench.transcript().contains("xxx xxx xxx"), "{}", bench.transcript());
+}
+
+#[test]
+fn a_header_that_names_a_unit_is_echoed_and_taken_for_no_banner() {
+    let mut bench = rtd8(Duration::ZERO);
+    let file = make::make(&make::Recipe {
+        target: &axrtd8co().target(),
+        version: Version::new(2, 2, 0),
+        words: 1000,
+        flaw: None,
+    });
+    let file = String::from_utf8(file.expect("an image")).expect("text");
+    // The text `AXRTD8CO V9.9.9`, and an XOFF that would stop us for ever.
+    let header = srecord::Record { kind: srecord::Kind::Header, address: 0, data: b"\0\0AXRTD8CO V9.9.9\x13" };
+    let header = String::from_utf8(header.to_text()).expect("text");
+    let file = file.replacen("S0110000000050524F4752414D264441544196", &header, 1);
+    let report = axcon::image::check(file.as_bytes(), None, &[axrtd8co().target()], None, &[]).expect("a slice");
+    let image = report.image().unwrap_or_else(|| panic!("{:?}", report.defects));
+    let report = bench.load(order(image));
+    assert!(bench.transcript().contains("AXRTD8CO V9.9.9."), "{}", bench.transcript());
+    assert_eq!(report.verdict, Verdict::Done, "{report:?}");
+}
+
+#[test]
+fn a_corrupted_record_is_told_in_words_and_at_most_one_more_leaves_behind_the_error() {
+    let mut bench = rtd8(Duration::ZERO);
+    bench.disturb(|number, byte| vec![if number == 5_000 { byte ^ 0x01 } else { byte }]);
+    bench.command(Command::Load(Box::new(order(small_image("AXRTD8CO", "2.2.0")))));
+    let limit = bench.now + Duration::from_secs(60);
+    let complaint =
+        |event: &Event| matches!(event, Event::Heard { message: Message::Loader(LoaderText::Error(_)), .. });
+    assert!(bench.run_until(limit, complaint).is_some(), "the loader complains");
+    let sent = bench.wire.len();
+    let Outcome::Loaded(report) = bench.outcome() else { panic!("no report") };
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
+    assert_eq!(report.what, "the loader reports error 0001 (wrong check sum)");
+    assert!(bench.wire.len() - sent <= 79, "{} characters behind the error", bench.wire.len() - sent);
+    let damaged = 5_000 / 79;
+    assert!(report.records <= damaged + 3, "{} records left, the {damaged}th was damaged", report.records);
+    bench.leave_in_peace();
+    let mut again = order(small_image("AXRTD8CO", "2.2.0"));
+    again.product = Some("AXRTD8CO".into());
+    assert_eq!(bench.load(again).verdict, Verdict::Done);
+}
+
+#[test]
+fn a_character_lost_in_the_last_records_is_noticed_and_the_loader_brought_out_of_its_silence() {
+    let image = small_image("AXRTD8CO", "2.2.0");
+    // How many characters the file has, and what is sent before it.
+    let mut bench = rtd8(Duration::ZERO);
+    bench.wire.clear();
+    let report = bench.load(order(image.clone()));
+    assert_eq!(report.verdict, Verdict::Done);
+    let end = bench.wire.windows(4).position(|window| window == b"S705").expect("an end record") as u64;
+    let return_of_end = end + 14;
+    for lost in (end - 60..return_of_end).step_by(5).chain([end - 1, return_of_end - 1, return_of_end]) {
+        let mut bench = rtd8(Duration::ZERO);
+        let first = bench.wire.len() as u64;
+        bench.disturb(move |number, byte| if number == first + lost { vec![] } else { vec![byte] });
+        let begun = bench.now;
+        let report = bench.load(order(image.clone()));
+        // Of the last return nothing is missing but that: the loader is given another, and the end is well.
+        let (verdict, unit) = if lost == return_of_end {
+            (Verdict::Done, UnitNow::Application)
+        } else {
+            (Verdict::Failed, UnitNow::Loader)
+        };
+        assert_eq!((report.verdict, report.unit), (verdict, unit), "{lost} of {end}: {report:?}");
+        assert!(bench.now.since(begun) < Duration::from_secs(25), "{lost} of {end}");
+        bench.leave_in_peace();
+        bench.ask(Command::Identify);
+        let state = if verdict == Verdict::Done { UnitState::Application } else { UnitState::Loader };
+        assert_eq!(bench.session.facts().state, state, "{lost} of {end}: it answers again");
+    }
+}
+
+#[test]
+fn a_loader_lost_in_a_record_of_an_earlier_program_is_brought_out_of_it() {
+    let mut bench = rtd8(Duration::ZERO);
+    bench.command(Command::Load(Box::new(order(small_image("AXRTD8CO", "2.2.0")))));
+    // Behind the erasing, in the middle of a record, whoever sent it goes: without a word.
+    let limit = bench.now + Duration::from_secs(60);
+    bench.run_until(limit, |event| matches!(event, Event::Progress(progress) if progress.records > 50));
+    let moment = Duration::from_micros(87 * 20);
+    bench.run_for(moment);
+    bench.unit.to_unit_mut().clear();
+    bench.reconnect();
+    bench.ask(Command::Identify);
+    assert_eq!(bench.session.facts().state, UnitState::Silent, "it takes the question for digits");
+    let mut again = order(small_image("AXRTD8CO", "2.2.0"));
+    again.product = Some("AXRTD8CO".into());
+    let report = bench.load(again);
+    assert_eq!(report.verdict, Verdict::Done, "{report:?}\n{}", bench.transcript());
+}
+
+#[test]
+fn a_power_cut_while_everything_is_erased_leaves_a_unit_that_a_second_upload_saves() {
+    let image = small_image("AXRTD8CO", "2.2.0");
+    for cut_ms in [1_500, 6_000, 11_000, 11_900] {
+        let mut bench = rtd8(Duration::from_millis(4));
+        bench.command(Command::Load(Box::new(order(image.clone()))));
+        bench.run_for(Duration::from_millis(cut_ms));
+        bench.power_cycle(Duration::from_millis(500));
+        let Outcome::Loaded(report) = bench.outcome() else { panic!("no report") };
+        assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{cut_ms} ms: {report:?}");
+        let mut again = order(image.clone());
+        again.product = Some("AXRTD8CO".into());
+        let report = bench.load(again);
+        assert_eq!(report.verdict, Verdict::Done, "{cut_ms} ms: {report:?}");
+        assert!(bench.unit.unit().flash() == flash_with(&image), "{cut_ms} ms");
+    }
 }
 
 #[test]
