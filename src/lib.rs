@@ -18,11 +18,11 @@ pub mod secret;
 
 pub mod record;
 
+pub mod canopen;
+
 pub mod wire;
 
 pub mod image;
-
-pub mod canopen;
 
 pub mod device;
 

@@ -4,6 +4,7 @@ pub mod confirm;
 pub mod console;
 pub mod defaults;
 pub mod diagnostics;
+pub mod dictionary;
 pub mod eds;
 pub mod emulate;
 pub mod error;
@@ -69,6 +70,8 @@ enum Command {
     Identify(identify::Args),
     /// Switch the data stream on and write it down.
     Stream(stream::Args),
+    /// Read or compare object dictionaries.
+    Dictionary(dictionary::Args),
     /// Read the unit's diagnostics pages.
     Diagnostics(diagnostics::Args),
     /// Restore the factory's object dictionary.
@@ -106,6 +109,7 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Ports(args)) => ports::run(args, global, output),
         Some(Command::Identify(args)) => identify::run(args, global, output),
         Some(Command::Stream(args)) => stream::run(args, global, output),
+        Some(Command::Dictionary(args)) => dictionary::run(args, global, output),
         Some(Command::Diagnostics(args)) => diagnostics::run(args, global, output),
         Some(Command::Defaults(args)) => defaults::run(args, global, output),
         Some(Command::Load(args)) => load::run(args, global, output),

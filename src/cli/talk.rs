@@ -255,7 +255,7 @@ fn finished(
 /// If the outcome is not what was wanted.
 pub fn expect_done(outcome: Outcome) -> Result<(), CliError> {
     match outcome {
-        Outcome::Identified | Outcome::Done(_) | Outcome::StreamRuns { .. } => Ok(()),
+        Outcome::Identified | Outcome::Done(_) | Outcome::StreamRuns { .. } | Outcome::DictionaryRead(_) => Ok(()),
         Outcome::NoAnswer { awaited, .. } => {
             let message = format!("the unit did not answer as expected: {awaited} did not come");
             Err(CliError::message(Kind::NoAnswer, message)

@@ -3,11 +3,12 @@
 //! Every sub-index is written out: readers lose entries of the compact form. Limits that depend on another entry are left
 //! out, since an EDS has constants only; the unit refuses what does not fit.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::Product;
 use super::dictionary::{Access, Bound, Entry, Object, ObjectKind};
-use crate::canopen::Value;
+use crate::canopen::{ObjectAddress, Value};
 
 /// Vendor's name as the manuals print it.
 const VENDOR: &str = "Axiomatic Technologies Corporation";
@@ -20,12 +21,32 @@ const NEVER_RESTORED: [u16; 4] = [0x1010, 0x1011, 0x5E00, 0x6125];
 /// Bit rates an EDS names, in kbit/s; the units have them all (section 3.1.2).
 const BIT_RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 
-/// The file's text, with CR LF.
+/// A unit as a device configuration file describes it.
+#[derive(Clone, Debug)]
+pub struct Configuration {
+    /// Its node-ID.
+    pub node_id: u8,
+    /// Its bit rate in kbit/s.
+    pub kbps: u16,
+    /// The values of its entries, where they are known.
+    pub values: BTreeMap<ObjectAddress, Value>,
+}
+
+/// The data sheet's text, with CR LF.
 pub fn write(product: &Product) -> String {
-    let mut eds = Eds { text: String::new() };
+    file(product, None)
+}
+
+/// The text of a device configuration file (DCF): the data sheet with a unit's values in it.
+pub fn write_configuration(product: &Product, configuration: &Configuration) -> String {
+    file(product, Some(configuration))
+}
+
+fn file(product: &Product, configuration: Option<&Configuration>) -> String {
+    let mut eds = Eds { text: String::new(), configuration };
     let name = &product.name;
     eds.section("FileInfo");
-    eds.line("FileName", format!("{name}.eds"));
+    eds.line("FileName", format!("{name}.{}", if configuration.is_some() { "dcf" } else { "eds" }));
     eds.line("FileVersion", "1");
     eds.line("FileRevision", "0");
     eds.line("EDSVersion", "4.0");
@@ -36,6 +57,15 @@ pub fn write(product: &Product) -> String {
     eds.line("ModificationTime", CREATED[1]);
     eds.line("ModificationDate", CREATED[0]);
     eds.line("ModifiedBy", "axcon");
+    if let Some(Configuration { node_id, kbps, .. }) = configuration {
+        eds.line("LastEDS", format!("{name}.eds"));
+        eds.section("DeviceComissioning");
+        eds.line("NodeID", node_id);
+        eds.line("NodeName", name);
+        eds.line("Baudrate", kbps);
+        eds.line("NetNumber", 0);
+        eds.line("CANopenManager", 0);
+    }
 
     eds.section("DeviceInfo");
     eds.line("VendorName", VENDOR);
@@ -80,11 +110,12 @@ fn pdos(product: &Product, first: u16) -> usize {
     product.dictionary.objects().iter().filter(|object| object.index & 0xFE00 == first).count()
 }
 
-struct Eds {
+struct Eds<'a> {
     text: String,
+    configuration: Option<&'a Configuration>,
 }
 
-impl Eds {
+impl Eds<'_> {
     fn section(&mut self, name: &str) {
         if !self.text.is_empty() {
             self.text.push_str("\r\n");
@@ -96,7 +127,7 @@ impl Eds {
         let _ = write!(self.text, "{key}={value}\r\n");
     }
 
-    fn list<'a>(&mut self, name: &str, objects: impl Iterator<Item = &'a Object>) {
+    fn list<'o>(&mut self, name: &str, objects: impl Iterator<Item = &'o Object>) {
         let objects: Vec<&Object> = objects.collect();
         self.section(name);
         self.line("SupportedObjects", objects.len());
@@ -162,6 +193,11 @@ impl Eds {
             }
         }
         self.line("PDOMapping", u8::from(entry.mappable));
+        let at = ObjectAddress::new(object.index, entry.sub);
+        let configured = self.configuration.and_then(|configuration| configuration.values.get(&at));
+        if let Some(value) = configured.filter(|value| value.as_f64().is_finite()) {
+            self.line("ParameterValue", number(*value));
+        }
         // Keys beyond the standard that python-canopen reads.
         if let Some(unit) = &entry.unit {
             self.line("Unit", unit);
@@ -192,7 +228,6 @@ fn factor(unit: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeMap;
 
     /// Sections of an INI file with their keys.
     fn sections(text: &str) -> BTreeMap<String, BTreeMap<String, String>> {
@@ -234,6 +269,24 @@ mod tests {
                 .sum();
             assert_eq!(listed, product.dictionary.objects().len());
         }
+    }
+
+    #[test]
+    fn a_configuration_carries_the_units_values() {
+        let product = Product::named("AXTC4CO").expect("built in");
+        let values = [
+            (ObjectAddress::new(0x6126, 2), Value::Real32(18.5)),
+            (ObjectAddress::new(0x6100, 1), Value::NOT_A_NUMBER),
+            (ObjectAddress::new(0x1800, 1), Value::Unsigned32(0x4000_01A0)),
+        ];
+        let configuration = Configuration { node_id: 32, kbps: 250, values: values.into_iter().collect() };
+        let sections = sections(&write_configuration(product, &configuration));
+        assert_eq!(sections["DeviceComissioning"]["NodeID"], "32");
+        assert_eq!(sections["DeviceComissioning"]["Baudrate"], "250");
+        assert_eq!(sections["6126sub2"]["ParameterValue"], "18.5");
+        assert_eq!(sections["1800sub1"]["ParameterValue"], "0x400001A0");
+        assert!(!sections["6100sub1"].contains_key("ParameterValue"), "no number, nothing to restore");
+        assert!(!sections["6126sub1"].contains_key("ParameterValue"));
     }
 
     #[test]

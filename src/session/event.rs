@@ -2,6 +2,7 @@
 //!
 //! Events carry spans into the record: a fact always points at the bytes it was read from.
 
+use crate::canopen::{ObjectAddress, Value};
 use crate::image::CheckedImage;
 use crate::record::Span;
 use crate::secret::Secret;
@@ -30,6 +31,8 @@ pub enum Command {
     StreamOff,
     /// Restore the default object dictionary; the unit resets itself (AXTC4CO manual, section 4.1.2).
     RestoreDefaults,
+    /// Read the whole object dictionary through V. Scanning and CAN are halted meanwhile (AXTC4CO manual, section 4.1.1).
+    ReadDictionary,
     /// Read pages of diagnostics: so many, or until it is cancelled; then no more come.
     Diagnostics {
         /// How many.
@@ -63,6 +66,8 @@ pub enum Job {
     StreamOff,
     /// [`Command::RestoreDefaults`].
     RestoreDefaults,
+    /// [`Command::ReadDictionary`].
+    ReadDictionary,
     /// [`Command::Diagnostics`].
     Diagnostics,
     /// [`Command::Load`].
@@ -107,6 +112,8 @@ pub enum Event {
         /// What it says.
         row: Row,
     },
+    /// So many entries of the object dictionary have been read.
+    EntriesRead(usize),
     /// A page of diagnostics is complete.
     Page {
         /// When its last line came.
@@ -136,6 +143,8 @@ pub enum Outcome {
         /// Whether it was on before, with whatever settings.
         was_on: bool,
     },
+    /// The object dictionary has been read, as far as the unit showed it.
+    DictionaryRead(Box<DictionaryReading>),
     /// The unit did not answer in time, or not in a way we understand.
     NoAnswer {
         /// Which job.
@@ -158,6 +167,32 @@ pub enum Outcome {
     Cancelled(Job),
     /// An upload has ended, well or not.
     Loaded(Box<LoadReport>),
+}
+
+/// What the unit showed of its object dictionary.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DictionaryReading {
+    /// Entries by index and sub-index.
+    pub entries: Vec<ReadEntry>,
+    /// Whether the walk came to its end.
+    pub complete: bool,
+    /// Lines of the view in which no entry was recognised, titles and hints among them.
+    pub unrecognised_lines: u64,
+}
+
+/// An entry as the unit showed it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadEntry {
+    /// Where it lies.
+    pub at: ObjectAddress,
+    /// Its value; `None` where the unit shows none, or the entry is not known.
+    pub value: Option<Value>,
+    /// What the line says besides index and sub-index.
+    pub text: String,
+    /// Where in the record it was read.
+    pub span: Span,
+    /// Whether the product's manual has it.
+    pub known: bool,
 }
 
 /// What is known of the unit, and from where.

@@ -6,6 +6,7 @@
 
 mod console;
 mod diagnostics;
+mod dictionary;
 mod event;
 mod identify;
 mod job;
@@ -115,6 +116,7 @@ impl Session {
             }
             Command::StreamOff => (Job::StreamOff, Box::new(console::StreamOff::default())),
             Command::RestoreDefaults => (Job::RestoreDefaults, Box::new(console::RestoreDefaults::default())),
+            Command::ReadDictionary => (Job::ReadDictionary, Box::new(dictionary::ReadDictionary::new())),
             Command::Diagnostics { pages } => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::new(pages))),
             Command::Load(order) => {
                 let password = order.password.reveal();

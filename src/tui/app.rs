@@ -457,6 +457,7 @@ impl App {
             Command::StreamOn { .. } => Some(Job::StreamOn),
             Command::StreamOff => Some(Job::StreamOff),
             Command::RestoreDefaults => Some(Job::RestoreDefaults),
+            Command::ReadDictionary => Some(Job::ReadDictionary),
             Command::Diagnostics { .. } => Some(Job::Diagnostics),
             Command::Load(_) => Some(Job::Load),
         };

@@ -100,6 +100,7 @@ pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) 
         Some(Job::Identify) => "asking the unit",
         Some(Job::StreamOn | Job::StreamOff) => "setting the stream",
         Some(Job::RestoreDefaults) => "restoring defaults",
+        Some(Job::ReadDictionary) => "reading the dictionary",
         Some(Job::Diagnostics) => "reading diagnostics",
         Some(Job::Load) => "loading",
     };

@@ -162,7 +162,7 @@ impl View {
     /// Takes in one event; `facts` are the session's at that moment.
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         match event {
-            Event::Heard { .. } | Event::Page { .. } => {}
+            Event::Heard { .. } | Event::Page { .. } | Event::EntriesRead(_) => {}
             Event::Row { at, row, .. } => self.row(*at, row),
             Event::FactsChanged => self.facts_changed(facts),
             Event::Held(true) => self.load.held_since = Some(now),
@@ -267,6 +267,7 @@ impl View {
     fn finished(&mut self, outcome: &Outcome) {
         self.job = None;
         match outcome {
+            Outcome::DictionaryRead(_) => self.tell(Tone::Good, done(Job::ReadDictionary)),
             Outcome::Identified => self.identified(),
             Outcome::StreamRuns { was_on: true } => {
                 self.tell(Tone::Good, "The stream was on already and now sends what you asked for.");
@@ -343,6 +344,7 @@ pub fn doing(job: Job) -> &'static str {
         Job::StreamOn => "switching the stream on",
         Job::StreamOff => "switching the stream off",
         Job::RestoreDefaults => "restoring the defaults",
+        Job::ReadDictionary => "reading the object dictionary",
         Job::Diagnostics => "reading the diagnostics",
         Job::Load => "loading new software",
     }
@@ -354,6 +356,7 @@ fn done(job: Job) -> &'static str {
         Job::StreamOn => "The stream is on, also after a power cycle, until T switches it off.",
         Job::StreamOff => "The stream is off.",
         Job::RestoreDefaults => "The defaults are restored and the unit has restarted.",
+        Job::ReadDictionary => "The object dictionary has been read.",
         Job::Diagnostics => "The diagnostics are off.",
         Job::Load => "The upload has ended.",
     }

@@ -6,6 +6,7 @@
 
 mod boot;
 pub mod diagnostics;
+pub mod dictionary;
 mod framer;
 mod menu;
 mod prompt;
@@ -75,11 +76,14 @@ impl Vocabulary<'_> {
         if let Some(name) = menu::software(&words, &self.products) {
             return Message::Software(name);
         }
-        if let Some(network) = menu::network(line, &words) {
-            return Message::Network(network);
-        }
-        if menu::is_refusal(&words) {
+        let network = menu::network(line, &words);
+        // "Only in pre-operational state" names a state, and says no.
+        let names_numbers = network.as_ref().is_some_and(|found| found.node_id.is_some() || found.can_kbps.is_some());
+        if menu::is_refusal(&words) && !names_numbers {
             return Message::Refusal;
+        }
+        if let Some(network) = network {
+            return Message::Network(network);
         }
         Message::Text
     }

@@ -359,3 +359,79 @@ fn a_client_nobody_here_wrote_uploads_into_the_emulator() {
     assert_eq!(ran.code, Some(0), "{}{}", ran.out, ran.err);
     assert_flash_holds(&bench.world.path("s1/flash.bin"), &bench.world.path("new.S"));
 }
+
+#[test]
+fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1", "--line-rate", "off"]);
+    unit.wait_out("serial: ");
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    unit.input(b"write 4010:2 1300\nwrite 6126:1 18\nread 6126:1\n");
+    unit.wait_out("6126:01 = 18.0");
+    let dump = ["dictionary", "dump", "--yes", "--port", "u1"];
+    let ran = world.run(&[&dump[..], &["--json", "--out", "one.json"]].concat(), b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let one = json(&std::fs::read_to_string(world.path("one.json")).expect("written"));
+    assert_eq!((&one["schema"], &one["product"]), (&"axcon.dictionary/1".into(), &"AXTC4CO".into()));
+    assert_eq!((&one["complete"], &one["missing"]), (&true.into(), &serde_json::json!([])));
+    let entries = one["entries"].as_array().expect("a list");
+    assert_eq!(entries.len(), 227);
+    let deviating: Vec<String> = entries
+        .iter()
+        .filter(|entry| entry["deviates"] == true)
+        .map(|entry| format!("{}:{} {} {}", entry["index"], entry["subindex"], entry["value"], entry["default"]))
+        .collect();
+    assert_eq!(deviating, ["\"4010\":2 1300 1250", "\"6126\":1 18.0 16.0"]);
+    let table = world.run(&dump, b"");
+    assert!(table.out.contains("* 4010:02  High Temperature Warning Threshold, TC2"), "{}", table.out);
+    assert!(table.out.contains("227 entries, 2 differ from the factory's (*)"), "{}", table.out);
+    assert!(table.out.contains("0x10020194"), "{}", table.out);
+    let same = world.run(&["dictionary", "diff", "one.json", "one.json"], b"");
+    assert_eq!((same.code, same.out.as_str()), (Some(0), ""), "{}", same.err);
+    let factory = world.run(&["dictionary", "diff", "one.json", "factory:axtc4co"], b"");
+    assert_eq!((factory.code, factory.out.lines().count()), (Some(1), 2), "{}", factory.out);
+    let csv = world.run(&[&dump[..], &["--format", "csv"]].concat(), b"");
+    assert_eq!(csv.out.lines().count(), 228, "{}", csv.out);
+    let bad = world.run(&["dictionary", "diff", "u1-nowhere.json", "factory:axtc4co"], b"");
+    assert_eq!(bad.code, Some(2));
+    assert!(bad.err.contains("cannot read the dump 'u1-nowhere.json'"), "{}", bad.err);
+    let unasked = world.run(&["dictionary", "dump", "--port", "u1"], b"");
+    assert_eq!(unasked.code, Some(2), "{}", unasked.err);
+}
+
+#[test]
+fn an_interrupt_in_the_middle_of_a_dump_leaves_the_view() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1"]);
+    unit.wait_out("serial: ");
+    let dump = world.start(&["dictionary", "dump", "--yes", "--port", "u1"]);
+    std::thread::sleep(std::time::Duration::from_millis(1_800));
+    dump.signal(rustix::process::Signal::INT);
+    let ran = dump.wait();
+    assert_eq!(ran.code, Some(130), "{}{}", ran.out, ran.err);
+    unit.input(b"read 6126:1\n");
+    unit.wait_out("6126:01 = 16.0");
+}
+
+#[test]
+fn diagnostics_and_defaults_are_commands_of_their_own() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axrtd8co", "--link", "u1"]);
+    unit.wait_out("serial: ");
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    unit.input(b"write 6126:1 18\nwrite 1010:1 0x65766173\nread 6126:1\n");
+    unit.wait_out("6126:01 = 18.0");
+    let ran = world.run(&["diagnostics", "--count", "1", "--json", "--port", "u1"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let page = json(&ran.out);
+    assert_eq!(page["schema"], "axcon.diagnostics/1");
+    let values = page["values"].as_array().expect("a list");
+    assert!(values.iter().any(|value| value["label"] == "Supply Voltage" && value["unit"] == "V"), "{page}");
+    let ran = world.run(&["defaults", "--port", "u1"], b"");
+    assert_eq!(ran.code, Some(2), "nobody said yes: {}", ran.err);
+    let ran = world.run(&["defaults", "--yes", "--json", "--port", "u1"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert_eq!(json(&ran.out)["product"], "AXRTD8CO");
+    unit.input(b"read 6126:1\n");
+    unit.wait_out("6126:01 = 16.0");
+}

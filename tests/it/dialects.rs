@@ -1,6 +1,7 @@
 //! The console against units that word and lay out everything in their own way, within what the manuals fix: the same
 //! facts and the same deeds for every dialect.
 
+use axcon::canopen::Value;
 use axcon::device::Product;
 use axcon::session::{Command, Event, Job, Outcome, UnitState};
 use axcon::time::Duration;
@@ -9,19 +10,23 @@ use axcon::wire::stream::Source;
 
 use crate::support::bench::Bench;
 
-/// Dialects that are tried; the environment may ask for more, or for a single one.
-fn seeds() -> Vec<u64> {
+/// Dialects that are tried, so many unless the environment asks for more, or for a single one.
+fn seeds(usual: u64) -> Vec<u64> {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
     match number("AXCON_SEED") {
         Some(seed) => vec![seed],
-        None => (0..number("AXCON_SEEDS").unwrap_or(150)).collect(),
+        None => (0..number("AXCON_SEEDS").unwrap_or(usual)).collect(),
     }
 }
 
 /// Runs a story with both products in every dialect and says in which ones it failed.
 fn in_every_dialect(story: impl Fn(&mut Bench, &'static Product) -> Result<(), String>) {
+    in_dialects(150, story);
+}
+
+fn in_dialects(usual: u64, story: impl Fn(&mut Bench, &'static Product) -> Result<(), String>) {
     let mut failed = Vec::new();
-    let seeds = seeds();
+    let seeds = seeds(usual);
     for &seed in &seeds {
         for product in Product::all() {
             let mut bench = Bench::in_dialect(product, seed);
@@ -103,6 +108,45 @@ fn every_dialects_diagnostics_are_read_and_stopped() {
     in_every_dialect(|bench, _| {
         let outcome = bench.ask(Command::Diagnostics { pages: Some(2) });
         if outcome == Outcome::Done(Job::Diagnostics) { Ok(()) } else { Err(format!("{outcome:?}")) }
+    });
+}
+
+#[test]
+fn every_dialects_dictionary_is_read_to_the_same_facts() {
+    // A walk over the whole dictionary takes its time: fewer of them.
+    in_dialects(40, |bench, product| {
+        let outcome = bench.ask(Command::ReadDictionary);
+        let Outcome::DictionaryRead(reading) = outcome else { return Err(format!("{outcome:?}")) };
+        if !reading.complete {
+            return Err(format!("not complete, {} entries", reading.entries.len()));
+        }
+        let mut wrong = Vec::new();
+        for (at, object, entry) in product.dictionary.entries() {
+            let read = reading.entries.iter().find(|read| read.at == at);
+            let (Some(read), Ok(value)) = (read, bench.unit.unit().read_object(at)) else {
+                let said = bench.transcript();
+                let line = said.lines().find(|line| line.contains(&format!("{:04X}", at.index))).unwrap_or_default();
+                wrong.push(format!("{at} {} {} is missing: {line}", object.name, entry.name));
+                continue;
+            };
+            let same = match read.value {
+                None => value.as_f64().is_nan(),
+                // As many digits as the unit prints, and one scan older perhaps.
+                Some(Value::Real32(number)) => (f64::from(number) - value.as_f64()).abs() < 1.0,
+                Some(other) => {
+                    let live = matches!(at.index, 0x2010 | 0x2130 | 0x3130 | 0x7130);
+                    other == value || (live && (other.as_f64() - value.as_f64()).abs() < 2_000.0)
+                }
+            };
+            if !same {
+                wrong.push(format!("{at}: {:?} from {:?}, not {value}", read.value, read.text));
+            }
+        }
+        if wrong.is_empty() {
+            Ok(())
+        } else {
+            Err(format!("{} wrong: {}", wrong.len(), wrong[..wrong.len().min(5)].join("; ")))
+        }
     });
 }
 

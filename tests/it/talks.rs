@@ -141,6 +141,46 @@ fn diagnostics_that_are_cancelled_at_any_moment_are_off_afterwards() {
 }
 
 #[test]
+fn a_reading_of_the_dictionary_that_is_cancelled_at_any_moment_leaves_the_view() {
+    let entry = "6100:1".parse().expect("an entry");
+    for moment_ms in (10..4_000).step_by(70) {
+        let mut bench = Bench::new();
+        bench.run_for(Duration::from_secs(4));
+        bench.command(Command::ReadDictionary);
+        bench.run_for(Duration::from_millis(moment_ms));
+        let outcome = bench.ask(Command::Cancel);
+        assert_eq!(outcome, Outcome::Cancelled(Job::ReadDictionary), "cancelled after {moment_ms} ms");
+        assert!(bench.unit.unit().read_object(entry).is_ok(), "after {moment_ms} ms: {}", bench.transcript());
+    }
+}
+
+#[test]
+fn a_unit_that_is_operational_says_why_it_shows_no_dictionary() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    let now = bench.now;
+    bench.unit.unit_mut().nmt(now, axcon::emulator::NmtCommand::Start);
+    let Outcome::Refused { reason, .. } = bench.ask(Command::ReadDictionary) else { panic!("{}", bench.transcript()) };
+    assert!(reason.contains("Pre-Operational state only"), "{reason}");
+}
+
+#[test]
+fn a_unit_that_falls_silent_in_its_view_is_left_and_what_was_read_is_kept() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    // The eleventh Enter and all behind it are lost, but not the key that leaves.
+    let mut enters = 0;
+    bench.disturb(move |_, byte| {
+        enters += u32::from(byte == b'\r');
+        if byte == b'\r' && enters > 10 { Vec::new() } else { vec![byte] }
+    });
+    let Outcome::DictionaryRead(reading) = bench.ask(Command::ReadDictionary) else { panic!("{}", bench.transcript()) };
+    assert!(!reading.complete && reading.entries.len() > 90, "{}", reading.entries.len());
+    let entry = "6100:1".parse().expect("an entry");
+    assert!(bench.unit.unit().read_object(entry).is_ok(), "the view has been left");
+}
+
+#[test]
 fn a_unit_without_diagnostics_ends_the_wait() {
     let mut bench = Bench::new();
     bench.disturb(|_, byte| if byte == b's' { Vec::new() } else { vec![byte] });

@@ -12,7 +12,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("secret", &[]),
     ("endpoint", &["time"]),
     ("record", &["endpoint", "time"]),
-    ("wire", &["record", "version"]),
+    ("wire", &["canopen", "record", "version"]),
     ("image", &["rng", "version"]),
     ("canopen", &[]),
     ("device", &["canopen", "image", "time", "version", "wire"]),

@@ -1,0 +1,341 @@
+//! Lines of V, the view of the object dictionary (manuals, section 4.1.1).
+//!
+//! The manuals fix hexadecimal indices and nothing else. So a line is read by its tokens: an index in one of its usual
+//! spellings, a sub-index beside it or at the head of a line below, and what is left, out of which somebody who knows the
+//! entry picks its value ([`value`]). A line that leaves a doubt stays text.
+
+use crate::canopen::{DataType, Value};
+
+/// Which entry a line speaks of, and what else it says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ViewLine {
+    /// Index; `None` on a line below its object's heading.
+    pub index: Option<u16>,
+    /// Sub-index, where the line names one.
+    pub sub: Option<SubIndex>,
+    /// The line without the two.
+    pub rest: String,
+}
+
+/// A sub-index as printed. Units write it in hexadecimal or in decimal digits; which, tell only its neighbours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SubIndex {
+    /// Its digits as hexadecimal ones.
+    pub hexadecimal: u8,
+    /// Its digits as decimal ones, if they can be and nothing marks them as hexadecimal.
+    pub decimal: Option<u8>,
+}
+
+impl SubIndex {
+    /// The sub-index that is meant behind the one before it.
+    pub fn behind(self, before: Option<u8>) -> u8 {
+        let next = before.map_or(0, |before| before.saturating_add(1));
+        match self.decimal {
+            Some(decimal) if self.hexadecimal != next && decimal == next => decimal,
+            _ => self.hexadecimal,
+        }
+    }
+
+    fn of(digits: &str) -> Option<Self> {
+        let marked = digits.starts_with("0x") || digits.ends_with(['h', 'H']);
+        let plain = digits.trim_start_matches("0x").trim_end_matches(['h', 'H']);
+        let fits = (1..=2).contains(&plain.len()) && plain.bytes().all(|digit| digit.is_ascii_hexdigit());
+        let hexadecimal = fits.then(|| u8::from_str_radix(plain, 16).ok()).flatten()?;
+        Some(SubIndex { hexadecimal, decimal: plain.parse().ok().filter(|_| !marked) })
+    }
+}
+
+/// What a line says an entry holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shown {
+    /// A value.
+    Value(Value),
+    /// Nothing: the unit has no number for it at the moment.
+    Nothing,
+}
+
+/// Reads a line. `knows` says whether an index is that of an object: spellings that could be something else count only
+/// for these.
+pub fn line(text: &str, knows: impl Fn(u16) -> bool) -> Option<ViewLine> {
+    let tokens: Vec<&str> = text.split_whitespace().collect();
+    let head = sub_at_head(&tokens);
+    for (place, token) in tokens.iter().enumerate() {
+        // Behind a sub-index a number of four digits is a value: `01h RTD1 = 2711h`.
+        let Some((index, sub, marked)) = address(token).filter(|_| place == 0 || head.is_none()) else { continue };
+        let names_object = place == 0 || tokens[place - 1].to_ascii_lowercase().starts_with(['o', 'i']);
+        if !((marked || place == 0) && knows(index) || marked && index >= 0x1000 && names_object) {
+            continue;
+        }
+        let mut rest = tokens.clone();
+        rest.remove(place);
+        let (sub, taken) = match sub {
+            Some(sub) => (Some(sub), 0),
+            None => sub_behind(&rest[place..]),
+        };
+        rest.drain(place..place + taken);
+        return Some(ViewLine { index: Some(index), sub, rest: rest.join(" ") });
+    }
+    let (sub, taken) = head?;
+    Some(ViewLine { index: None, sub: Some(sub), rest: tokens[taken..].join(" ") })
+}
+
+/// Index and sub-index of a token, and whether it is marked as hexadecimal: `6126h`, `0x6126`, `$6126`, `[6126:01]`,
+/// `6126sub1`, `6126h.1`, `6126/1`.
+fn address(token: &str) -> Option<(u16, Option<SubIndex>, bool)> {
+    let bare = token.trim_matches(['[', ']', '(', ')', '<', '>', ',', ';']).trim_end_matches([':', '.', '=']);
+    let (plain, prefixed) = match bare.strip_prefix("0x").or(bare.strip_prefix("0X")).or(bare.strip_prefix('$')) {
+        Some(plain) => (plain, true),
+        None => (bare, false),
+    };
+    let digits = plain.get(..4)?;
+    if !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+        return None;
+    }
+    let index = u16::from_str_radix(digits, 16).ok()?;
+    let rest = &plain[4..];
+    let (rest, suffixed) = match rest.strip_prefix(['h', 'H']) {
+        Some(rest) => (rest, true),
+        None => (rest, false),
+    };
+    let marked = prefixed || suffixed;
+    if rest.is_empty() {
+        return Some((index, None, marked));
+    }
+    let lower = rest.to_ascii_lowercase();
+    let (separator, sub) = ["sub", ":", ".", "/", ","]
+        .iter()
+        .find_map(|separator| Some((*separator, SubIndex::of(lower.strip_prefix(separator)?)?)))?;
+    // A number like 6126.01 is no address unless something marks it.
+    let bracketed = token.starts_with('[');
+    Some((index, Some(sub), marked || bracketed || matches!(separator, "sub" | ":")))
+}
+
+/// A sub-index in tokens of its own behind an index, and how many tokens it takes: `sub 1`, `sub-index: 01`, `[1]`, `01h`.
+fn sub_behind(tokens: &[&str]) -> (Option<SubIndex>, usize) {
+    match sub_at_head(tokens) {
+        Some((sub, taken))
+            if taken == 2 || tokens[0].starts_with(['[', '(', ':', '.', '/']) || is_marked(tokens[0]) =>
+        {
+            (Some(sub), taken)
+        }
+        _ => (None, 0),
+    }
+}
+
+fn is_marked(token: &str) -> bool {
+    let bare = token.trim_end_matches(':');
+    bare.len() == 3 && bare.ends_with(['h', 'H'])
+}
+
+/// A sub-index at the head of a line, and how many tokens it takes: `01h Name`, `sub 1: 16.0`, `[1] ...`, `1: ...`.
+fn sub_at_head(tokens: &[&str]) -> Option<(SubIndex, usize)> {
+    let first = *tokens.first()?;
+    let lower = first.to_ascii_lowercase();
+    let name = lower.trim_end_matches([':', '.', '=']);
+    if matches!(name, "sub" | "subindex" | "sub-index" | "si") {
+        return SubIndex::of(tokens.get(1)?.trim_end_matches([':', '.', ',', '='])).map(|sub| (sub, 2));
+    }
+    if let Some(digits) = name.strip_prefix("sub") {
+        return SubIndex::of(digits.trim_start_matches('-')).map(|sub| (sub, 1));
+    }
+    let marked = is_marked(first)
+        || first.ends_with(':')
+        || first.ends_with(')')
+        || first.starts_with(['[', '(', '.', ':', '/']);
+    let digits = lower.trim_matches(['[', ']', '(', ')', ':', '.', '/', ',']);
+    (marked && tokens.len() > 1).then(|| SubIndex::of(digits)).flatten().map(|sub| (sub, 1))
+}
+
+/// The value a line shows of an entry of a type, given the names it may carry. `None` if there is none, or more than one
+/// that could be meant.
+pub fn value(rest: &str, data_type: DataType, names: &[&str]) -> Option<Shown> {
+    let mut tokens: Vec<Option<&str>> = rest.split_whitespace().map(Some).collect();
+    for name in names {
+        forget(&mut tokens, name);
+    }
+    // What stands behind an equals sign is meant, then what stands behind a colon or leaders, then what is left.
+    let mut found: [Vec<Shown>; 3] = [Vec::new(), Vec::new(), Vec::new()];
+    let mut rank = 2;
+    for token in tokens {
+        let Some(token) = token else {
+            rank = if rank == 0 { 0 } else { 2 };
+            continue;
+        };
+        let (before, word) = token.rsplit_once('=').map_or(("", token), |(_, word)| ("=", word));
+        if before == "=" {
+            rank = 0;
+        }
+        let bare = word.trim_matches(['(', ')', '[', ']', '<', '>', ',', ';', '"', '\'']);
+        let bare = bare.trim_end_matches(':');
+        if let Some(shown) = parse(bare, data_type) {
+            found[rank].push(shown);
+            rank = 2;
+        } else if word.ends_with(':') || (word.len() >= 2 && word.bytes().all(|sign| sign == b'.' || sign == b'_')) {
+            rank = 1;
+        } else if !bare.is_empty() {
+            rank = 2;
+        }
+    }
+    let [first, second, third] = found;
+    let candidates = [first, second, third].into_iter().find(|candidates| !candidates.is_empty())?;
+    let one = candidates.first()?.clone();
+    candidates.iter().all(|other| *other == one).then_some(one)
+}
+
+/// Takes a name's words out of the tokens, where they stand one behind the other.
+fn forget(tokens: &mut [Option<&str>], name: &str) {
+    let words: Vec<String> = name.split_whitespace().map(plain).collect();
+    if words.is_empty() || words.len() > tokens.len() {
+        return;
+    }
+    for start in 0..=tokens.len() - words.len() {
+        let matches =
+            |(place, word): (usize, &String)| tokens[start + place].is_some_and(|token| plain(token) == *word);
+        if words.iter().enumerate().all(matches) {
+            tokens[start..start + words.len()].fill(None);
+            return;
+        }
+    }
+}
+
+fn plain(word: &str) -> String {
+    word.trim_matches(|c: char| !c.is_alphanumeric()).to_lowercase()
+}
+
+fn parse(word: &str, data_type: DataType) -> Option<Shown> {
+    let lower = word.to_ascii_lowercase();
+    if data_type == DataType::Real32 && matches!(lower.as_str(), "nan" | "-nan" | "+nan" | "----" | "n/a" | "inf") {
+        return Some(Shown::Nothing);
+    }
+    if data_type == DataType::Boolean {
+        match lower.as_str() {
+            "on" | "yes" => return Some(Shown::Value(Value::Boolean(true))),
+            "off" | "no" => return Some(Shown::Value(Value::Boolean(false))),
+            _ => {}
+        }
+    }
+    match data_type.parse(word)? {
+        Value::Real32(number) if number.is_nan() => Some(Shown::Nothing),
+        value => Some(Shown::Value(value)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn read(text: &str) -> Option<(Option<u16>, Option<u8>, String)> {
+        line(text, |index| matches!(index, 0x6126 | 0x1000 | 0x5555))
+            .map(|line| (line.index, line.sub.map(|sub| sub.hexadecimal), line.rest))
+    }
+
+    #[test]
+    fn indices_and_sub_indices_are_found_in_their_usual_spellings() {
+        let entry = |sub, rest: &str| Some((Some(0x6126), sub, rest.to_owned()));
+        let table = [
+            ("6126h Scaling Factor", entry(None, "Scaling Factor")),
+            ("0x6126 Scaling Factor", entry(None, "Scaling Factor")),
+            ("$6126: Scaling Factor", entry(None, "Scaling Factor")),
+            ("Object 6126h, Scaling", entry(None, "Object Scaling")),
+            ("[6126:01] TC1 = 16.0", entry(Some(1), "TC1 = 16.0")),
+            ("6126sub1 16.0", entry(Some(1), "16.0")),
+            ("6126subA\t16.0", entry(Some(10), "16.0")),
+            ("6126h:01  Factor: 16.0", entry(Some(1), "Factor: 16.0")),
+            ("0x6126.1 Factor .... 16.0", entry(Some(1), "Factor .... 16.0")),
+            ("$6126/1 16.0", entry(Some(1), "16.0")),
+            ("6126 sub 2 16.0", entry(Some(2), "16.0")),
+            ("6126h sub-index 02: 16.0", entry(Some(2), "16.0")),
+            ("6126h 03h TC3 = 16.0", entry(Some(3), "TC3 = 16.0")),
+            ("6126h [3] 16.0", entry(Some(3), "16.0")),
+            ("6126 Scaling Factor", entry(None, "Scaling Factor")),
+            ("16.000 6126h.4 TC4", entry(Some(4), "16.000 TC4")),
+            ("  01h TC1 = 16.000", Some((None, Some(1), "TC1 = 16.000".into()))),
+            ("    sub 1: 16.000", Some((None, Some(1), "16.000".into()))),
+            ("sub1: 16.000", Some((None, Some(1), "16.000".into()))),
+            ("[2] 16.000", Some((None, Some(2), "16.000".into()))),
+            ("2: 16.000", Some((None, Some(2), "16.000".into()))),
+            ("  01h RTD1 = 2711h", Some((None, Some(1), "RTD1 = 2711h".into()))),
+            ("Object 2711h Something new", Some((Some(0x2711), None, "Object Something new".into()))),
+            ("limit 0x2711", None),
+            ("6127 Scaling Offset", None),
+            ("16.000 mA", None),
+            ("Supply 24.1 V", None),
+            ("Main Menu - AXTC4CO V1.1.0", None),
+            ("  25.1;  26.2; 100.0", None),
+            ("", None),
+        ];
+        for (text, expected) in table {
+            assert_eq!(read(text), expected, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_sub_index_in_decimal_digits_is_told_by_its_neighbours() {
+        let sub = |text: &str| line(text, |_| true).and_then(|line| line.sub).expect("a sub-index");
+        assert_eq!((sub("sub 10: 0").behind(Some(9)), sub("sub 10: 0").behind(Some(15))), (10, 16));
+        assert_eq!((sub("  10h x 0").behind(Some(9)), sub("6126.11 0").behind(Some(10))), (16, 11));
+        assert_eq!((sub("sub A: 0").behind(Some(9)), sub("sub 1: 0").behind(None)), (10, 1));
+    }
+
+    #[test]
+    fn the_value_is_what_the_line_leaves_no_doubt_about() {
+        let names = ["Thermocouple Scaling Factor", "TC1"];
+        let real = |rest: &str| value(rest, DataType::Real32, &names);
+        let number = |number: f32| Some(Shown::Value(Value::Real32(number)));
+        for (rest, expected) in [
+            ("TC1 = 16.000", number(16.0)),
+            ("Thermocouple Scaling Factor TC1 ........ 16.000", number(16.0)),
+            ("Thermocouple Scaling Factor TC1: 1.6E+01 degC", number(16.0)),
+            ("16.000 Thermocouple Scaling Factor TC1", number(16.0)),
+            ("16.000\tTC1", number(16.0)),
+            ("TC1=16.000", number(16.0)),
+            ("TC1 = nan", Some(Shown::Nothing)),
+            ("TC1 = 0xFFFFFFFF", Some(Shown::Nothing)),
+            ("TC1 = ----", Some(Shown::Nothing)),
+            ("input 1 factor = 16.0", number(16.0)),
+            ("input 1 factor 16.0", None),
+            ("REAL32 RW -1000.0 1000.0 16.0", None),
+            ("REAL32 RW (-1000.0 to 1000.0) value: 16.0", number(16.0)),
+            ("TC1", None),
+            ("", None),
+        ] {
+            assert_eq!(real(rest), expected, "{rest:?}");
+        }
+        let whole = |rest: &str, data_type, names: &[&str]| match value(rest, data_type, names) {
+            Some(Shown::Value(value)) => value.as_integer(),
+            _ => None,
+        };
+        for (rest, data_type, names, expected) in [
+            ("Mapped object 1 = 0x71300110", DataType::Unsigned32, &["Mapped object 1"][..], Some(0x7130_0110)),
+            ("= 60 Hz (60 Hz)", DataType::Unsigned8, &[], Some(60)),
+            ("RTD1 = 10001 (3-wire RTD)", DataType::Unsigned16, &["RTD1"], Some(10_001)),
+            ("RTD1 = 1 (IEC 0.00385)", DataType::Unsigned16, &["RTD1"], Some(1)),
+            ("Bank 1 (TC1, TC2): 4768", DataType::Integer16, &["Bank 1 (TC1, TC2)"], Some(4_768)),
+            ("Start in Operational Mode = off", DataType::Boolean, &["Start in Operational Mode"], Some(0)),
+            ("COB-ID 400001FFh", DataType::Unsigned32, &["COB-ID"], Some(0x4000_01FF)),
+            ("Status = 0x02 2", DataType::Unsigned8, &[], Some(2)),
+            ("-200 (0.1 C)", DataType::Integer16, &[], Some(-200)),
+        ] {
+            assert_eq!(whole(rest, data_type, names), expected, "{rest:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_without_complaint(text in "\\PC{0,120}") {
+            if let Some(line) = line(&text, |_| true) {
+                let _ = value(&line.rest, DataType::Real32, &["TC1", "a b"]);
+            }
+        }
+
+        #[test]
+        fn tokens_in_any_order_are_read_without_complaint(
+            text in "((6126h|0x6126|sub|1|=|:|16\\.0|\\[|\\]|0x|h|\\.\\.\\.|é)[ ]?){0,12}"
+        ) {
+            if let Some(line) = line(&text, |_| true) {
+                let _ = value(&line.rest, DataType::Unsigned16, &["sub 1"]);
+            }
+        }
+    }
+}
