@@ -355,7 +355,7 @@ mod tests {
         objects.write(at(index, sub), &value.encode())
     }
 
-    // B-003, B-8, B-7
+    // B-003, B-8, B-7, B-074, B-38
     #[test]
     fn each_violation_has_its_own_refusal() {
         let mut objects = tc4();
@@ -509,7 +509,7 @@ mod tests {
         assert_eq!(objects.get(0x6114, 4), Value::Unsigned32(200_000), "B-060: fixed, errata E-07");
     }
 
-    // B-047, B-048, B-102, B-103, B-104, B-050
+    // B-047, B-048, B-049, B-102, B-103, B-104, B-050
     #[test]
     fn a_pdo_is_mapped_anew_in_the_printed_order_only() {
         let mut objects = tc4();

@@ -5,6 +5,8 @@ mod acceptance;
 mod commands;
 mod console;
 mod dialects;
+#[cfg(unix)]
+mod eds;
 mod emulator;
 mod images;
 #[cfg(unix)]

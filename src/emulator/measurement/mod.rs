@@ -443,7 +443,7 @@ mod tests {
         }
     }
 
-    // B-060, B-199, B-022
+    // B-060, B-199, B-022, B-023
     #[test]
     fn all_thermocouples_are_read_together_and_nothing_is_said_before_its_time() {
         let product = Product::named("AXTC4CO").expect("built in");
@@ -504,7 +504,7 @@ mod tests {
         }
     }
 
-    // B-071, B-072, B-117, B-100, B-052
+    // B-071, B-072, B-117, B-100
     #[test]
     fn an_open_thermocouple_is_found_within_1600_ms_and_its_end_at_once() {
         let mut bench = Bench::tc4();
@@ -836,7 +836,7 @@ mod tests {
         assert_eq!((bench.status(6), bench.errors()), (0x09, vec![0x0806_FF00]));
     }
 
-    // B-140 of the stream words: what a row says of each state.
+    // B-140
     #[test]
     fn a_row_says_why_a_value_is_missing() {
         let mut bench = Bench::rtd8();

@@ -377,6 +377,17 @@ mod tests {
     }
 
     #[test]
+    fn the_example_of_the_documentation_can_be_played() {
+        let text = include_str!("../../../docs/emulator.md");
+        let example = text.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+        let scenario = Scenario::read("emulator.md", example, product()).expect("no fault").expect("for this product");
+        assert!(scenario.deeds.len() > 600, "ten steps of the ramp in each second");
+        for verb in HELP.lines().map(|line| line.split_whitespace().next().unwrap_or_default().trim_end_matches(',')) {
+            assert!(text.contains(&format!("`{verb}")), "{verb} is not in the documentation");
+        }
+    }
+
+    #[test]
     fn a_scenario_begins_anew_and_asking_often_changes_nothing() {
         let text = "repeat = 20\n[[at]]\nseconds = 5\ndo = ['set 1 temperature 50']\n[[at]]\nseconds = 15\n\
                     do = ['set 1 temperature 90', 'power cycle 0.5']\n";

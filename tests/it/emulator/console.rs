@@ -35,6 +35,7 @@ fn stream_of(bench: &mut Bench) -> StreamSetting {
     bench.unit().settings().stream
 }
 
+// B-030
 #[test]
 fn power_up_prints_the_banner_and_then_the_menu() {
     let mut bench = Bench::new(setup(flash_with(&old_program())));
@@ -62,6 +63,7 @@ fn power_up_prints_the_banner_and_then_the_menu() {
     );
 }
 
+// B-181
 #[test]
 fn every_line_ends_with_cr_lf() {
     let mut bench = Bench::at_menu();
@@ -75,6 +77,7 @@ fn every_line_ends_with_cr_lf() {
     assert_eq!((text.matches('\r').count(), text.matches('\n').count()), (returns, returns));
 }
 
+// B-182, B-183, B-184, B-198
 #[test]
 fn m_prints_the_menu_again_in_either_case_and_other_keys_do_nothing() {
     let mut bench = Bench::at_menu();
@@ -94,6 +97,7 @@ fn m_prints_the_menu_again_in_either_case_and_other_keys_do_nothing() {
     }
 }
 
+// B-190
 #[test]
 fn the_stream_is_switched_on_with_two_questions_and_off_with_none() {
     for (toggle, choice, source) in [(b't', b'f', Source::FieldValue), (b'T', b'P', Source::ProcessValue)] {
@@ -142,6 +146,7 @@ fn both_limits_of_the_repetition_rate_are_taken() {
     }
 }
 
+// B-192, B-193, B-194, B-195
 #[test]
 fn rows_have_the_manuals_widths_in_every_condition() {
     let mut bench = Bench::at_menu();
@@ -166,6 +171,7 @@ fn rows_have_the_manuals_widths_in_every_condition() {
     assert_eq!(readings[2..4], [Reading::Open, Reading::Disabled]);
 }
 
+// B-196, B-199, B-022
 #[test]
 fn rows_come_at_the_set_rate_and_not_before_the_first_valid_data() {
     let mut bench = Bench::at_menu();
@@ -177,6 +183,7 @@ fn rows_come_at_the_set_rate_and_not_before_the_first_valid_data() {
     assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 500), "{times:?}");
 }
 
+// B-060
 #[test]
 fn rows_repeat_the_newest_scan_and_a_scan_comes_every_200_ms() {
     let mut bench = Bench::at_menu();
@@ -206,6 +213,7 @@ fn a_line_that_is_too_slow_loses_whole_rows() {
     assert!(menu.contains("V - View Object Dictionary\r\n  D - Default"), "the menu comes whole: {menu}");
 }
 
+// B-191, B-197, B-157
 #[test]
 fn the_stream_comes_back_after_a_power_cycle_and_diagnostics_do_not() {
     let mut bench = Bench::at_menu();
@@ -254,6 +262,7 @@ fn stream_and_diagnostics_pause_while_something_is_asked_or_shown() {
     }
 }
 
+// B-197
 #[test]
 fn diagnostics_repeat_every_second_until_stopped() {
     for key in [b"s", b"S"] {
@@ -276,6 +285,7 @@ fn diagnostics_repeat_every_second_until_stopped() {
     }
 }
 
+// B-188, B-156
 #[test]
 fn yes_restores_the_defaults_and_resets() {
     for key in [b"d", b"D"] {
@@ -294,6 +304,7 @@ fn yes_restores_the_defaults_and_resets() {
     }
 }
 
+// B-189
 #[test]
 fn any_other_answer_leaves_everything_as_it_is() {
     let mut bench = Bench::at_menu();
@@ -307,6 +318,7 @@ fn any_other_answer_leaves_everything_as_it_is() {
     assert!(bench.keys(b"m").contains("Main Menu"));
 }
 
+// B-185, B-183
 #[test]
 fn the_view_shows_pdos_first_and_then_an_object_for_each_enter() {
     for (open, close) in [(b"v", b"x"), (b"V", b"X")] {
@@ -354,6 +366,7 @@ fn the_view_ends_by_itself_and_freezes_the_values_meanwhile() {
     assert!((counts - 12_368.0).abs() < 4.0, "scanning goes on: {counts}");
 }
 
+// B-185
 #[test]
 fn the_view_is_refused_outside_pre_operational() {
     let mut bench = Bench::at_menu();
@@ -368,6 +381,7 @@ fn the_view_is_refused_outside_pre_operational() {
     }
 }
 
+// B-210, B-214
 #[test]
 fn a_wrong_password_leads_back_to_the_menu_without_a_reset() {
     for (key, answer) in [(b'l', &b"axio-2010\r"[..]), (b'L', b"AXIO-2011\r"), (b'l', b"AXIO-2010 \r")] {
@@ -386,6 +400,7 @@ fn a_wrong_password_leads_back_to_the_menu_without_a_reset() {
     }
 }
 
+// B-211
 #[test]
 fn the_right_password_is_never_shown_and_leads_into_the_loader() {
     for key in [b"l", b"L"] {
@@ -403,6 +418,7 @@ fn the_right_password_is_never_shown_and_leads_into_the_loader() {
     }
 }
 
+// B-180, B-127
 #[test]
 fn output_is_paced_at_the_line_rate() {
     let mut bench = Bench::at_menu();
@@ -418,6 +434,7 @@ fn output_is_paced_at_the_line_rate() {
     assert!(moments.windows(2).all(|pair| pair[1].since(pair[0]) <= Duration::from_micros(1_100)));
 }
 
+// B-180
 #[test]
 fn xoff_stops_the_unit_within_a_character_and_xon_loses_nothing_of_the_menu() {
     let mut bench = Bench::at_menu();

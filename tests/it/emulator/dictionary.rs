@@ -16,7 +16,7 @@ fn measuring(name: &str) -> Bench {
     bench
 }
 
-// B-001, B-002, B-004, B-008, B-009, B-1, B-2, B-3, B-6, B-7, B-94, B-93, B-044, B-043, B-040
+// B-001, B-002, B-004, B-008, B-009, B-1, B-2, B-3, B-6, B-7, B-94, B-93, B-044, B-043, B-040, B-67
 #[test]
 fn a_unit_from_the_factory_reads_as_its_manual_prints_it() {
     for name in PRODUCTS {
@@ -71,6 +71,8 @@ fn a_unit_from_the_factory_reads_as_its_manual_prints_it() {
         ("1803:1", 0x4000_04FFu32),
         ("1A01:1", 0x7130_0510),
         ("1A02:0", 3),
+        ("1A02:1", 0x2130_0110),
+        ("1A02:3", 0x2130_0310),
         ("1A03:0", 2),
         ("1A03:2", 0x5001_0020),
         ("1802:5", 1_000),

@@ -99,7 +99,7 @@ fn without_flow_control(text: &str) -> String {
     text.replace(['\x11', '\x13'], "")
 }
 
-/// B-211, B-212, B-213: the prompt, the dots, the first start and the new banner.
+// B-212, B-213
 #[test]
 fn a_whole_program_is_loaded_and_started() {
     let mut bench = in_loader();
@@ -203,7 +203,7 @@ fn erased_flash_is_not_erased_again() {
     assert!(saved.abs_diff(erase * 4) < Duration::from_millis(3), "{saved:?}");
 }
 
-/// B-215, as far as this loader looks.
+// B-215
 #[test]
 fn each_error_has_its_number_and_leads_back_to_the_prompt() {
     let bad_sum = s3(0, &[0; 4]).replace("F6\r", "F7\r");
