@@ -57,6 +57,9 @@ pub const RING: usize = 550;
 /// Erasing one page or sector (public data sheet of the 56F83xx, likely the part).
 pub const ERASE_TIME: Duration = Duration::from_millis(20);
 
+/// Programming one word (public data sheet of the 56F83xx, likely the part).
+pub const PROGRAM_TIME: Duration = Duration::from_micros(20);
+
 /// The longest that erasing all of the program flash can take: page by page, with the smallest pages any part of the
 /// family has. A part with larger sectors, or one that erases in bulk, is quicker.
 pub fn longest_erase(flash: &FlashMap) -> Duration {

@@ -11,7 +11,7 @@ pub mod schema;
 
 pub use complaint::{Complaint, Complaints};
 pub use dictionary::Dictionary;
-pub use loader::{ERASE_TIME, LoaderKind, Pacing, RING, longest_erase};
+pub use loader::{ERASE_TIME, LoaderKind, PROGRAM_TIME, Pacing, RING, longest_erase};
 
 use std::sync::OnceLock;
 

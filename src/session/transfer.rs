@@ -10,7 +10,10 @@
 //! - Generation `g3` has a ring of some 550 characters without an overrun check. It stops us behind every record and lets
 //!   us go on when the ring is empty, so each XOFF with its XON says that one more record has been taken. No more than
 //!   [`WINDOW`] characters are on their way without that, so the ring cannot overflow whatever an adapter shows late; and
-//!   behind the header, while all of the flash is erased, and before the end record nothing is.
+//!   behind the header, while all of the flash is erased, and before the end record nothing is. Should an
+//!   acknowledgement be missing, a record is lost, or its acknowledgement is, or the loader has taken two in one hold, as
+//!   it does if it writes more slowly than the line is. Nobody can say which record it was, so everything is sent once
+//!   more from the header on, one record at a time.
 //!
 //! That the XOFF may be shown late by an adapter (16 ms are 184 characters) does not matter either way: it is awaited,
 //! not reacted to. Which generation a unit has is believed, not known. A loader that stops us behind the header is a g3
@@ -19,7 +22,7 @@
 use std::collections::VecDeque;
 
 use super::transmitter::Transmitter;
-use crate::device::{Pacing, RING, longest_erase};
+use crate::device::{PROGRAM_TIME, Pacing, RING, longest_erase};
 use crate::endpoint::Transmit;
 use crate::image::srecord::{self, Kind, Record};
 use crate::image::{FlashMap, Image};
@@ -48,7 +51,7 @@ pub(super) enum Stall {
     Held,
     /// Nothing has been heard since the record before.
     Silent,
-    /// A record has not been acknowledged, though the loader did so before: it may be lost.
+    /// A record that was alone on its way has not been acknowledged, though the loader did so before: it may be lost.
     Unacknowledged,
 }
 
@@ -76,6 +79,10 @@ pub(super) struct Transfer {
     /// When the last character has left of each record let go and not taken.
     left_at: VecDeque<Instant>,
     pacing: Pacing,
+    /// Characters on their way to a ring at most. None: one record at a time.
+    window: Option<usize>,
+    /// Everything is being sent once more.
+    again: bool,
     /// Since when a loader that stops us behind every record does so. The transmitter's own knowledge will not do: it
     /// takes a header that names a unit, and is echoed, for a unit that starts and has forgotten that it stopped us.
     stopped_since: Option<Instant>,
@@ -122,6 +129,8 @@ impl Transfer {
             bytes_taken: 0,
             left_at: VecDeque::new(),
             pacing,
+            window: Some(WINDOW),
+            again: false,
             stopped_since: None,
             longest_erase: longest_erase(flash),
             crossing: None,
@@ -136,7 +145,12 @@ impl Transfer {
     /// # Errors
     /// If the loader holds us too long, or nobody seems to be there.
     pub(super) fn advance(&mut self, now: Instant, transmitter: &mut Transmitter) -> Result<bool, Stall> {
-        self.begun.get_or_insert(now);
+        if self.begun.is_none() {
+            self.begun = Some(now);
+            // Where a record is written more slowly than it comes, two would be taken in one hold.
+            let writing = PROGRAM_TIME * DATA_WORDS;
+            self.window = (transmitter.time_for(DATA_CHARACTERS) > writing * 2).then_some(WINDOW);
+        }
         self.deadline = None;
         if let Some(since) = transmitter.held_since().or(self.stopped_since) {
             let limit = since + self.longest_hold();
@@ -266,7 +280,8 @@ impl Transfer {
                 let on_their_way: usize = self.records[self.taken..self.sent].iter().map(|sent| sent.text.len()).sum();
                 let is_end = self.sent + 1 == self.records.len();
                 // The header and the first data have to show first that this loader answers.
-                let fits = self.taken >= PROVEN && !is_end && on_their_way + next.text.len() <= WINDOW;
+                let fits = self.window.is_some_and(|window| on_their_way + next.text.len() <= window);
+                let fits = fits && self.taken >= PROVEN && !is_end;
                 (!fits).then(|| left_at + if self.alive { ACKNOWLEDGED } else { SIGN_OF_LIFE })
             }
         }
@@ -297,10 +312,18 @@ impl Transfer {
     fn pass_unheld(&mut self) -> Result<(), Stall> {
         match self.pacing {
             // G1 says nothing behind the header.
-            Pacing::Records if self.taken == 0 => self.pacing = Pacing::Pages,
+            Pacing::Records if self.taken == 0 && !self.again => self.pacing = Pacing::Pages,
             _ if !self.alive => return Err(Stall::Silent),
+            Pacing::Records if self.again => return Err(Stall::Unacknowledged),
             Pacing::Records if self.taken < PROVEN => self.pacing = Pacing::Pages,
-            Pacing::Records => return Err(Stall::Unacknowledged),
+            Pacing::Records => {
+                self.again = true;
+                self.window = None;
+                (self.sent, self.taken, self.bytes_taken) = (0, 0, 0);
+                self.left_at.clear();
+                self.alive = false;
+                return Ok(());
+            }
             Pacing::Pages => {}
         }
         self.crossing = None;
@@ -309,6 +332,11 @@ impl Transfer {
         Ok(())
     }
 }
+
+/// Data words of a record as compilers write them, and its characters with the line end.
+const DATA_WORDS: u32 = 16;
+/// See [`DATA_WORDS`].
+const DATA_CHARACTERS: usize = 79;
 
 /// Records that have to be acknowledged one by one before more than one is on its way: the header, and the first data.
 const PROVEN: usize = 2;

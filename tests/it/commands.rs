@@ -112,6 +112,27 @@ fn an_upload_puts_exactly_the_image_into_flash_and_the_unit_says_the_new_version
 }
 
 #[test]
+fn an_upload_to_a_loader_that_erases_everything_first_says_so_and_ends_well() {
+    let world = World::new();
+    fs::write(world.path("pw"), "AXIO-2010\n").expect("written");
+    let args = ["image", "make", "--product", "axrtd8co", "--version", "2.2.0", "--words", "4000", "--out", "new.S"];
+    assert_eq!(world.run(&args, b"").code, Some(0));
+    let unit = world.start(&["emulate", "axrtd8co", "--link", "u0", "--state", "s0", "--line-rate", "off"]);
+    unit.wait_out("serial: ");
+    let load = ["load", "new.S", "--yes", "--password-file", "pw", "--port", "u0", "--json"];
+    let ran = world.run(&[&load[..], FAST].concat(), b"");
+    assert_eq!(ran.code, Some(0), "{} {}", ran.out, ran.err);
+    let objects = objects(&ran.out);
+    let (verdict, progress) = objects.split_last().expect("objects");
+    assert_eq!((&verdict["verdict"], &verdict["product"]), (&"done".into(), &"AXRTD8CO".into()));
+    assert_eq!((&verdict["version_before"], &verdict["version_after"]), (&"2.1.1".into(), &"2.2.0".into()));
+    for phase in ["enter-loader", "erase", "transfer", "finish", "verify"] {
+        assert!(progress.iter().any(|object| object["phase"] == phase), "{phase}: {}", ran.out);
+    }
+    assert_flash_holds(&world.path("s0/flash.bin"), &world.path("new.S"));
+}
+
+#[test]
 fn an_upload_in_json_is_progress_line_by_line_and_then_the_verdict() {
     let bench = Bench::new();
     let ran = bench.load("new.S", &["--json"]);

@@ -6,13 +6,10 @@
 use std::collections::VecDeque;
 
 use super::super::{Area, Store};
-use crate::device::ERASE_TIME;
+use crate::device::{ERASE_TIME, PROGRAM_TIME};
 use crate::image::FlashMap;
 use crate::rng::Rng;
-use crate::time::{Duration, Instant};
-
-/// Programming one word (public data sheet of the 56F83xx, likely the part).
-pub const PROGRAM_TIME: Duration = Duration::from_micros(20);
+use crate::time::Instant;
 
 /// Content of an erased word.
 const ERASED: u16 = 0xFFFF;
@@ -226,6 +223,7 @@ fn differing(old: &[u16], wanted: &[u16]) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::image::AddressUnit;
+    use crate::time::Duration;
 
     const MAP: FlashMap = FlashMap { address_unit: AddressUnit::Word, program_words: 16, page_words: 8 };
 
