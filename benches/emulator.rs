@@ -3,6 +3,8 @@
 //! Prints ratios against real time, with the goal beside each; `cargo bench --bench emulator`. A ratio says how many
 //! seconds of a unit's life one second of one core computes.
 
+#![allow(clippy::print_stdout, reason = "a benchmark prints its figures")]
+
 use std::time::Instant as WallInstant;
 
 use axcon::device::Product;

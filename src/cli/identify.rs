@@ -1,19 +1,39 @@
 //! `axcon identify`: what is at the other end, and how we know.
 
+use std::ops::ControlFlow;
+
 use serde::Serialize;
 
 use super::Global;
-use super::error::CliError;
+use super::confirm::confirm;
+use super::error::{CliError, Kind};
 use super::output::Output;
-use super::talk::Talk;
-use crate::session::{Command, Facts, Known, Origin, UnitState};
+use super::talk::{Talk, expect_done, no_answer_hints};
+use crate::canopen::ObjectAddress;
+use crate::device::Product;
+use crate::record::Span;
+use crate::session::{Command, Facts, Known, Origin, Outcome, UnitState};
+use crate::time::Duration;
 
 /// Arguments of `axcon identify`.
 ///
 /// The unit is asked with `m`, which prints its menu and changes nothing. A unit that waits in its loader is recognised
 /// too, and takes no harm from the question.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Read product code, serial number and compile date from the object dictionary too; the unit may halt scanning and
+    /// CAN meanwhile.
+    #[arg(long)]
+    deep: bool,
+    /// Wait for the power-up messages: a unit prints its version only then. Switch its power off and on.
+    #[arg(long, conflicts_with = "deep")]
+    wait: bool,
+}
+
+/// How long somebody may take to switch the power off and on.
+const POWER_CYCLE: Duration = Duration::from_secs(120);
+/// How long the rest of the power-up messages may take behind product and version.
+const REST_OF_BANNER: Duration = Duration::from_millis(1500);
 
 #[derive(Serialize)]
 struct Object<'a> {
@@ -43,14 +63,31 @@ struct Sources {
 ///
 /// # Errors
 /// If the link does not open, or nothing we know answers.
-pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    if args.deep {
+        confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
+    }
     let mut talk = Talk::open(global, output)?;
-    talk.ask(Command::Identify)?;
-    let facts = talk.session().facts().clone();
+    if args.wait {
+        wait_for_banner(&mut talk, output)?;
+    } else {
+        talk.ask(Command::Identify)?;
+    }
+    let deep = match talk.session().facts().state {
+        UnitState::Application if args.deep => Some(Deep::read(&mut talk)?),
+        _ => None,
+    };
+    let mut facts = talk.session().facts().clone();
+    let deep = deep.unwrap_or_default();
+    if facts.product.is_none()
+        && let Some((name, span)) = deep.product.clone()
+    {
+        facts.product = Some(Known { value: name, origin: Origin::Dictionary, span });
+    }
     if output.json {
-        output.object(&object(&facts))?;
+        output.object(&object(&facts, &deep))?;
     } else if matches!(facts.state, UnitState::Application | UnitState::Loader) {
-        output.data(text(&facts).as_bytes())?;
+        output.data((text(&facts) + &deep.text()).as_bytes())?;
     }
     let result = match facts.state {
         UnitState::Application | UnitState::Loader => Ok(()),
@@ -58,6 +95,81 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
     };
     talk.close(output);
     result
+}
+
+/// What only the object dictionary says.
+#[derive(Clone, Debug, Default)]
+struct Deep {
+    /// Product by its code, 1018h sub-index 2, and where it was read.
+    product: Option<(String, Span)>,
+    serial_number: Option<u32>,
+    revision: Option<u32>,
+    /// Day, month and year, their decimal digits in hexadecimal ones (1020h).
+    compiled: Option<u32>,
+}
+
+impl Deep {
+    fn read(talk: &mut Talk) -> Result<Self, CliError> {
+        let reading = match talk.ask(Command::ReadDictionary)? {
+            Outcome::DictionaryRead(reading) => reading,
+            outcome => {
+                return expect_done(outcome)
+                    .and_then(|()| Err(CliError::message(Kind::Failed, "the reading ended without a result")));
+            }
+        };
+        let entry = |index, sub| reading.entries.iter().find(|entry| entry.at == ObjectAddress::new(index, sub));
+        let bits = |index, sub| entry(index, sub)?.value?.as_integer().and_then(|bits| u32::try_from(bits).ok());
+        let code = bits(0x1018, 2);
+        let product = Product::all().iter().find(|product| Some(product.can.product_code) == code);
+        let span = entry(0x1018, 2).map(|entry| entry.span).unwrap_or_default();
+        Ok(Deep {
+            product: product.map(|product| (product.name.clone(), span)),
+            serial_number: bits(0x1018, 4),
+            revision: bits(0x1018, 3),
+            compiled: bits(0x1020, 1),
+        })
+    }
+
+    fn compiled(&self) -> Option<String> {
+        let digits = format!("{:08x}", self.compiled?);
+        Some(format!("{}-{}-{}", &digits[4..], &digits[2..4], &digits[..2]))
+    }
+
+    fn text(&self) -> String {
+        let mut lines = String::new();
+        for (name, value) in [
+            ("serial", self.serial_number.map(|number| format!("{number} ({number:08X}h)"))),
+            ("revision", self.revision.map(|revision| format!("{revision:08X}h"))),
+            ("compiled", self.compiled()),
+        ] {
+            if let Some(value) = value {
+                lines.push_str(&format!("{name:<10} {value}  (from the object dictionary)\n"));
+            }
+        }
+        lines
+    }
+}
+
+/// Listens until the unit has said product and version at its start.
+fn wait_for_banner(talk: &mut Talk, output: &mut Output) -> Result<(), CliError> {
+    output.remark("axcon: switch the unit's power off and on; it says its version only then");
+    let until = talk.now() + POWER_CYCLE;
+    let mut said = false;
+    let undisturbed = talk.listen(until, |session, _| {
+        let facts = session.facts();
+        said = facts.product.is_some() && facts.version.is_some() || facts.state == UnitState::Loader;
+        Ok(if said { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    })?;
+    if !undisturbed {
+        return Err(CliError::message(Kind::Interrupted, "interrupted"));
+    }
+    if !said {
+        let message = format!("no power-up messages within {} s", POWER_CYCLE.as_secs());
+        return Err(no_answer_hints(CliError::message(Kind::NoAnswer, message)));
+    }
+    let until = talk.now() + REST_OF_BANNER;
+    talk.listen(until, |_, _| Ok(ControlFlow::Continue(())))?;
+    Ok(())
 }
 
 /// The state as JSON names it.
@@ -70,13 +182,13 @@ pub fn state_name(state: UnitState) -> &'static str {
     }
 }
 
-fn object(facts: &Facts) -> Object<'_> {
+fn object<'a>(facts: &'a Facts, deep: &Deep) -> Object<'a> {
     Object {
         schema: "axcon.identify/1",
         state: state_name(facts.state),
         product: facts.product.as_ref().map(|known| known.value.as_str()),
         version: facts.version.as_ref().map(|known| known.value.to_string()),
-        serial_number: None,
+        serial_number: deep.serial_number,
         node_id: value(&facts.node_id),
         can_kbps: value(&facts.can_kbps),
         nmt_state: facts.nmt_state.as_ref().map(|known| known.value.as_str()),
@@ -126,5 +238,6 @@ fn source<T>(known: &Option<Known<T>>) -> Option<&'static str> {
     known.as_ref().map(|known| match known.origin {
         Origin::Banner => "banner",
         Origin::Menu => "menu",
+        Origin::Dictionary => "object dictionary",
     })
 }

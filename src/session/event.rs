@@ -234,6 +234,8 @@ pub enum Origin {
     Banner,
     /// The main menu, printed on request.
     Menu,
+    /// The object dictionary.
+    Dictionary,
 }
 
 /// Who is talking at the other end.

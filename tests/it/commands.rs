@@ -456,3 +456,28 @@ fn diagnostics_and_defaults_are_commands_of_their_own() {
     unit.input(b"read 6126:1\n");
     unit.wait_out("6126:01 = 16.0");
 }
+
+#[test]
+fn a_deep_look_says_the_serial_number_and_a_wait_hears_the_banner() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1", "--line-rate", "off", "--seed", "7"]);
+    unit.wait_out("serial: ");
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    unit.input(b"read 1018:4\n");
+    let said = unit.wait_out("1018:04 = ");
+    let serial: u32 = said.rsplit("= ").next().and_then(|text| text.trim().parse().ok()).expect("a number");
+    let unasked = world.run(&["identify", "--deep", "--port", "u1"], b"");
+    assert_eq!(unasked.code, Some(2), "{}", unasked.err);
+    let ran = world.run(&["identify", "--deep", "--yes", "--json", "--port", "u1"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let identity = json(&ran.out);
+    assert_eq!((&identity["serial_number"], &identity["product"]), (&serial.into(), &"AXTC4CO".into()));
+    let waiting = world.start(&["identify", "--wait", "--json", "--port", "u1"]);
+    waiting.wait_err("switch the unit's power off and on");
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    unit.input(b"power cycle 0.1\n");
+    let ran = waiting.wait();
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let identity = json(&ran.out);
+    assert_eq!((&identity["version"], &identity["sources"]["version"]), (&"1.1.0".into(), &"banner".into()));
+}

@@ -197,6 +197,7 @@ fn known<T>(fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -> Span<'stati
             let origin = match known.origin {
                 Origin::Banner => "banner",
                 Origin::Menu => "menu",
+                Origin::Dictionary => "object dictionary",
             };
             Span::raw(format!("{} ({origin})", show(&known.value)))
         }
