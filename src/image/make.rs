@@ -60,7 +60,7 @@ pub fn flaws() -> impl Iterator<Item = DefectId> {
         .filter(|id| !matches!(id, DefectId::TooLarge | DefectId::WrongProduct | DefectId::FileName))
 }
 
-/// The usual size of a product's sample image: three quarters of its flash, but no more than [`MOST_USUAL_WORDS`].
+/// The usual size of a product's sample image: three quarters of its flash, but no more than 80 K words.
 pub fn usual_words(target: &Target) -> u32 {
     (target.flash.program_words / 4 * 3).min(MOST_USUAL_WORDS)
 }
