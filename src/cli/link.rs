@@ -17,7 +17,16 @@ use crate::host::recorder::Plan;
 /// If the name makes no sense, or none was given and there is not exactly one candidate.
 pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
     match &global.port {
-        Some(text) => text.parse().map_err(spec_error),
+        Some(text) => {
+            let spec: LinkSpec = text.parse().map_err(spec_error)?;
+            match &spec {
+                // What is no file may be an adapter's serial number: it stays the same, whatever the port is called today.
+                LinkSpec::Serial(path) if !path.exists() => {
+                    Ok(by_serial_number(&ports::list().unwrap_or_default(), text)?.unwrap_or(spec))
+                }
+                LinkSpec::Serial(_) | LinkSpec::Emulated(_) => Ok(spec),
+            }
+        }
         None => only_port(ports::list().map_err(|error| CliError::new(Kind::PortNone, error))?),
     }
 }
@@ -113,6 +122,22 @@ pub fn pump_error(error: PumpError) -> CliError {
     }
 }
 
+/// The port of the USB adapter with this serial number; `usb:` may stand before it.
+fn by_serial_number(found: &[Port], text: &str) -> Result<Option<LinkSpec>, CliError> {
+    let wanted = text.strip_prefix("usb:").unwrap_or(text);
+    let number = |port: &Port| port.usb.as_ref().and_then(|usb| usb.serial_number.clone());
+    let ports: Vec<&Port> = found.iter().filter(|port| number(port).as_deref() == Some(wanted)).collect();
+    match ports.as_slice() {
+        [] => Ok(None),
+        [only] => Ok(Some(LinkSpec::Serial(only.path.clone().into()))),
+        several => {
+            let names = several.iter().map(|port| port.path.clone()).collect::<Vec<_>>().join(", ");
+            let message = format!("several ports have the serial number {wanted}: {names}");
+            Err(CliError::message(Kind::PortAmbiguous, message).hint("name one of them with --port"))
+        }
+    }
+}
+
 fn only_port(found: Vec<Port>) -> Result<LinkSpec, CliError> {
     let names = |ports: &[&Port]| ports.iter().map(|port| port.path.clone()).collect::<Vec<_>>().join(", ");
     let usb: Vec<&Port> = found.iter().filter(|port| port.kind == ports::Kind::Usb).collect();
@@ -158,6 +183,26 @@ mod tests {
         assert_eq!(error.kind, Kind::PortNone);
         assert_eq!(error.hints[0], "there are others: /dev/ttyS0; name one with --port");
         assert_eq!(only_port(Vec::new()).expect_err("none").kind, Kind::PortNone);
+    }
+
+    #[test]
+    fn an_adapter_is_found_by_its_serial_number() {
+        let adapter = |path: &str, number: &str| {
+            let serial_number = Some(number.to_owned());
+            let usb = ports::Usb { vid: 0x0403, pid: 0x6001, serial_number, manufacturer: None, product: None };
+            Port { usb: Some(usb), ..port(path, ports::Kind::Usb) }
+        };
+        let found = [adapter("/dev/ttyUSB0", "A1"), adapter("/dev/ttyUSB1", "B2"), adapter("/dev/ttyUSB2", "B2")];
+        for text in ["A1", "usb:A1"] {
+            let spec = by_serial_number(&found, text).expect("one of them");
+            assert_eq!(spec, Some(LinkSpec::Serial("/dev/ttyUSB0".into())), "{text}");
+        }
+        assert_eq!(by_serial_number(&found, "/dev/ttyUSB9").expect("none"), None);
+        let error = by_serial_number(&found, "B2").expect_err("two of them");
+        assert_eq!(
+            (error.kind, error.to_string().as_str()),
+            (Kind::PortAmbiguous, "several ports have the serial number B2: /dev/ttyUSB1, /dev/ttyUSB2")
+        );
     }
 
     #[test]

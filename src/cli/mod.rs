@@ -42,7 +42,8 @@ struct Cli {
 /// What every command understands.
 #[derive(Debug, Clone, Args)]
 pub struct Global {
-    /// Where the unit is: a serial port (/dev/ttyUSB0, COM3) or an emulated unit (emu:axtc4co).
+    /// Where the unit is: a serial port (/dev/ttyUSB0, COM3, or its USB adapter's serial number) or an emulated unit
+    /// (emu:axtc4co).
     #[arg(long, value_name = "LINK", env = "AXCON_PORT", global = true)]
     pub port: Option<String>,
     /// Line rate in baud; the units have 115200.

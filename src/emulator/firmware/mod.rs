@@ -447,7 +447,7 @@ impl Firmware {
     /// dropped whole.
     fn repeat(&mut self, board: &mut Board<'_>, text: &str) {
         if matches!(self.dialogue, Dialogue::Menu) && board.uart.backlog() + text.len() <= ROW_BUFFER {
-            self.say(board, text);
+            board.uart.send(board.now, text.as_bytes());
         }
     }
 
