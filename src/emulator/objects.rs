@@ -65,12 +65,14 @@ impl Objects {
     }
 
     /// As the unit starts: the factory's values, and over them what is kept, taken as a whole (errata E-29). Entries
-    /// that this product does not have are left out.
+    /// that this product does not have, and values that none of its versions takes, are left out.
     pub fn with_saved(product: &'static Product, node_id: u8, saved: &Saved) -> Self {
         let mut objects = Objects::factory(product, node_id);
         for &(at, value) in saved {
-            if let Some(place) = objects.place(at)
-                && objects.values[place].1.data_type() == value.data_type()
+            if let Ok((place, entry)) = objects.find(at)
+                && entry.data_type == value.data_type()
+                && entry.limits.admit_alone(value)
+                && value.as_f64().is_finite()
             {
                 objects.values[place].1 = value;
             }
@@ -608,6 +610,9 @@ mod tests {
             (at(0x3000, 1), Value::Unsigned16(2)),
             (at(0x6126, 1), Value::Unsigned8(1)),
             (at(0x6126, 3), Value::Real32(2.0)),
+            (at(0x6110, 1), Value::Unsigned16(3)),
+            (at(0x6126, 4), Value::NOT_A_NUMBER),
+            (at(0x6127, 4), Value::Real32(1e9)),
         ];
         let objects = Objects::with_saved(product("AXTC4CO"), 127, &kept);
         assert_eq!(objects.deviations(127), [(at(0x6126, 3), Value::Real32(2.0))]);
