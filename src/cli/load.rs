@@ -85,7 +85,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     plan(&report, &image, &name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
     if args.dry_run {
         talk.close(output);
-        return Ok(());
+        return check_product(&image, &facts);
     }
     if !global.yes && !agreed(output)? {
         talk.close(output);
@@ -114,6 +114,19 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let result = conclude(&result, lost, &report, output);
     talk.close(output);
     result
+}
+
+/// What the upload itself would say of an image for another product.
+fn check_product(image: &CheckedImage, facts: &Facts) -> Result<(), CliError> {
+    let made_for = image.identity().map(|identity| identity.product.as_str());
+    let unit = facts.product.as_ref().map(|known| known.value.as_str());
+    match made_for.zip(unit) {
+        Some((made_for, unit)) if !made_for.eq_ignore_ascii_case(unit) => {
+            let message = format!("the image is for {made_for}, the unit is an {unit}: it would be refused");
+            Err(CliError::message(Kind::ImageRefused, message).hint("use an image that is made for this unit"))
+        }
+        Some(_) | None => Ok(()),
+    }
 }
 
 /// The journal's part in an upload on one port.

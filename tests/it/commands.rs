@@ -481,3 +481,13 @@ fn a_deep_look_says_the_serial_number_and_a_wait_hears_the_banner() {
     let identity = json(&ran.out);
     assert_eq!((&identity["version"], &identity["sources"]["version"]), (&"1.1.0".into(), &"banner".into()));
 }
+
+#[test]
+fn a_dry_run_says_that_the_image_is_for_another_unit() {
+    let world = World::new();
+    let image = Path::new(env!("CARGO_MANIFEST_DIR")).join("firmware_images/AXRTD8CO_V2.2.0.elf.S");
+    let image = image.display().to_string();
+    let ran = world.run(&["load", "--dry-run", "--port", "emu:axtc4co", &image], b"");
+    assert_eq!(ran.code, Some(5), "{}", ran.err);
+    assert!(ran.err.contains("the image is for AXRTD8CO, the unit is an AXTC4CO"), "{}", ran.err);
+}
