@@ -13,6 +13,7 @@ use super::Input;
 use super::clock::Clock;
 use super::ports::{self, Holder};
 use crate::device::Product;
+use crate::record::Adapter;
 use crate::time::Duration;
 
 #[cfg(windows)]
@@ -184,6 +185,7 @@ pub struct Connection {
     port: String,
     settings: String,
     driver: Option<String>,
+    adapter: Option<Adapter>,
 }
 
 /// Bytes could not be queued.
@@ -220,8 +222,10 @@ impl Connection {
         match spec {
             LinkSpec::Serial(path) => {
                 let (lines, outgoing) = serial::open(path, options, clock, inputs)?;
-                let driver = ports::describe(path).driver;
-                Ok(Connection::new(spec, options, lines, outgoing, driver))
+                let port = ports::describe(path);
+                let mut connection = Connection::new(spec, options, lines, outgoing, port.driver);
+                connection.adapter = port.usb.map(Adapter::from);
+                Ok(connection)
             }
             LinkSpec::Emulated(product) => Connection::emulated(spec, product, options, clock, inputs),
         }
@@ -283,6 +287,7 @@ impl Connection {
             port: spec.to_string(),
             settings: format!("{} 8N1", options.baud),
             driver,
+            adapter: None,
         }
     }
 
@@ -311,6 +316,11 @@ impl Connection {
     /// Driver of the port, where known.
     pub fn driver(&self) -> Option<&str> {
         self.driver.as_deref()
+    }
+
+    /// The USB adapter, where it is one.
+    pub fn adapter(&self) -> Option<&Adapter> {
+        self.adapter.as_ref()
     }
 
     /// The emulated unit at the other end, if it lives in this process.

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serialport::SerialPortType;
 
+use crate::record::Adapter;
+
 /// A serial port of this computer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Port {
@@ -55,6 +57,18 @@ pub struct Usb {
     pub manufacturer: Option<String>,
     /// Product, in its own words.
     pub product: Option<String>,
+}
+
+impl From<Usb> for Adapter {
+    fn from(usb: Usb) -> Self {
+        Adapter {
+            vid: format!("{:04x}", usb.vid),
+            pid: format!("{:04x}", usb.pid),
+            serial_number: usb.serial_number,
+            manufacturer: usb.manufacturer,
+            product: usb.product,
+        }
+    }
 }
 
 /// A process that has a port open.

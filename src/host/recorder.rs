@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::clock::Clock;
 use super::link::Connection;
 use crate::endpoint::Secrecy;
-use crate::record::{Cast, Direction, Header, Record};
+use crate::record::{Cast, Direction, Header, Record, Tally};
 use crate::time::Instant;
 
 /// Where a session is recorded.
@@ -24,7 +24,7 @@ pub enum Plan {
 }
 
 /// The recording of one session.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Recorder {
     open: Option<Open>,
     warning: Option<String>,
@@ -38,6 +38,9 @@ struct Open {
     path: PathBuf,
     /// What makes the next part, for recordings with a limit.
     series: Option<Series>,
+    tally: Tally,
+    /// The latest moment that was recorded.
+    last: Instant,
 }
 
 #[derive(Debug)]
@@ -72,34 +75,35 @@ impl Recorder {
             port: connection.port().to_owned(),
             settings: connection.settings().to_owned(),
             driver: connection.driver().map(str::to_owned),
+            adapter: connection.adapter().cloned(),
+            part: 1,
         };
         Recorder::begin(plan, header, &stem(clock, connection.port()))
     }
 
     /// Records nothing.
     pub fn nothing() -> Self {
-        Recorder { open: None, warning: None, followed: 0 }
+        Recorder::default()
     }
 
     fn begin(plan: &Plan, header: Header, stem: &str) -> Self {
         let opened = match plan {
             Plan::Nothing => return Recorder::nothing(),
-            Plan::File(path) => part(path, &header).map(|cast| Open { cast, path: path.clone(), series: None }),
+            Plan::File(path) => part(path, &header).map(|cast| Open::new(cast, path.clone(), None)),
             Plan::Unasked => folder()
                 .ok_or_else(|| io::Error::other("there is no home directory"))
                 .and_then(|folder| series(folder, stem, header, LIMITS)),
         };
         match opened {
-            Ok(open) => Recorder { open: Some(open), warning: None, followed: 0 },
+            Ok(open) => Recorder { open: Some(open), ..Recorder::default() },
             Err(error) => {
                 let place = match plan {
                     Plan::File(path) => path.display().to_string(),
                     Plan::Unasked | Plan::Nothing => folder().unwrap_or_default().display().to_string(),
                 };
                 Recorder {
-                    open: None,
                     warning: Some(format!("this session is not recorded: {place}: {error}")),
-                    followed: 0,
+                    ..Recorder::default()
                 }
             }
         }
@@ -114,11 +118,29 @@ impl Recorder {
         }
     }
 
+    /// Puts a remark into the recording.
+    pub fn mark(&mut self, at: Instant, text: &str) {
+        self.write(at, |open| open.cast.mark(at, text));
+    }
+
+    /// The cable is back: what follows from now on is another record, of the same conversation.
+    pub fn resume(&mut self, at: Instant, text: &str) {
+        self.followed = 0;
+        self.mark(at, text);
+    }
+
     /// Records bytes; secret ones by their number only.
     fn push(&mut self, at: Instant, direction: Direction, secrecy: Secrecy, bytes: &[u8]) {
+        self.write(at, |open| {
+            open.tally.count(at, direction, bytes);
+            open.cast.push(at, direction, secrecy, bytes)
+        });
+    }
+
+    fn write(&mut self, at: Instant, write: impl FnOnce(&mut Open) -> io::Result<()>) {
         let Some(open) = &mut self.open else { return };
-        let pushed = open.cast.push(at, direction, secrecy, bytes).and_then(|()| open.next_part_if_full());
-        if let Err(error) = pushed {
+        open.last = open.last.max(at);
+        if let Err(error) = write(open).and_then(|()| open.next_part_if_full()) {
             self.warning = Some(format!("the recording ends here: {}: {error}", open.path.display()));
             self.open = None;
         }
@@ -135,7 +157,18 @@ impl Recorder {
     }
 }
 
+impl Drop for Open {
+    /// The numbers of the session stand at its end; those of a killed one can be counted from its bytes.
+    fn drop(&mut self) {
+        let _ = self.cast.mark(self.last, &format!("end: {}", self.tally.summary(self.last)));
+    }
+}
+
 impl Open {
+    fn new(cast: Cast<File>, path: PathBuf, series: Option<Series>) -> Self {
+        Open { cast, path, series, tally: Tally::default(), last: Instant::ZERO }
+    }
+
     fn next_part_if_full(&mut self) -> io::Result<()> {
         let Some(series) = &mut self.series else { return Ok(()) };
         if self.cast.written() >= series.limits.part_bytes {
@@ -149,12 +182,14 @@ impl Open {
 impl Series {
     fn open(&self) -> io::Result<(Cast<File>, PathBuf)> {
         make_room(&self.folder, self.limits)?;
+        // The parts of a session stand in their order behind its first one, whose name ends here.
         let name = match self.part {
             1 => format!("{}{ENDING}", self.stem),
-            part => format!("{}-{part}{ENDING}", self.stem),
+            part => format!("{}.p{part:05}{ENDING}", self.stem),
         };
         let path = self.folder.join(name);
-        Ok((part(&path, &self.header)?, path))
+        let header = Header { part: self.part, ..self.header.clone() };
+        Ok((part(&path, &header)?, path))
     }
 }
 
@@ -162,7 +197,7 @@ fn series(folder: PathBuf, stem: &str, header: Header, limits: Limits) -> io::Re
     fs::create_dir_all(&folder)?;
     let series = Series { folder, stem: stem.to_owned(), part: 1, header, limits };
     let (cast, path) = series.open()?;
-    Ok(Open { cast, path, series: Some(series) })
+    Ok(Open::new(cast, path, Some(series)))
 }
 
 fn part(path: &Path, header: &Header) -> io::Result<Cast<File>> {
@@ -235,7 +270,7 @@ mod tests {
     use super::*;
 
     fn header() -> Header {
-        Header { unix_seconds: 0, port: "u0".into(), settings: "115200 8N1".into(), driver: None }
+        Header { port: "u0".into(), settings: "115200 8N1".into(), part: 1, ..Header::default() }
     }
 
     fn names(folder: &Path) -> Vec<String> {
@@ -268,7 +303,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let limits = Limits { bytes: 2_000, files: 100, part_bytes: 500 };
         let open = series(folder.path().to_owned(), "20260131T120000Z-u0-7", header(), limits).expect("opened");
-        let mut recorder = Recorder { open: Some(open), warning: None, followed: 0 };
+        let mut recorder = Recorder { open: Some(open), ..Recorder::default() };
         for round in 0..100 {
             recorder.push(Instant::from_millis(round), Direction::FromUnit, Secrecy::Open, &[b'x'; 50]);
         }
@@ -278,7 +313,15 @@ mod tests {
             .map(|e| e.expect("entry").metadata().expect("size").len())
             .sum();
         assert!(sizes <= 2_200, "{sizes}");
-        assert!(names(folder.path()).len() >= 2);
+        let kept = names(folder.path());
+        assert!(kept.len() >= 2, "{kept:?}");
+        // The last parts are there, and the first is not.
+        let number = |name: &String| name.split(".p").nth(1).and_then(|rest| rest[..5].parse::<u32>().ok());
+        let numbers: Vec<u32> = kept.iter().map(|name| number(name).expect("a later part")).collect();
+        assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "{numbers:?}");
+        drop(recorder);
+        let last = std::fs::read_to_string(folder.path().join(&kept[kept.len() - 1])).expect("the last part");
+        assert!(last.contains("\"part\":") && last.contains("end: 5000 bytes received"), "{last}");
     }
 
     #[test]

@@ -3,9 +3,13 @@
 //! Structure is an overlay: events point into this record by [`Span`], and what no recogniser understood lies here all
 //! the same. The record in memory keeps the newest part only; the file on disk keeps the rest.
 
-mod file;
+mod cast;
+mod reader;
+mod tally;
 
-pub use file::{Cast, Header};
+pub use cast::{Adapter, Cast, Header};
+pub use reader::{Ending, LONGEST_LINE, Piece, ReadError, Reader};
+pub use tally::Tally;
 
 use std::collections::VecDeque;
 

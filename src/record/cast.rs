@@ -1,19 +1,19 @@
-//! The recording on disk: asciicast v2, `"o"` from the unit and `"i"` to it.
+//! The recording as a file: asciicast v2, `"o"` from the unit, `"i"` to it, `"m"` for remarks.
 //!
 //! The format is lines of JSON, so a recording is readable up to its last complete line whatever killed the writer,
 //! and common players show it. An event holds text, the line holds bytes: every byte becomes the character of the
-//! same number (Latin-1), which loses nothing. The header says so in `axcon.encoding`.
+//! same number (Latin-1), which loses nothing. The header says so in `axcon.encoding`. [`super::Reader`] reads it back.
 
 use std::io::{self, Write};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Direction, REDACTED};
 use crate::endpoint::Secrecy;
 use crate::time::Instant;
 
 /// What stands at the head of a recording.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
     /// When the recording began, in seconds since 1970.
     pub unix_seconds: i64,
@@ -23,6 +23,25 @@ pub struct Header {
     pub settings: String,
     /// Driver or kind of the port, where known.
     pub driver: Option<String>,
+    /// The USB adapter, where it is one.
+    pub adapter: Option<Adapter>,
+    /// Which part of a long session this is, counted from 1.
+    pub part: u32,
+}
+
+/// What a USB adapter says about itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Adapter {
+    /// Vendor, four hexadecimal digits.
+    pub vid: String,
+    /// Product, four hexadecimal digits.
+    pub pid: String,
+    /// Serial number, where it has one.
+    pub serial_number: Option<String>,
+    /// Maker, in its own words.
+    pub manufacturer: Option<String>,
+    /// Product, in its own words.
+    pub product: Option<String>,
 }
 
 /// A recording being written. Each event is one `write`: a killed process loses nothing it had recorded.
@@ -32,6 +51,11 @@ pub struct Cast<W> {
     begun: Option<Instant>,
     written: u64,
 }
+
+/// What the recordings of this program are called in their header.
+pub(super) const SCHEMA: &str = "axcon.recording/1";
+/// How bytes become text in them.
+pub(super) const LATIN_1: &str = "latin-1";
 
 #[derive(Serialize)]
 struct HeaderLine<'a> {
@@ -51,6 +75,8 @@ struct Details<'a> {
     port: &'a str,
     settings: &'a str,
     driver: Option<&'a str>,
+    adapter: Option<&'a Adapter>,
+    part: u32,
 }
 
 impl<W: Write> Cast<W> {
@@ -67,12 +93,14 @@ impl<W: Write> Cast<W> {
             timestamp: header.unix_seconds,
             title: format!("axcon {}", header.port),
             axcon: Details {
-                schema: "axcon.recording/1",
-                encoding: "latin-1",
+                schema: SCHEMA,
+                encoding: LATIN_1,
                 program: concat!("axcon ", env!("CARGO_PKG_VERSION")),
                 port: &header.port,
                 settings: &header.settings,
                 driver: header.driver.as_deref(),
+                adapter: header.adapter.as_ref(),
+                part: header.part,
             },
         })?;
         Ok(cast)
@@ -83,7 +111,6 @@ impl<W: Write> Cast<W> {
     /// # Errors
     /// If writing fails; the caller says so and goes on without a recording.
     pub fn push(&mut self, at: Instant, direction: Direction, secrecy: Secrecy, bytes: &[u8]) -> io::Result<()> {
-        let begun = *self.begun.get_or_insert(at);
         let code = match direction {
             Direction::FromUnit => "o",
             Direction::ToUnit => "i",
@@ -92,12 +119,32 @@ impl<W: Write> Cast<W> {
             Secrecy::Open => bytes.iter().map(|&byte| char::from(byte)).collect(),
             Secrecy::Secret => bytes.iter().map(|_| char::from(REDACTED)).collect(),
         };
-        self.line(&(at.since(begun).as_secs_f64(), code, text))
+        self.event(at, code, &text)
+    }
+
+    /// Appends a remark, which players show as a marker: that the cable was away, how much has gone over it.
+    ///
+    /// # Errors
+    /// If writing fails.
+    pub fn mark(&mut self, at: Instant, text: &str) -> io::Result<()> {
+        self.event(at, "m", text)
+    }
+
+    /// What it was written to.
+    pub fn into_inner(self) -> W {
+        self.to
     }
 
     /// Bytes written so far, for the size limit.
     pub fn written(&self) -> u64 {
         self.written
+    }
+
+    fn event(&mut self, at: Instant, code: &str, text: &str) -> io::Result<()> {
+        let begun = *self.begun.get_or_insert(at);
+        // Six digits: microseconds, as the format has them; a character takes 87.
+        let seconds = (at.since(begun).as_secs_f64() * 1e6).round() / 1e6;
+        self.line(&(seconds, code, text))
     }
 
     fn line(&mut self, value: &impl Serialize) -> io::Result<()> {
@@ -114,11 +161,12 @@ mod tests {
 
     #[test]
     fn every_byte_survives_and_the_password_does_not() {
-        let header = Header { unix_seconds: 0, port: "u0".into(), settings: "115200 8N1".into(), driver: None };
+        let header = Header { port: "u0".into(), settings: "115200 8N1".into(), part: 1, ..Header::default() };
         let mut cast = Cast::begin(Vec::new(), &header).expect("a vector takes everything");
         let all: Vec<u8> = (0..=255).collect();
         cast.push(Instant::from_millis(5), Direction::FromUnit, Secrecy::Open, &all).expect("written");
         cast.push(Instant::from_millis(1505), Direction::ToUnit, Secrecy::Secret, b"AXIO-2010").expect("written");
+        cast.mark(Instant::from_millis(1505), "link lost").expect("written");
         let text = String::from_utf8(cast.to.clone()).expect("JSON is UTF-8");
         assert_eq!(cast.written(), text.len() as u64);
         let lines: Vec<serde_json::Value> =
@@ -128,6 +176,7 @@ mod tests {
             lines[1][2].as_str().expect("text").chars().map(|c| u8::try_from(c).expect("Latin-1")).collect();
         assert_eq!(back, all);
         assert_eq!(lines[2], serde_json::json!([1.5, "i", "*********"]));
+        assert_eq!(lines[3], serde_json::json!([1.5, "m", "link lost"]));
         assert!(!text.contains("AXIO"));
     }
 }
