@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::Global;
 use super::confirm::confirm;
 use super::error::{CliError, Kind};
+use super::link;
 use super::output::Output;
 use super::talk::{Talk, expect_done};
 use crate::session::{Command, Outcome};
@@ -29,6 +30,9 @@ struct Object<'a> {
 /// # Errors
 /// If nobody said yes, no unit answers, or its banner does not come back.
 pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    if link::is_recording(global) {
+        return Err(link::read_only("restore its defaults"));
+    }
     confirm("All parameters go back to their factory values and the unit resets itself", global, output)?;
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;

@@ -51,7 +51,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let json = args.format.unwrap_or(if output.json { Format::Json } else { Format::Text }) == Format::Json;
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
-    let clock = talk.clock();
+    let calendar = talk.calendar();
     let mut written = Ok(());
     let ended = talk.run(Command::Diagnostics { pages: args.count }, |_, event| {
         let Event::Page { at, lines } = event else { return Ok(()) };
@@ -66,7 +66,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
                 value: quantity.value,
                 unit: quantity.unit,
             });
-            let time = clock.wall(*at).strftime("%Y-%m-%dT%H:%M:%S%.3fZ").to_string();
+            let time = calendar.text(*at);
             output.object(&PageObject { schema: "axcon.diagnostics/1", time, values: values.collect(), lines })
         } else {
             output.data(format!("{}\n\n", lines.join("\n")).as_bytes())

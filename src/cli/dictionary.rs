@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Global;
 use super::confirm::confirm;
 use super::error::{CliError, Kind};
+use super::link;
 use super::output::Output;
 use super::talk::{Ended, Talk, expect_done};
 use crate::canopen::{DataType, ObjectAddress, Value};
@@ -128,7 +129,9 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 }
 
 fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output) -> Result<(), CliError> {
-    confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
+    if !link::is_recording(global) {
+        confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
+    }
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     let ended = talk.run(Command::ReadDictionary, |_, _| Ok(()))?;

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::Global;
 use super::confirm::confirm;
 use super::error::{CliError, Kind};
+use super::link;
 use super::output::Output;
 use super::talk::{Talk, expect_done, no_answer_hints};
 use crate::canopen::ObjectAddress;
@@ -64,16 +65,22 @@ struct Sources {
 /// # Errors
 /// If the link does not open, or nothing we know answers.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
-    if args.deep {
+    if args.deep && !link::is_recording(global) {
         confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
     }
     let mut talk = Talk::open(global, output)?;
-    if args.wait {
+    if talk.is_recorded() {
+        // Read below, in one go with everything else.
+        if !args.deep {
+            talk.hear_out()?;
+        }
+    } else if args.wait {
         wait_for_banner(&mut talk, output)?;
     } else {
         talk.ask(Command::Identify)?;
     }
     let deep = match talk.session().facts().state {
+        _ if args.deep && talk.is_recorded() => Some(Deep::read(&mut talk)?),
         UnitState::Application if args.deep => Some(Deep::read(&mut talk)?),
         _ => None,
     };

@@ -1,5 +1,7 @@
 //! From `--port` to an open link: which port, and what to do when it does not open.
 
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::SyncSender;
 
 use super::Global;
@@ -9,7 +11,10 @@ use crate::host::clock::Clock;
 use crate::host::link::{Cause, Connection, LinkError, LinkSpec, LinkSpecError, Options};
 use crate::host::ports::{self, Port};
 use crate::host::pump::PumpError;
-use crate::host::recorder::Plan;
+use crate::host::recorder::{self, Plan};
+use crate::host::replay::RecordingError;
+use crate::record::Adapter;
+use crate::time::Duration;
 
 /// The link that the user named, or the only USB serial port there is.
 ///
@@ -22,9 +27,10 @@ pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
             match &spec {
                 // What is no file may be an adapter's serial number: it stays the same, whatever the port is called today.
                 LinkSpec::Serial(path) if !path.exists() => {
-                    Ok(by_serial_number(&ports::list().unwrap_or_default(), text)?.unwrap_or(spec))
+                    let named = by_serial_number(&ports::list().unwrap_or_default(), text)?;
+                    Ok(named.or_else(|| by_id(text)).unwrap_or(spec))
                 }
-                LinkSpec::Serial(_) | LinkSpec::Emulated(_) => Ok(spec),
+                LinkSpec::Serial(_) | LinkSpec::Emulated(_) | LinkSpec::Replay(_) => Ok(spec),
             }
         }
         None => only_port(ports::list().map_err(|error| CliError::new(Kind::PortNone, error))?),
@@ -54,7 +60,7 @@ pub fn open(spec: &LinkSpec, global: &Global, clock: Clock, inputs: SyncSender<I
 /// another one next time, or else the path as the user gives it. `None` for units that end with this process.
 pub fn journal_key(spec: &LinkSpec) -> Option<String> {
     match spec {
-        LinkSpec::Emulated(_) => None,
+        LinkSpec::Emulated(_) | LinkSpec::Replay(_) => None,
         LinkSpec::Serial(path) => {
             let resolved = std::fs::canonicalize(path).unwrap_or_else(|_| path.clone());
             let listed = ports::list().unwrap_or_default();
@@ -119,7 +125,71 @@ pub fn pump_error(error: PumpError) -> CliError {
         PumpError::Send { .. } => CliError::new(Kind::PortGone, error),
         PumpError::Deadline => CliError::new(Kind::NoAnswer, error),
         PumpError::Interrupted(_) => CliError::new(Kind::Interrupted, error),
+        PumpError::Over => CliError::new(Kind::NoAnswer, error),
+        PumpError::Recording(error) => recording_error(error),
     }
+}
+
+/// What a recording that cannot be read means to the user.
+pub fn recording_error(error: RecordingError) -> CliError {
+    let kind = match &error {
+        RecordingError::File { error, .. } => match error.kind() {
+            ErrorKind::NotFound => Kind::PortMissing,
+            ErrorKind::PermissionDenied => Kind::PortDenied,
+            _ => Kind::PortGone,
+        },
+        RecordingError::Content { .. } => Kind::Usage,
+    };
+    let is_missing = kind == Kind::PortMissing;
+    let error = CliError::new(kind, error);
+    match recorder::folder() {
+        Some(folder) if is_missing => error.hint(format!("recordings lie in {}", folder.display())),
+        Some(_) | None => error,
+    }
+}
+
+/// Whether the command line names a recording.
+pub fn is_recording(global: &Global) -> bool {
+    global.port.as_ref().is_some_and(|text| matches!(text.parse(), Ok(LinkSpec::Replay(_))))
+}
+
+/// The error of a command that would have to send something to a recording.
+pub fn read_only(deed: &str) -> CliError {
+    CliError::message(Kind::Usage, format!("a recording cannot be told to {deed}: nothing reaches the unit"))
+        .hint("name the unit's port with --port")
+}
+
+/// A link that may come back after it was lost.
+pub struct Comeback {
+    path: PathBuf,
+    adapter: Option<Adapter>,
+}
+
+impl Comeback {
+    /// How often it is looked for: soon enough for a person, rarely enough for the machine.
+    pub const RETRY: Duration = Duration::from_millis(250);
+
+    /// What has to come back. `None` for units that ended with their link.
+    pub fn of(spec: &LinkSpec, connection: &Connection) -> Option<Self> {
+        match spec {
+            LinkSpec::Serial(path) => Some(Comeback { path: path.clone(), adapter: connection.adapter().cloned() }),
+            LinkSpec::Emulated(_) | LinkSpec::Replay(_) => None,
+        }
+    }
+
+    /// The link, if it is there and opens. One that does not is tried again: the system sets rights and names a moment
+    /// after the device.
+    pub fn open(&self, global: &Global, clock: Clock, inputs: SyncSender<Input>) -> Option<Connection> {
+        let path = ports::find_again(&self.path, self.adapter.as_ref())?;
+        Connection::open(&LinkSpec::Serial(path), Options { baud: global.baud }, clock, inputs).ok()
+    }
+}
+
+/// The port with this name among those the system names by what they are.
+fn by_id(text: &str) -> Option<LinkSpec> {
+    const BY_ID: &str = "/dev/serial/by-id";
+    let path = Path::new(BY_ID).join(text);
+    (!text.contains('/') && path.exists()).then_some(LinkSpec::Serial(path))
 }
 
 /// The port of the USB adapter with this serial number; `usb:` may stand before it.

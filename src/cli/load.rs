@@ -78,6 +78,9 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if args.dry_run && global.port.is_none() {
         return plan(&report, &image, &name, None, output);
     }
+    if link::is_recording(global) {
+        return Err(link::read_only("take new software"));
+    }
     let mut talk = Talk::open(global, output)?;
     talk.ask(Command::Identify)?;
     let journal = Desk::of(&talk);
@@ -147,7 +150,7 @@ impl Desk {
         let Some((journal, key)) = &self.journal else { return };
         let said = facts.product.as_ref().map(|known| known.value.as_str());
         let Some(product) = said.or(product) else { return };
-        let unix_seconds = talk.clock().wall(talk.now()).as_second();
+        let unix_seconds = talk.calendar().at(talk.now()).as_second();
         let note = Note { product: product.to_owned(), image: image.to_owned(), unix_seconds };
         if let Err(error) = journal.begin(key, note) {
             output.remark(&format!("axcon: this upload is not noted, so a failed one will want --product: {error}"));

@@ -14,6 +14,7 @@ pub mod link;
 pub mod load;
 pub mod output;
 pub mod password;
+pub mod playback;
 pub mod ports;
 pub mod stream;
 pub mod talk;
@@ -42,8 +43,8 @@ struct Cli {
 /// What every command understands.
 #[derive(Debug, Clone, Args)]
 pub struct Global {
-    /// Where the unit is: a serial port (/dev/ttyUSB0, COM3, or its USB adapter's serial number) or an emulated unit
-    /// (emu:axtc4co).
+    /// Where the unit is: a serial port (/dev/ttyUSB0, COM3, or its USB adapter's serial number) an emulated unit
+    /// (emu:axtc4co), or a recording (replay:FILE).
     #[arg(long, value_name = "LINK", env = "AXCON_PORT", global = true)]
     pub port: Option<String>,
     /// Line rate in baud; the units have 115200.

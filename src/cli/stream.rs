@@ -10,18 +10,19 @@ use serde::Serialize;
 
 use super::Global;
 use super::error::{CliError, Kind};
+use super::link;
 use super::output::{Closed, Output};
-use super::talk::{Talk, expect_done};
+use super::talk::{Calendar, Ended, Talk, expect_done};
 use crate::device::Product;
-use crate::host::clock::Clock;
 use crate::session::{Command, Event, Outcome};
-use crate::time::{Duration, Instant};
+use crate::time::{BITS_PER_CHARACTER, Duration, Instant};
 use crate::wire::stream::{Layout, Reading, Row, Source};
 
 /// Arguments of `axcon stream`.
 ///
 /// The stream is switched on, written until it is enough (or Ctrl-C), and left as it was found. A stream that runs
-/// already is joined, unless another source or period is asked for.
+/// already is joined, unless another source or period is asked for. A recording's rows are written with the times they
+/// had.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Field values (fv: °C) or process values (pv: counts).
@@ -45,6 +46,9 @@ pub struct Args {
     /// Leave the stream on.
     #[arg(long)]
     keep: bool,
+    /// How long to wait for an adapter that was pulled out before giving up; 0 gives up at once.
+    #[arg(long, value_name = "S", default_value_t = 10)]
+    reconnect: u64,
     /// Switch the stream off and do nothing else.
     #[arg(long, conflicts_with_all = ["source", "period", "format", "out", "count", "duration", "keep"])]
     off: bool,
@@ -66,9 +70,6 @@ enum Format {
 /// Repetition time asked for where the user says nothing (errata E-105: the units' own default).
 const PERIOD: Duration = Duration::from_millis(1000);
 
-/// Characters a second at 115,200 baud, 8N1.
-const CHARACTERS_PER_SECOND: f64 = 11_520.0;
-
 /// How long the beginnings of a running stream are watched for.
 const LISTEN_FIRST: Duration = Duration::from_millis(1200);
 
@@ -79,6 +80,13 @@ const LISTEN_FIRST: Duration = Duration::from_millis(1200);
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let duration = args.duration.map(seconds).transpose()?;
     let format = args.format.unwrap_or(if output.json { Format::Jsonl } else { Format::Csv });
+    let wanted = args.source.map(|source| match source {
+        SourceName::Fv => Source::FieldValue,
+        SourceName::Pv => Source::ProcessValue,
+    });
+    if link::is_recording(global) && (args.off || args.period.is_some() || args.keep) {
+        return Err(link::read_only("change its stream"));
+    }
     let file = args.out.as_ref().map(create).transpose()?;
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
@@ -87,29 +95,139 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         talk.close(output);
         return expect_done(outcome);
     }
-    let found = watch(&mut talk)?;
-    let wanted = args.source.map(|source| match source {
-        SourceName::Fv => Source::FieldValue,
-        SourceName::Pv => Source::ProcessValue,
-    });
+    let sink = Sink { file, format, source: wanted, calendar: talk.calendar(), header_written: false, rows: 0 };
     let period = args.period.map(Duration::from_millis);
+    let limits = Limits { count: args.count, duration };
+    let mut stream = Stream { talk, sink, limits, until: Instant::NEVER, setting: None };
+    if stream.talk.is_recorded() {
+        let written = stream.write_rows(output);
+        let flushed = stream.sink.flush();
+        stream.talk.close(output);
+        return written.and(flushed);
+    }
+    let found = watch(&mut stream.talk)?;
     let joins = found.is_some_and(|found| period.is_none() && wanted.is_none_or(|wanted| wanted == found.source));
     let mut was_on = found.is_some();
     if !joins {
         let source = wanted.or(found.map(|found| found.source)).unwrap_or(Source::FieldValue);
         let period = period.or(found.and_then(|found| found.period)).unwrap_or(PERIOD);
-        warn_of_rate(&talk, source, period, output);
-        match talk.ask(Command::StreamOn { source, period })? {
-            Outcome::StreamRuns { was_on: on } => was_on |= on,
-            other => expect_done(other)?,
-        }
+        warn_of_rate(&stream.talk, source, period, global.baud, output);
+        was_on |= stream.switch_on(source, period, output)?;
     }
-    let mut sink = Sink { file, format, clock: talk.clock(), header_written: false, rows: 0 };
-    let written = write_rows(&mut talk, &mut sink, args.count, duration, output);
+    let written = stream.keep_writing(Duration::from_secs(args.reconnect), global, output);
+    let Stream { mut talk, mut sink, .. } = stream;
     let left = if args.keep || (joins && was_on) { Ok(()) } else { leave_as_found(&mut talk, was_on, found, output) };
     let flushed = sink.flush();
     talk.close(output);
     written.and(left).and(flushed)
+}
+
+/// When it is enough.
+struct Limits {
+    count: Option<u64>,
+    duration: Option<Duration>,
+}
+
+/// A stream being written down.
+struct Stream {
+    talk: Talk,
+    sink: Sink,
+    limits: Limits,
+    /// When the time is over.
+    until: Instant,
+    /// What the stream was switched to, if it was.
+    setting: Option<(Source, Duration)>,
+}
+
+/// How long the rows of a unit that was on all the time may take to come behind a cable that is back, beside their
+/// period: a unit that was switched off as well has none for up to 5 s (AXRTD8CO manual, section 1.1).
+const ROWS_AGAIN: Duration = Duration::from_secs(7);
+
+impl Stream {
+    /// Switches the stream on and says whether it was on before. The row that proves it is the first one written.
+    fn switch_on(&mut self, source: Source, period: Duration, output: &mut Output) -> Result<bool, CliError> {
+        self.setting = Some((source, period));
+        let mut proof = None;
+        let ended = self.talk.run(Command::StreamOn { source, period }, |session, event| {
+            if let Event::Row { at, span, row } = event {
+                proof = Some((*at, row.clone(), session.record().bytes(*span)));
+            }
+            Ok(())
+        })?;
+        let was_on = match ended {
+            Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => was_on,
+            Ended::Finished { outcome, interrupted: false } => return expect_done(outcome).map(|()| false),
+            Ended::Finished { interrupted: true, .. } => {
+                return Err(CliError::message(Kind::Interrupted, "interrupted"));
+            }
+            Ended::Lost { error, .. } => return Err(error),
+        };
+        if let Some((at, row, raw)) = proof {
+            self.sink.row(at, &row, &raw, output)?;
+        }
+        Ok(was_on)
+    }
+
+    /// Writes rows until it is enough, also over a cable that was pulled out in between.
+    fn keep_writing(&mut self, patience: Duration, global: &Global, output: &mut Output) -> Result<(), CliError> {
+        loop {
+            let lost = match self.write_rows(output) {
+                Err(error) if error.kind == Kind::PortGone => error,
+                ended => return ended,
+            };
+            if !self.talk.reconnect(lost, patience, global, output)? {
+                return Ok(());
+            }
+            self.ask_again(output)?;
+        }
+    }
+
+    /// A unit that has lost its power with the cable may have come back without its stream.
+    fn ask_again(&mut self, output: &mut Output) -> Result<(), CliError> {
+        let Some((source, period)) = self.setting else { return Ok(()) };
+        let until = self.talk.now() + ROWS_AGAIN + period;
+        let mut runs = false;
+        let sink = &mut self.sink;
+        self.talk.listen(until, |session, event| {
+            let Event::Row { at, span, row } = event else { return Ok(ControlFlow::Continue(())) };
+            runs = true;
+            sink.row(*at, row, &session.record().bytes(*span), output)?;
+            Ok(ControlFlow::Break(()))
+        })?;
+        if !runs {
+            self.talk.find_application()?;
+            self.switch_on(source, period, output)?;
+        }
+        Ok(())
+    }
+
+    fn write_rows(&mut self, output: &mut Output) -> Result<(), CliError> {
+        if let Some(duration) = self.limits.duration
+            && self.until == Instant::NEVER
+        {
+            self.until = self.talk.now() + duration;
+        }
+        let (sink, count) = (&mut self.sink, self.limits.count);
+        if count.is_some_and(|count| sink.rows >= count) {
+            return Ok(());
+        }
+        let result = self.talk.listen(self.until, |session, event| {
+            if let Event::Row { at, span, row } = event {
+                sink.row(*at, row, &session.record().bytes(*span), output)?;
+            }
+            Ok(if count.is_some_and(|count| sink.rows >= count) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            })
+        });
+        match result {
+            Ok(_) => Ok(()),
+            // Whoever read our output has enough: that is a way to end.
+            Err(error) if error.error.is::<Closed>() => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
 }
 
 /// A stream that was on before we came.
@@ -143,32 +261,6 @@ fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
     }))
 }
 
-fn write_rows(
-    talk: &mut Talk,
-    sink: &mut Sink,
-    count: Option<u64>,
-    duration: Option<Duration>,
-    output: &mut Output,
-) -> Result<(), CliError> {
-    let until = duration.map_or(Instant::NEVER, |duration| talk.now() + duration);
-    let result = talk.listen(until, |session, event| {
-        if let Event::Row { at, span, row } = event {
-            sink.row(*at, row, &session.record().bytes(*span), output)?;
-        }
-        Ok(if count.is_some_and(|count| sink.rows >= count) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        })
-    });
-    match result {
-        Ok(_) => Ok(()),
-        // Whoever read our output has enough: that is a way to end.
-        Err(error) if error.error.is::<Closed>() => Ok(()),
-        Err(error) => Err(error),
-    }
-}
-
 /// Puts the stream back to what it was.
 fn leave_as_found(talk: &mut Talk, was_on: bool, found: Option<Found>, output: &mut Output) -> Result<(), CliError> {
     match (was_on, found) {
@@ -184,17 +276,18 @@ fn leave_as_found(talk: &mut Talk, was_on: bool, found: Option<Found>, output: &
 }
 
 /// Says so if the line cannot carry the rate.
-fn warn_of_rate(talk: &Talk, source: Source, period: Duration, output: &mut Output) {
+fn warn_of_rate(talk: &Talk, source: Source, period: Duration, baud: u32, output: &mut Output) {
     let Some(layout) = layout(talk) else { return };
     let format = layout.format(source);
     let width = format.widths.first().copied().unwrap_or_default();
     let characters = (width + 1) * layout.channels.len() + 1;
     let asked = characters as f64 / period.as_secs_f64();
-    if asked > CHARACTERS_PER_SECOND {
-        let most = (characters as f64 / CHARACTERS_PER_SECOND * 1000.0).ceil();
+    let carries = f64::from(baud) / f64::from(BITS_PER_CHARACTER);
+    if asked > carries {
+        let most = (characters as f64 / carries * 1000.0).ceil();
         output.remark(&format!(
             "axcon: a row of {characters} characters every {} ms is {asked:.0} characters/s; the line carries \
-             {CHARACTERS_PER_SECOND:.0}, a row every {most} ms: the unit will leave rows out",
+             {carries:.0}, a row every {most} ms: the unit will leave rows out",
             period.as_millis()
         ));
     }
@@ -209,7 +302,9 @@ fn layout(talk: &Talk) -> Option<&'static Layout> {
 struct Sink {
     file: Option<(PathBuf, BufWriter<File>)>,
     format: Format,
-    clock: Clock,
+    /// Rows of another source are left out.
+    source: Option<Source>,
+    calendar: Calendar,
     header_written: bool,
     rows: u64,
 }
@@ -231,8 +326,11 @@ struct ValueObject<'a> {
 
 impl Sink {
     fn row(&mut self, at: Instant, row: &Row, raw: &[u8], output: &mut Output) -> Result<(), CliError> {
+        if self.source.is_some_and(|source| source != row.source) {
+            return Ok(());
+        }
         let channels = channels_of(row);
-        let time = self.clock.wall(at).strftime("%Y-%m-%dT%H:%M:%S%.3fZ").to_string();
+        let time = self.calendar.text(at);
         let mut text = Vec::new();
         match self.format {
             Format::Raw => text.extend_from_slice(raw),

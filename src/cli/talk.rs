@@ -1,28 +1,67 @@
-//! What every headless command does with a unit: open the link, record, run jobs, end in order.
+//! What every headless command does with a unit: open the link, record, run jobs, end in order. A recording takes the
+//! unit's place where a command only reads.
 
 use std::ops::ControlFlow;
+use std::sync::mpsc::SyncSender;
+
+use jiff::Timestamp;
 
 use super::Global;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
-use crate::host;
+use super::playback::Playback;
 use crate::host::clock::Clock;
 use crate::host::link::LinkSpec;
 use crate::host::pump::{Pump, PumpError};
 use crate::host::recorder::Recorder;
+use crate::host::replay::Recording;
 use crate::host::signal::Signals;
+use crate::host::{self, Input};
+use crate::record::Ending;
 use crate::session::{Command, Event, Outcome, Session, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::visible;
 
-/// A conversation with a unit over an open link.
+/// A conversation with a unit over an open link, or one that has been.
 pub struct Talk {
-    pump: Pump,
+    line: Line,
     session: Session,
     port: String,
     spec: LinkSpec,
+    inputs: SyncSender<Input>,
     _signals: Signals,
+}
+
+enum Line {
+    Live(Box<Pump>),
+    Recorded(Box<Playback>),
+}
+
+/// What the calendar says at moments of a conversation.
+#[derive(Clone, Copy, Debug)]
+pub enum Calendar {
+    /// Of the computer's clock.
+    Clock(Clock),
+    /// A recording's, which began at so many milliseconds since 1970.
+    Recording(i64),
+}
+
+impl Calendar {
+    /// Date and time in UTC.
+    pub fn at(self, moment: Instant) -> Timestamp {
+        match self {
+            Calendar::Clock(clock) => clock.wall(moment),
+            Calendar::Recording(begun) => Timestamp::from_millisecond(begun)
+                .and_then(|begun| begun.checked_add(moment.since_start()))
+                .unwrap_or(Timestamp::UNIX_EPOCH),
+        }
+    }
+
+    /// The form data is written in: `2026-01-31T12:00:00.123Z`.
+    pub fn text(self, moment: Instant) -> String {
+        self.at(moment).strftime("%Y-%m-%dT%H:%M:%S%.3fZ").to_string()
+    }
 }
 
 /// How a job ended that was not left to itself.
@@ -51,27 +90,29 @@ const WINDING_UP: Duration = Duration::from_secs(10);
 const QUOTED: usize = 120;
 
 impl Talk {
-    /// Opens the link that the command line names and starts recording.
+    /// Opens the link that the command line names and starts recording, or opens the recording it names.
     ///
     /// # Errors
     /// If there is no such link, or it does not open.
     pub fn open(global: &Global, output: &mut Output) -> Result<Self, CliError> {
-        let clock = Clock::start();
-        let (sender, inputs) = host::channel();
         let spec: LinkSpec = link::spec(global)?;
+        let (sender, inputs) = host::channel();
         let signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
-        let connection = link::open(&spec, global, clock, sender)?;
-        let mut recorder = Recorder::start(&link::recording(global), &connection, clock);
-        if let Some(warning) = recorder.take_warning() {
-            output.remark(&format!("axcon: {warning}"));
-        }
-        Ok(Talk {
-            pump: Pump::new(connection, inputs, clock, recorder),
-            session: Session::new(global.baud),
-            port: spec.to_string(),
-            spec,
-            _signals: signals,
-        })
+        let (line, session) = if let LinkSpec::Replay(path) = &spec {
+            let recording = Recording::open(path).map_err(link::recording_error)?;
+            let line = Line::Recorded(Box::new(Playback::new(recording, inputs)));
+            (line, Session::of_recording(global.baud))
+        } else {
+            let clock = Clock::start();
+            let connection = link::open(&spec, global, clock, sender.clone())?;
+            let mut recorder = Recorder::start(&link::recording(global), &connection, clock);
+            if let Some(warning) = recorder.take_warning() {
+                output.remark(&format!("axcon: {warning}"));
+            }
+            let line = Line::Live(Box::new(Pump::new(connection, inputs, clock, recorder)));
+            (line, Session::new(global.baud))
+        };
+        Ok(Talk { line, session, port: spec.to_string(), spec, inputs: sender, _signals: signals })
     }
 
     /// Runs a job to its end; `news` hears every event on the way. An interrupt cancels the job, a second one is final.
@@ -88,7 +129,7 @@ impl Talk {
         let mut interrupted = false;
         let mut deadline = Instant::NEVER;
         loop {
-            let step = self.pump.run(&mut self.session, deadline, Session::record, |session, _| {
+            let step = self.step(deadline, |session| {
                 finished(session, &mut news).map_or_else(|| ControlFlow::Continue(()), ControlFlow::Break)
             });
             match step {
@@ -108,6 +149,13 @@ impl Talk {
                         Some(outcome) => Ok(Ended::Lost { outcome: outcome?, error }),
                         None => Err(error),
                     };
+                }
+                // A job that listens ends with the recording.
+                Err(PumpError::Over) => {
+                    self.session.recording_over(self.now());
+                    let ended = finished(&mut self.session, &mut news);
+                    let none = || CliError::message(Kind::Failed, "the recording has ended, and the job has not");
+                    return Ok(Ended::Finished { outcome: ended.ok_or_else(none)??, interrupted });
                 }
                 Err(error) => return Err(link::pump_error(error)),
             }
@@ -135,7 +183,7 @@ impl Talk {
         until: Instant,
         mut news: impl FnMut(&Session, &Event) -> Result<ControlFlow<()>, CliError>,
     ) -> Result<bool, CliError> {
-        let step = self.pump.run(&mut self.session, until, Session::record, |session, _| {
+        let step = self.step(until, |session| {
             while let Some(event) = session.poll_event() {
                 match news(session, &event) {
                     Ok(ControlFlow::Continue(())) => {}
@@ -148,19 +196,101 @@ impl Talk {
         match step {
             Ok(enough) => enough.map(|()| true),
             Err(PumpError::Deadline) => Ok(true),
+            Err(PumpError::Over) => {
+                self.session.recording_over(self.now());
+                while let Some(event) = self.session.poll_event() {
+                    if news(&self.session, &event)?.is_break() {
+                        break;
+                    }
+                }
+                Ok(true)
+            }
             Err(PumpError::Interrupted(_)) => Ok(false),
             Err(error) => Err(link::pump_error(error)),
         }
     }
 
-    /// The moment it is.
-    pub fn now(&self) -> Instant {
-        self.pump.clock().now()
+    /// Listens to a recording to its end.
+    ///
+    /// # Errors
+    /// If the recording cannot be read to its end, or the user interrupts.
+    pub fn hear_out(&mut self) -> Result<(), CliError> {
+        match self.listen(Instant::NEVER, |_, _| Ok(ControlFlow::Continue(())))? {
+            true => Ok(()),
+            false => Err(CliError::message(Kind::Interrupted, "interrupted")),
+        }
     }
 
-    /// The clock all moments are of.
-    pub fn clock(&self) -> Clock {
-        self.pump.clock()
+    /// Whether this is a recording, to which nothing can be said.
+    pub fn is_recorded(&self) -> bool {
+        matches!(self.line, Line::Recorded(_))
+    }
+
+    fn step<T>(
+        &mut self,
+        deadline: Instant,
+        mut look: impl FnMut(&mut Session) -> ControlFlow<T>,
+    ) -> Result<T, PumpError> {
+        match &mut self.line {
+            Line::Live(pump) => pump.run(&mut self.session, deadline, Session::record, |session, _| look(session)),
+            Line::Recorded(playback) => playback.run(&mut self.session, deadline, |session, _| look(session)),
+        }
+    }
+
+    /// Waits for a lost link to come back and opens it again: the same USB adapter under whatever name, or the same
+    /// path. The recording goes on, the gap marked. `Ok(false)` if the user has had enough.
+    ///
+    /// # Errors
+    /// If it has not come back within `patience`: the error is the one that it was lost with.
+    pub fn reconnect(
+        &mut self,
+        lost: CliError,
+        patience: Duration,
+        global: &Global,
+        output: &mut Output,
+    ) -> Result<bool, CliError> {
+        let Line::Live(pump) = &mut self.line else { return Err(lost) };
+        let spec = link::Comeback::of(&self.spec, pump.connection());
+        let Some(spec) = spec.filter(|_| !patience.is_zero()) else { return Err(lost) };
+        let clock = pump.clock();
+        let gone = clock.now();
+        self.session.link_lost(gone);
+        pump.recorder_mut().mark(gone, "link lost");
+        output.remark(&format!("axcon: {lost}; waiting {} s for it to come back", patience.as_secs()));
+        let deadline = gone + patience;
+        let connection = loop {
+            match pump.pause(link::Comeback::RETRY) {
+                Err(_) => return Ok(false),
+                Ok(()) if clock.now() >= deadline => return Err(lost),
+                Ok(()) => {}
+            }
+            if let Some(connection) = spec.open(global, clock, self.inputs.clone()) {
+                break connection;
+            }
+        };
+        let away = clock.now().since(gone).as_secs_f64();
+        let text = format!("link back after {away:.1} s as {}", connection.port());
+        output.remark(&format!("axcon: {text}"));
+        pump.recorder_mut().mark(clock.now(), &text);
+        pump.replace(connection);
+        self.session.link_back(clock.now());
+        Ok(true)
+    }
+
+    /// The moment it is, or to which a recording has been played.
+    pub fn now(&self) -> Instant {
+        match &self.line {
+            Line::Live(pump) => pump.clock().now(),
+            Line::Recorded(playback) => playback.now(),
+        }
+    }
+
+    /// The calendar of all moments.
+    pub fn calendar(&self) -> Calendar {
+        match &self.line {
+            Line::Live(pump) => Calendar::Clock(pump.clock()),
+            Line::Recorded(playback) => Calendar::Recording(playback.recording().header().unix_millis),
+        }
     }
 
     /// What is known of the unit.
@@ -179,17 +309,29 @@ impl Talk {
     }
 
     /// Tells the user what became of the recording, if something did.
-    pub fn close(mut self, output: &mut Output) {
-        if let Some(warning) = self.pump.recorder_mut().take_warning() {
-            output.remark(&format!("axcon: {warning}"));
+    pub fn close(&mut self, output: &mut Output) {
+        match &mut self.line {
+            Line::Live(pump) => {
+                if let Some(warning) = pump.recorder_mut().take_warning() {
+                    output.remark(&format!("axcon: {warning}"));
+                }
+            }
+            Line::Recorded(playback) if playback.recording().ending() == Some(Ending::CutShort) => {
+                output.remark("axcon: the recording ends in the middle of a line: whoever wrote it was killed");
+            }
+            Line::Recorded(_) => {}
         }
     }
 
-    /// Finds out what is at the other end, and makes an error of it if that is no unit whose firmware runs.
+    /// Finds out what is at the other end, and makes an error of it if that is no unit whose firmware runs. A recording
+    /// shows that by itself.
     ///
     /// # Errors
     /// If nothing or something unknown answers, or the unit waits in its loader.
     pub fn find_application(&mut self) -> Result<(), CliError> {
+        if self.is_recorded() {
+            return Ok(());
+        }
         self.ask(Command::Identify)?;
         match self.session.facts().state {
             UnitState::Application => Ok(()),
@@ -203,6 +345,9 @@ impl Talk {
     pub fn no_unit(&self) -> CliError {
         let heard = self.last_words();
         if heard.is_empty() {
+            if self.is_recorded() {
+                return CliError::message(Kind::NoAnswer, format!("{}: the unit says nothing in it", self.port));
+            }
             let error = CliError::message(Kind::NoAnswer, format!("{}: nothing answers", self.port));
             return no_answer_hints(error);
         }

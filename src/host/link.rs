@@ -28,13 +28,15 @@ pub enum LinkSpec {
     Serial(PathBuf),
     /// An emulated unit in this process.
     Emulated(&'static Product),
+    /// A recording: what was said, read only.
+    Replay(PathBuf),
 }
 
 /// Why a link makes no sense.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LinkSpecError {
     /// Nothing was named.
-    #[error("the link is empty")]
+    #[error("the link names nothing")]
     Empty,
     /// No such product can be emulated.
     #[error("there is no emulated '{name}'; there is {}", known.join(", "))]
@@ -56,12 +58,15 @@ impl std::str::FromStr for LinkSpec {
     type Err = LinkSpecError;
 
     fn from_str(text: &str) -> Result<Self, LinkSpecError> {
-        for scheme in ["tcp://", "rfc2217://", "replay:"] {
+        for scheme in ["tcp://", "rfc2217://"] {
             if starts_with(text, scheme) {
                 return Err(LinkSpecError::Unsupported { scheme });
             }
         }
-        if text.is_empty() {
+        if starts_with(text, REPLAY) && text.len() > REPLAY.len() {
+            return Ok(LinkSpec::Replay(PathBuf::from(&text[REPLAY.len()..])));
+        }
+        if text.is_empty() || starts_with(text, REPLAY) {
             return Err(LinkSpecError::Empty);
         }
         if !starts_with(text, EMULATED) {
@@ -81,6 +86,7 @@ impl fmt::Display for LinkSpec {
         match self {
             LinkSpec::Serial(path) => path.display().fmt(f),
             LinkSpec::Emulated(product) => write!(f, "{EMULATED}{}", product.name.to_lowercase()),
+            LinkSpec::Replay(path) => write!(f, "{REPLAY}{}", path.display()),
         }
     }
 }
@@ -211,6 +217,7 @@ pub const WRITE_PATIENCE: Duration = Duration::from_secs(5);
 pub const CLOSE_PATIENCE: Duration = Duration::from_millis(300);
 
 const EMULATED: &str = "emu:";
+const REPLAY: &str = "replay:";
 
 impl Connection {
     /// Opens a link and starts reading. What comes is put on `inputs`, stamped by `clock`; while that is full, nothing
@@ -228,6 +235,12 @@ impl Connection {
                 Ok(connection)
             }
             LinkSpec::Emulated(product) => Connection::emulated(spec, product, options, clock, inputs),
+            // There is no line: who can do with a recording opens it as one.
+            LinkSpec::Replay(_) => Err(LinkError {
+                port: spec.to_string(),
+                operation: Operation::Open,
+                cause: Cause::NotSerial { what: "a recording" },
+            }),
         }
     }
 
@@ -355,9 +368,9 @@ mod tests {
         assert_eq!(read(""), Err(LinkSpecError::Empty));
         let error = read("emu:toaster").expect_err("no such product").to_string();
         assert!(error.starts_with("there is no emulated 'toaster'; there is emu:axtc4co"), "{error}");
-        for (text, scheme) in
-            [("tcp://host:1", "tcp://"), ("RFC2217://host:1", "rfc2217://"), ("replay:a.cast", "replay:")]
-        {
+        assert_eq!(read("Replay:a.cast"), Ok(LinkSpec::Replay("a.cast".into())));
+        assert_eq!(read("replay:"), Err(LinkSpecError::Empty));
+        for (text, scheme) in [("tcp://host:1", "tcp://"), ("RFC2217://host:1", "rfc2217://")] {
             assert_eq!(read(text), Err(LinkSpecError::Unsupported { scheme }), "{text}");
         }
     }

@@ -10,6 +10,7 @@ pub mod link;
 pub mod ports;
 pub mod pump;
 pub mod recorder;
+pub mod replay;
 pub mod signal;
 pub mod terminal;
 

@@ -109,6 +109,32 @@ pub fn describe(path: &Path) -> Port {
     listed.unwrap_or_else(|| Port { path: path.display().to_string(), kind, usb: None, driver: None })
 }
 
+/// Where an adapter is now that was at `path` before the cable was pulled: a USB adapter keeps its identity and not its
+/// name. Everything else is known by its path. `None` while it is not there.
+pub fn find_again(path: &Path, adapter: Option<&Adapter>) -> Option<PathBuf> {
+    let Some(adapter) = adapter else { return path.exists().then(|| path.to_owned()) };
+    again(&list().unwrap_or_default(), path, adapter)
+}
+
+fn again(ports: &[Port], path: &Path, adapter: &Adapter) -> Option<PathBuf> {
+    let same: Vec<&Port> = ports
+        .iter()
+        .filter(|port| {
+            port.usb.clone().map(Adapter::from).is_some_and(|other| {
+                (&other.vid, &other.pid, &other.serial_number) == (&adapter.vid, &adapter.pid, &adapter.serial_number)
+            })
+        })
+        .collect();
+    // Without a serial number, adapters of one kind are told apart by their place only.
+    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let at_its_place = same.iter().find(|port| Path::new(&port.path) == target);
+    match (at_its_place, same.as_slice()) {
+        (Some(port), _) => Some(port.path.clone().into()),
+        (None, [only]) => Some(only.path.clone().into()),
+        (None, _) => None,
+    }
+}
+
 /// The first process that has the port open, apart from the host of a pseudo-terminal itself. `None` also where the
 /// system does not say: other users' processes are not visible.
 pub fn holder(path: &Path) -> Option<Holder> {
@@ -229,6 +255,31 @@ mod tests {
         let mut names = ["/dev/ttyUSB10", "/dev/ttyS0", "/dev/ttyUSB9", "COM3", "COM12"];
         names.sort_by_key(|name| natural_key(name));
         assert_eq!(names, ["/dev/ttyS0", "/dev/ttyUSB9", "/dev/ttyUSB10", "COM3", "COM12"]);
+    }
+
+    #[test]
+    fn an_adapter_is_found_again_under_another_name_and_never_mistaken() {
+        let port = |path: &str, number: Option<&str>| {
+            let usb = Usb {
+                vid: 0x0403,
+                pid: 0x6001,
+                serial_number: number.map(str::to_owned),
+                manufacturer: None,
+                product: None,
+            };
+            Port { path: path.into(), kind: Kind::Usb, usb: Some(usb), driver: None }
+        };
+        let adapter = |number: Option<&str>| Adapter::from(port("", number).usb.expect("an adapter"));
+        let was = Path::new("/dev/ttyUSB0");
+        let found = |ports: &[Port], number| again(ports, was, &adapter(number));
+        let numbered = [port("/dev/ttyUSB1", Some("B2")), port("/dev/ttyUSB2", Some("A1"))];
+        assert_eq!(found(&numbered, Some("A1")), Some("/dev/ttyUSB2".into()));
+        assert_eq!(found(&numbered, Some("C3")), None);
+        let plain = [port("/dev/ttyUSB1", None), port("/dev/ttyUSB2", None)];
+        assert_eq!(found(&plain, None), None, "which of the two it is nobody can say");
+        assert_eq!(found(&plain[..1], None), Some("/dev/ttyUSB1".into()));
+        let at_its_place = [port("/dev/ttyUSB1", None), port("/dev/ttyUSB0", None)];
+        assert_eq!(found(&at_its_place, None), Some("/dev/ttyUSB0".into()));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use super::Input;
 use super::clock::Clock;
 use super::link::{Connection, LinkError, SendError};
 use super::recorder::Recorder;
+use super::replay::RecordingError;
 use crate::endpoint::Endpoint;
 use crate::record::Record;
 use crate::time::{Duration, Instant};
@@ -42,6 +43,12 @@ pub enum PumpError {
     /// A signal came (its number).
     #[error("interrupted")]
     Interrupted(i32),
+    /// The recording that was played has ended.
+    #[error("the recording has ended")]
+    Over,
+    /// The recording that was played is none from some place on.
+    #[error(transparent)]
+    Recording(RecordingError),
 }
 
 /// Longest wait for anything: bounds the arithmetic, nothing else.
@@ -95,6 +102,25 @@ impl Pump {
                 }
             }
         }
+    }
+
+    /// Goes on over another connection, which puts its inputs on the same channel.
+    pub fn replace(&mut self, connection: Connection) {
+        self.connection = connection;
+    }
+
+    /// Waits so long, whatever else comes; a signal ends it.
+    ///
+    /// # Errors
+    /// If a signal comes.
+    pub fn pause(&mut self, time: Duration) -> Result<(), PumpError> {
+        let until = self.clock.now() + time;
+        while self.clock.now() < until {
+            if let Ok(Input::Signal(signal)) = self.inputs.recv_timeout(self.clock.until(until)) {
+                return Err(PumpError::Interrupted(signal));
+            }
+        }
+        Ok(())
     }
 
     /// The connection.

@@ -48,7 +48,9 @@ struct Series {
     folder: PathBuf,
     stem: String,
     part: u32,
+    /// The first part's head, and the moment it began.
     header: Header,
+    begun: Instant,
     limits: Limits,
 }
 
@@ -70,15 +72,16 @@ const ENDING: &str = ".cast";
 impl Recorder {
     /// Starts recording a connection. Never fails: see [`take_warning`](Recorder::take_warning).
     pub fn start(plan: &Plan, connection: &Connection, clock: Clock) -> Self {
+        let now = clock.now();
         let header = Header {
-            unix_seconds: clock.wall(clock.now()).as_second(),
+            unix_millis: clock.wall(now).as_millisecond(),
             port: connection.port().to_owned(),
             settings: connection.settings().to_owned(),
             driver: connection.driver().map(str::to_owned),
             adapter: connection.adapter().cloned(),
             part: 1,
         };
-        Recorder::begin(plan, header, &stem(clock, connection.port()))
+        Recorder::begin(plan, header, now, &stem(clock, connection.port()))
     }
 
     /// Records nothing.
@@ -86,13 +89,13 @@ impl Recorder {
         Recorder::default()
     }
 
-    fn begin(plan: &Plan, header: Header, stem: &str) -> Self {
+    fn begin(plan: &Plan, header: Header, now: Instant, stem: &str) -> Self {
         let opened = match plan {
             Plan::Nothing => return Recorder::nothing(),
-            Plan::File(path) => part(path, &header).map(|cast| Open::new(cast, path.clone(), None)),
+            Plan::File(path) => part(path, &header, now).map(|cast| Open::new(cast, path.clone(), now, None)),
             Plan::Unasked => folder()
                 .ok_or_else(|| io::Error::other("there is no home directory"))
-                .and_then(|folder| series(folder, stem, header, LIMITS)),
+                .and_then(|folder| series(folder, stem, header, now, LIMITS)),
         };
         match opened {
             Ok(open) => Recorder { open: Some(open), ..Recorder::default() },
@@ -165,22 +168,22 @@ impl Drop for Open {
 }
 
 impl Open {
-    fn new(cast: Cast<File>, path: PathBuf, series: Option<Series>) -> Self {
-        Open { cast, path, series, tally: Tally::default(), last: Instant::ZERO }
+    fn new(cast: Cast<File>, path: PathBuf, begun: Instant, series: Option<Series>) -> Self {
+        Open { cast, path, series, tally: Tally::default(), last: begun }
     }
 
     fn next_part_if_full(&mut self) -> io::Result<()> {
         let Some(series) = &mut self.series else { return Ok(()) };
         if self.cast.written() >= series.limits.part_bytes {
             series.part += 1;
-            (self.cast, self.path) = series.open()?;
+            (self.cast, self.path) = series.open(self.last)?;
         }
         Ok(())
     }
 }
 
 impl Series {
-    fn open(&self) -> io::Result<(Cast<File>, PathBuf)> {
+    fn open(&self, now: Instant) -> io::Result<(Cast<File>, PathBuf)> {
         make_room(&self.folder, self.limits)?;
         // The parts of a session stand in their order behind its first one, whose name ends here.
         let name = match self.part {
@@ -188,19 +191,21 @@ impl Series {
             part => format!("{}.p{part:05}{ENDING}", self.stem),
         };
         let path = self.folder.join(name);
-        let header = Header { part: self.part, ..self.header.clone() };
-        Ok((part(&path, &header)?, path))
+        let later = i64::try_from(now.since(self.begun).as_millis()).unwrap_or(i64::MAX);
+        let unix_millis = self.header.unix_millis.saturating_add(later);
+        let header = Header { part: self.part, unix_millis, ..self.header.clone() };
+        Ok((part(&path, &header, now)?, path))
     }
 }
 
-fn series(folder: PathBuf, stem: &str, header: Header, limits: Limits) -> io::Result<Open> {
+fn series(folder: PathBuf, stem: &str, header: Header, begun: Instant, limits: Limits) -> io::Result<Open> {
     fs::create_dir_all(&folder)?;
-    let series = Series { folder, stem: stem.to_owned(), part: 1, header, limits };
-    let (cast, path) = series.open()?;
-    Ok(Open::new(cast, path, Some(series)))
+    let series = Series { folder, stem: stem.to_owned(), part: 1, header, begun, limits };
+    let (cast, path) = series.open(begun)?;
+    Ok(Open::new(cast, path, begun, Some(series)))
 }
 
-fn part(path: &Path, header: &Header) -> io::Result<Cast<File>> {
+fn part(path: &Path, header: &Header, begun: Instant) -> io::Result<Cast<File>> {
     let mut options = File::options();
     options.write(true).create(true).truncate(true);
     #[cfg(unix)]
@@ -212,7 +217,7 @@ fn part(path: &Path, header: &Header) -> io::Result<Cast<File>> {
     let file = options.open(path)?;
     // Tells other sessions that this one is being written. Where locks do not work, its age protects it well enough.
     let _ = file.try_lock_shared();
-    Cast::begin(file, header)
+    Cast::begin(file, header, begun)
 }
 
 /// Deletes the oldest recordings until a full part more fits. Their names begin with the time, so their order is their
@@ -290,7 +295,8 @@ mod tests {
         }
         fs::write(folder.path().join("00-notes.txt"), [0; 1000]).expect("written");
         let limits = Limits { bytes: 1_000, files: 3, part_bytes: 500 };
-        let open = series(folder.path().to_owned(), "20260131T120000Z-u0-7", header(), limits).expect("opened");
+        let open =
+            series(folder.path().to_owned(), "20260131T120000Z-u0-7", header(), Instant::ZERO, limits).expect("opened");
         assert_eq!(
             names(folder.path()),
             ["00-notes.txt", "20200102T000000Z-a-1.cast", "20200103T000000Z-a-1.cast", "20260131T120000Z-u0-7.cast"]
@@ -302,7 +308,8 @@ mod tests {
     fn a_long_session_goes_on_in_parts_and_its_first_parts_go_first() {
         let folder = tempfile::tempdir().expect("a folder");
         let limits = Limits { bytes: 2_000, files: 100, part_bytes: 500 };
-        let open = series(folder.path().to_owned(), "20260131T120000Z-u0-7", header(), limits).expect("opened");
+        let open =
+            series(folder.path().to_owned(), "20260131T120000Z-u0-7", header(), Instant::ZERO, limits).expect("opened");
         let mut recorder = Recorder { open: Some(open), ..Recorder::default() };
         for round in 0..100 {
             recorder.push(Instant::from_millis(round), Direction::FromUnit, Secrecy::Open, &[b'x'; 50]);
@@ -327,7 +334,7 @@ mod tests {
     #[test]
     fn a_recording_that_cannot_be_made_is_a_warning_once() {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut recorder = Recorder::begin(&Plan::File(folder.path().to_owned()), header(), "x");
+        let mut recorder = Recorder::begin(&Plan::File(folder.path().to_owned()), header(), Instant::ZERO, "x");
         recorder.push(Instant::ZERO, Direction::ToUnit, Secrecy::Open, b"m");
         let warning = recorder.take_warning().expect("a warning");
         assert!(warning.starts_with("this session is not recorded: "), "{warning}");

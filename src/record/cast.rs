@@ -15,8 +15,8 @@ use crate::time::Instant;
 /// What stands at the head of a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
-    /// When the recording began, in seconds since 1970.
-    pub unix_seconds: i64,
+    /// When the recording began, in milliseconds since 1970.
+    pub unix_millis: i64,
     /// The port, as the user named it.
     pub port: String,
     /// Line settings, e.g. `115200 8N1`.
@@ -48,7 +48,7 @@ pub struct Adapter {
 #[derive(Debug)]
 pub struct Cast<W> {
     to: W,
-    begun: Option<Instant>,
+    begun: Instant,
     written: u64,
 }
 
@@ -70,6 +70,7 @@ struct HeaderLine<'a> {
 #[derive(Serialize)]
 struct Details<'a> {
     schema: &'static str,
+    begun_ms: i64,
     encoding: &'static str,
     program: &'static str,
     port: &'a str,
@@ -80,20 +81,21 @@ struct Details<'a> {
 }
 
 impl<W: Write> Cast<W> {
-    /// Writes the header.
+    /// Writes the header of a recording that begins at `begun`.
     ///
     /// # Errors
     /// If writing fails.
-    pub fn begin(to: W, header: &Header) -> io::Result<Self> {
-        let mut cast = Cast { to, begun: None, written: 0 };
+    pub fn begin(to: W, header: &Header, begun: Instant) -> io::Result<Self> {
+        let mut cast = Cast { to, begun, written: 0 };
         cast.line(&HeaderLine {
             version: 2,
             width: 80,
             height: 24,
-            timestamp: header.unix_seconds,
+            timestamp: header.unix_millis.div_euclid(1000),
             title: format!("axcon {}", header.port),
             axcon: Details {
                 schema: SCHEMA,
+                begun_ms: header.unix_millis,
                 encoding: LATIN_1,
                 program: concat!("axcon ", env!("CARGO_PKG_VERSION")),
                 port: &header.port,
@@ -141,9 +143,8 @@ impl<W: Write> Cast<W> {
     }
 
     fn event(&mut self, at: Instant, code: &str, text: &str) -> io::Result<()> {
-        let begun = *self.begun.get_or_insert(at);
         // Six digits: microseconds, as the format has them; a character takes 87.
-        let seconds = (at.since(begun).as_secs_f64() * 1e6).round() / 1e6;
+        let seconds = (at.since(self.begun).as_secs_f64() * 1e6).round() / 1e6;
         self.line(&(seconds, code, text))
     }
 
@@ -162,7 +163,7 @@ mod tests {
     #[test]
     fn every_byte_survives_and_the_password_does_not() {
         let header = Header { port: "u0".into(), settings: "115200 8N1".into(), part: 1, ..Header::default() };
-        let mut cast = Cast::begin(Vec::new(), &header).expect("a vector takes everything");
+        let mut cast = Cast::begin(Vec::new(), &header, Instant::from_millis(5)).expect("a vector takes all");
         let all: Vec<u8> = (0..=255).collect();
         cast.push(Instant::from_millis(5), Direction::FromUnit, Secrecy::Open, &all).expect("written");
         cast.push(Instant::from_millis(1505), Direction::ToUnit, Secrecy::Secret, b"AXIO-2010").expect("written");

@@ -7,8 +7,8 @@
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::cast::{Adapter, Header, LATIN_1, SCHEMA};
 use super::Direction;
+use super::cast::{Adapter, Header, LATIN_1, SCHEMA};
 use crate::time::{Duration, Instant};
 
 /// Bytes of a line at most. This program's own lines have 25,000; other recorders write a screen at once.
@@ -89,6 +89,7 @@ struct HeaderLine {
 #[derive(Deserialize)]
 struct Details {
     schema: String,
+    begun_ms: Option<i64>,
     encoding: Option<String>,
     port: Option<String>,
     settings: Option<String>,
@@ -105,7 +106,8 @@ impl Reader {
     pub fn push(&mut self, bytes: &[u8], mut out: impl FnMut(Piece)) -> Result<(), ReadError> {
         for part in bytes.split_inclusive(|&byte| byte == b'\n') {
             if self.line.len() + part.len() > LONGEST_LINE {
-                return Err(self.error(1, format!("the line has more than {LONGEST_LINE} bytes")));
+                let what = format!("the line has more than {LONGEST_LINE} bytes");
+                return Err(ReadError { line: self.number + 1, column: 1, what });
             }
             self.line.extend_from_slice(part);
             if part.ends_with(b"\n") {
@@ -179,18 +181,20 @@ impl Reader {
         }
         self.format = Some(Format { relative: read.version == 3, latin_1: encoding.is_some() });
         let details = read.axcon;
-        let unix_seconds = read.timestamp.filter(|seconds| seconds.abs() < 1e12).unwrap_or_default() as i64;
+        let timestamp = read.timestamp.filter(|seconds| seconds.abs() < 1e12).unwrap_or_default();
+        let begun = details.as_ref().and_then(|details| details.begun_ms);
+        let unix_millis = begun.unwrap_or((timestamp * 1000.0) as i64);
         let part = details.as_ref().and_then(|details| details.part).unwrap_or(1);
         Ok(match details {
             Some(details) => Header {
-                unix_seconds,
+                unix_millis,
                 port: details.port.unwrap_or_default(),
                 settings: details.settings.unwrap_or_default(),
                 driver: details.driver,
                 adapter: details.adapter,
                 part,
             },
-            None => Header { unix_seconds, port: read.title.unwrap_or_default(), part, ..Header::default() },
+            None => Header { unix_millis, port: read.title.unwrap_or_default(), part, ..Header::default() },
         })
     }
 
@@ -229,9 +233,7 @@ impl Reader {
     }
 
     fn error(&self, column: usize, what: String) -> ReadError {
-        // While a line is being collected its number is not counted yet.
-        let line = self.number.max(1) + u64::from(!self.line.is_empty() && self.number > 0);
-        ReadError { line, column: column.max(1), what }
+        ReadError { line: self.number, column: column.max(1), what }
     }
 }
 
@@ -271,7 +273,7 @@ mod tests {
     fn header() -> Header {
         let adapter = Adapter { vid: "0403".into(), pid: "6001".into(), ..Adapter::default() };
         Header {
-            unix_seconds: 1_769_860_800,
+            unix_millis: 1_769_860_800_123,
             port: "/dev/ttyUSB0".into(),
             settings: "115200 8N1".into(),
             driver: Some("ftdi_sio".into()),
@@ -328,7 +330,7 @@ mod tests {
 
     #[test]
     fn a_killed_writers_last_line_is_forgiven_and_nothing_before_it_lost() {
-        let mut cast = Cast::begin(Vec::new(), &header()).expect("written");
+        let mut cast = Cast::begin(Vec::new(), &header(), Instant::ZERO).expect("written");
         for second in 0..3 {
             cast.push(Instant::from_millis(second * 1000), Direction::FromUnit, Secrecy::Open, b"row\r\n").expect("it");
         }
@@ -349,13 +351,12 @@ mod tests {
             events in prop::collection::vec((0u64..5_000_000, any::<bool>(), prop::collection::vec(any::<u8>(), 1..40)), 0..20),
             size in 1usize..200,
         ) {
-            let mut cast = Cast::begin(Vec::new(), &header()).expect("written");
-            let mut at = Instant::from_millis(77);
+            let begun = Instant::from_millis(77);
+            let mut cast = Cast::begin(Vec::new(), &header(), begun).expect("written");
+            let mut at = begun;
             let mut expected = vec![Piece::Header(header())];
-            let mut first = None;
             for (micros, from_unit, bytes) in events {
                 at += Duration::from_micros(micros);
-                let begun = *first.get_or_insert(at);
                 let direction = if from_unit { Direction::FromUnit } else { Direction::ToUnit };
                 cast.push(at, direction, Secrecy::Open, &bytes).expect("written");
                 expected.push(Piece::Bytes { at: Instant::ZERO + at.since(begun), direction, bytes });

@@ -126,7 +126,7 @@ impl Work for StreamOn {
                 self.heard(message, desk)
             }
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
-            Signal::Tick | Signal::Hold(_) => None,
+            Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Cancel => {
                 if self.stage != OnStage::Period {
                     desk.leave_dialogue();
@@ -179,7 +179,7 @@ impl Work for StreamOff {
                     Some(Outcome::Done(Job::StreamOff))
                 }
             },
-            Signal::Tick | Signal::Hold(_) => None,
+            Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Cancel => {
                 desk.leave_dialogue();
                 Some(Outcome::Cancelled(Job::StreamOff))
@@ -232,7 +232,7 @@ impl Work for RestoreDefaults {
                 let awaited = if self.confirmed { "the banner after the reset" } else { "the question for Yes" };
                 Some(Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard: self.heard })
             }
-            Signal::Tick | Signal::Hold(_) => None,
+            Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Cancel => {
                 if !self.confirmed {
                     desk.leave_dialogue();

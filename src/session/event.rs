@@ -86,6 +86,9 @@ pub enum Refusal {
     /// The password is empty or holds a control character, which would end it early.
     #[error("the password is empty or holds a control character")]
     Password,
+    /// The session listens to a recording.
+    #[error("this is a recording: nothing can be sent to the unit")]
+    ReadOnly,
     /// The unit holds us by XOFF, and too much waits already.
     #[error("the unit does not take what has been typed so far (held by XOFF)")]
     Held,

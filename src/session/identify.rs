@@ -90,7 +90,7 @@ impl Work for Identify {
                 }
                 None
             }
-            Signal::Hold(_) => None,
+            Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => {
                 if self.is_answered() || self.asked == QUESTIONS.len() {
                     return self.conclude(desk);

@@ -23,6 +23,10 @@ pub(super) enum Signal<'a> {
     Cancel,
     /// The port is gone: nothing can be sent or heard any more.
     LinkLost,
+    /// In a recording: these keys were sent then.
+    Typed(&'a [u8]),
+    /// In a recording: it has ended.
+    Over,
 }
 
 /// What a job can do.
@@ -36,6 +40,8 @@ pub(super) struct Desk<'a> {
     pub(super) pending: Option<&'a Text>,
     /// Set when what the unit prints from now on is an answer, and no part of the line before.
     pub(super) cut: bool,
+    /// Set when the job has read something from what it was told, and no recogniser had.
+    pub(super) understood: bool,
     /// Bytes received so far: text that begins here or later is newer than this moment.
     pub(super) received: u64,
     /// Set when secret bytes have been queued: what comes back until the next line end may echo them.

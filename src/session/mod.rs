@@ -10,6 +10,8 @@ mod dictionary;
 mod event;
 mod identify;
 mod job;
+mod overheard;
+mod redactor;
 mod transfer;
 mod transmitter;
 mod upload;
@@ -18,6 +20,8 @@ pub use event::*;
 
 use std::collections::VecDeque;
 
+use zeroize::Zeroizing;
+
 use crate::device::Product;
 use crate::endpoint::{Endpoint, Secrecy, Transmit};
 use crate::record::{Direction, Record, Span};
@@ -25,11 +29,15 @@ use crate::time::character_time;
 use crate::time::{Duration, Instant};
 use crate::wire::{Confidence, Framer, Item, LoaderText, Message, NmtState, Prompt, Text, Vocabulary};
 use job::{Desk, Signal, Work};
+use redactor::Redactor;
 use transmitter::Transmitter;
 
 /// Silence behind a text without a line end that makes a prompt of it: several character times, and more than an
 /// adapter's latency of 16 ms.
 const PROMPT_QUIET: Duration = Duration::from_millis(60);
+
+/// How long bytes that may be the beginning of the password wait for the next ones.
+const ECHO_QUIET: Duration = Duration::from_millis(30);
 
 /// A conversation with one unit.
 pub struct Session {
@@ -49,6 +57,15 @@ pub struct Session {
     /// L has been typed by hand: what follows up to Enter may be the password, even if the unit asks for it in words we
     /// do not know.
     load_key: bool,
+    redactor: Redactor,
+    /// What has been typed by hand of the password so far.
+    typed_secret: Zeroizing<Vec<u8>>,
+    /// When bytes that the redactor keeps back are handed out.
+    echo_due: Option<Instant>,
+    /// It listens to a recording: nothing is ever sent.
+    passive: bool,
+    /// The last thing that was sent was the question for the menu.
+    asked_for_menu: bool,
 }
 
 /// The job that runs, and which it is.
@@ -89,7 +106,21 @@ impl Session {
             prompt: PromptWatch::default(),
             password_open: false,
             load_key: false,
+            redactor: Redactor::default(),
+            typed_secret: Zeroizing::default(),
+            echo_due: None,
+            passive: false,
+            asked_for_menu: false,
         }
+    }
+
+    /// A conversation that has been: it is told what both ends said ([`Session::handle_sent`]), sends nothing, and jobs
+    /// read what they can from what they hear, up to [`Session::recording_over`].
+    ///
+    /// # Panics
+    /// If `baud` is 0.
+    pub fn of_recording(baud: u32) -> Self {
+        Session { passive: true, ..Session::new(baud) }
     }
 
     /// Takes a command, or says why not.
@@ -105,6 +136,20 @@ impl Session {
                 }
                 self.signal(Signal::Cancel);
                 return Ok(());
+            }
+            Command::ReadDictionary if self.passive => (Job::ReadDictionary, Box::<overheard::Dictionary>::default()),
+            Command::Diagnostics { pages } if self.passive => {
+                (Job::Diagnostics, Box::new(overheard::Diagnostics::new(pages)))
+            }
+            Command::Keys(_)
+            | Command::Identify
+            | Command::StreamOn { .. }
+            | Command::StreamOff
+            | Command::RestoreDefaults
+            | Command::Load(_)
+                if self.passive =>
+            {
+                return Err(Refusal::ReadOnly);
             }
             Command::Keys(keys) => return self.keys(&keys),
             Command::Identify => (Job::Identify, Box::new(identify::Identify::default())),
@@ -123,6 +168,7 @@ impl Session {
                 if password.is_empty() || password.iter().any(u8::is_ascii_control) {
                     return Err(Refusal::Password);
                 }
+                self.redactor.look_for(password);
                 (Job::Load, Box::new(upload::Upload::new(*order)))
             }
         };
@@ -148,6 +194,36 @@ impl Session {
         self.transmitter.clear();
         self.signal(Signal::LinkLost);
         self.transmitter.clear();
+        self.cut_line();
+    }
+
+    /// The port is back, the unit behind it perhaps another state: it does not stop us until it says so, and waits for
+    /// no password that we know of.
+    pub fn link_back(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        self.transmitter.hold(now, false);
+        (self.password_open, self.load_key) = (false, false);
+        self.cut_line();
+    }
+
+    /// In a recording: these bytes were sent then.
+    pub fn handle_sent(&mut self, now: Instant, bytes: &[u8]) {
+        self.now = self.now.max(now);
+        self.record.push(self.now, Direction::ToUnit, Secrecy::Open, bytes);
+        self.asked_for_menu = bytes.iter().any(|key| matches!(key, b'm' | b'M'));
+        self.signal(Signal::Typed(bytes));
+        self.cut_line();
+    }
+
+    /// In a recording: it has ended. The running job ends with what it has heard.
+    pub fn recording_over(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        self.hand_out_echo();
+        self.look_at_prompt();
+        if self.facts.state == UnitState::Silent && self.record.received() > 0 {
+            self.facts.state = UnitState::Unknown;
+        }
+        self.signal(Signal::Over);
     }
 
     /// The next piece of news.
@@ -197,30 +273,71 @@ impl Session {
             if !(self.transmitter.push_text(typed, secrecy) && self.transmitter.push_text(enter, Secrecy::Open)) {
                 return Err(Refusal::Held);
             }
+            if secret {
+                self.note_typed(typed, !enter.is_empty());
+            }
             self.password_open |= secret && !typed.is_empty();
             self.load_key = enter.is_empty() && (secret || piece.ends_with(b"l") || piece.ends_with(b"L"));
         }
         Ok(())
     }
 
-    /// Appends to the record; what may echo the password is secret up to the next line end.
+    /// Keeps what is typed where a password is wanted, to know it again should the unit repeat it.
+    fn note_typed(&mut self, typed: &[u8], entered: bool) {
+        for &key in typed {
+            match key {
+                0x08 | 0x7F => {
+                    self.typed_secret.pop();
+                }
+                _ => self.typed_secret.push(key),
+            }
+        }
+        if entered {
+            let typed = std::mem::take(&mut self.typed_secret);
+            self.redactor.look_for(&typed);
+        }
+    }
+
+    /// Appends to the record; what may echo the password is secret up to the next line end, and the password itself
+    /// wherever it stands.
     fn append(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
-            let (part, secrecy) = if self.password_open {
+            let (part, is_echo) = if self.password_open {
                 let end = rest.iter().position(|&byte| byte == b'\r' || byte == b'\n');
-                (&rest[..end.unwrap_or(rest.len())], Secrecy::Secret)
+                (&rest[..end.unwrap_or(rest.len())], true)
             } else {
-                (rest, Secrecy::Open)
+                (rest, false)
             };
             if part.is_empty() {
                 self.password_open = false;
                 continue;
             }
-            self.record.push(self.now, Direction::FromUnit, secrecy, part);
             rest = &rest[part.len()..];
-            self.frame(part);
+            if is_echo {
+                self.hand_out_echo();
+                self.take_in(part, Secrecy::Secret);
+                continue;
+            }
+            for (bytes, secrecy) in self.redactor.push(part) {
+                self.take_in(&bytes, secrecy);
+            }
         }
+        self.echo_due = self.redactor.keeps_back().then(|| self.now + ECHO_QUIET);
+    }
+
+    /// What looked like the beginning of the password was none.
+    fn hand_out_echo(&mut self) {
+        self.echo_due = None;
+        let bytes = self.redactor.flush();
+        if !bytes.is_empty() {
+            self.take_in(&bytes, Secrecy::Open);
+        }
+    }
+
+    fn take_in(&mut self, bytes: &[u8], secrecy: Secrecy) {
+        self.record.push(self.now, Direction::FromUnit, secrecy, bytes);
+        self.frame(bytes);
     }
 
     fn frame(&mut self, bytes: &[u8]) {
@@ -228,7 +345,8 @@ impl Session {
         self.framer.push(bytes, |item| items.push(item));
         for item in items {
             match item {
-                Item::Line(text) => {
+                Item::Line(mut text) => {
+                    self.redactor.scrub(&mut text.text);
                     let message = self.vocabulary.line(&text.text);
                     self.heard(text, message);
                 }
@@ -250,7 +368,8 @@ impl Session {
     /// Looks at a text without a line end behind which the unit has fallen silent.
     fn look_at_prompt(&mut self) {
         self.prompt.due = None;
-        let Some(text) = self.framer.pending() else { return };
+        let Some(mut text) = self.framer.pending() else { return };
+        self.redactor.scrub(&mut text.text);
         self.prompt.seen = text.span.end;
         let message = match self.vocabulary.prompt(&text.text) {
             Some(prompt) => Message::Prompt(prompt),
@@ -285,7 +404,7 @@ impl Session {
     /// Folds a message into the facts.
     fn learn(&mut self, span: Span, message: &Message) {
         let before = self.facts.clone();
-        let asked = self.job() == Some(Job::Identify);
+        let asked = self.asked_for_menu || self.job() == Some(Job::Identify);
         let origin = if asked { Origin::Menu } else { Origin::Banner };
         let facts = &mut self.facts;
         match message {
@@ -346,11 +465,15 @@ impl Session {
             events: &mut self.events,
             pending: pending.as_ref(),
             cut: false,
+            understood: false,
             received: self.record.received(),
             echo_is_secret: &mut self.password_open,
         };
         let outcome = running.work.handle(signal, &mut desk);
         let cut = desk.cut;
+        if desk.understood && matches!(signal, Signal::Heard(_, Message::Text)) {
+            self.facts.unrecognised_lines = self.facts.unrecognised_lines.saturating_sub(1);
+        }
         if self.facts != before {
             self.events.push_back(Event::FactsChanged);
         }
@@ -392,6 +515,9 @@ impl Endpoint for Session {
 
     fn handle_timeout(&mut self, now: Instant) {
         self.now = self.now.max(now);
+        if self.echo_due.is_some_and(|due| due <= self.now) {
+            self.hand_out_echo();
+        }
         if self.prompt.due.is_some_and(|due| due <= self.now) {
             self.look_at_prompt();
         }
@@ -399,6 +525,9 @@ impl Endpoint for Session {
     }
 
     fn poll_transmit(&mut self) -> Option<Transmit> {
+        if self.passive {
+            return None;
+        }
         let transmit = self.transmitter.poll(self.now)?;
         self.record.push(self.now, Direction::ToUnit, transmit.secrecy, &transmit.bytes);
         Some(transmit)
@@ -406,6 +535,6 @@ impl Endpoint for Session {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let job = self.running.as_ref().and_then(|running| running.work.deadline());
-        [self.prompt.due, self.transmitter.poll_timeout(), job].into_iter().flatten().min()
+        [self.prompt.due, self.echo_due, self.transmitter.poll_timeout(), job].into_iter().flatten().min()
     }
 }

@@ -642,6 +642,7 @@ impl Work for Upload {
                 self.report_progress(desk);
                 None
             }
+            Signal::Typed(_) | Signal::Over => None,
             Signal::Tick => self.tick(desk),
             Signal::Heard(text, message) => {
                 self.quote(text, message);

@@ -4,11 +4,15 @@
 //! what comes in one go, has numbers in it and comes again. Pages that come already are joined; when it is enough, S
 //! is pressed until they have stopped.
 
+mod assembler;
+
+pub(super) use assembler::{Assembler, Page};
+
 use super::event::{Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
-use crate::wire::{Message, Prompt, Text, diagnostics};
+use crate::wire::{Message, Prompt};
 
 /// How long to look for pages that come already: one comes every second.
 const WATCH: Duration = Duration::from_millis(1300);
@@ -17,19 +21,12 @@ const WATCH: Duration = Duration::from_millis(1300);
 const FIRST_PAGE: Duration = Duration::from_millis(6500);
 /// How long the next page may take.
 const NEXT_PAGE: Duration = Duration::from_millis(2500);
-/// Silence that ends a page: lines follow each other within a millisecond, an adapter adds some 20.
-const QUIET: Duration = Duration::from_millis(200);
-/// How long a text without a line end must stay as it is to count as a page's last line, and not as a row of the stream
-/// under way.
-const STILL: Duration = Duration::from_millis(40);
 /// Time without a page behind the key that stops them.
 const STOPPED: Duration = Duration::from_millis(1500);
 /// A page that comes so soon behind that key was under way before it.
 const UNDER_WAY: Duration = Duration::from_millis(700);
 /// How often the key is pressed to stop them.
 const MOST_STOPS: u32 = 3;
-/// Lines of a page at most; more than a screen at 200x60 shows.
-const MOST_LINES: usize = 200;
 
 /// The job.
 #[derive(Debug)]
@@ -38,12 +35,7 @@ pub(super) struct Diagnostics {
     wanted: Option<u32>,
     taken: u32,
     stage: Stage,
-    page: Vec<Text>,
-    page_at: Instant,
-    /// When the page counts as complete.
-    page_due: Option<Instant>,
-    /// Where a text without a line end ended when the page was first looked at.
-    unended: Option<u64>,
+    page: Assembler,
     deadline: Option<Instant>,
     heard: Option<Span>,
 }
@@ -66,44 +58,15 @@ impl Diagnostics {
             wanted,
             taken: 0,
             stage: Stage::Watching,
-            page: Vec::new(),
-            page_at: Instant::ZERO,
-            page_due: None,
-            unended: None,
+            page: Assembler::default(),
             deadline: None,
             heard: None,
         }
     }
 
-    /// A line that may be part of a page.
-    fn line(&mut self, text: &Text, now: Instant) {
-        self.heard = Some(text.span);
-        if self.page.len() < MOST_LINES {
-            self.page.push(text.clone());
-        }
-        self.page_at = now;
-        self.page_due = Some(now + QUIET);
-        self.unended = None;
-    }
-
-    /// Nothing has followed for a while: what has come is a page if it shows numbers.
+    /// Nothing has followed for a while: what has come may be a page.
     fn page_complete(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let unended = desk.pending.map(|text| text.span.end);
-        let looked_at = std::mem::replace(&mut self.unended, unended);
-        if unended.is_some() && looked_at.is_none() {
-            self.page_due = Some(desk.now + STILL);
-            return None;
-        }
-        self.page_due = None;
-        let mut lines = std::mem::take(&mut self.page);
-        if let Some(text) = desk.pending.filter(|_| unended == looked_at) {
-            lines.push(text.clone());
-            // It has been read: what is painted over it is the next page.
-            desk.cut = true;
-        }
-        if !lines.iter().any(|line| !diagnostics::quantities(&line.text).is_empty()) {
-            return None;
-        }
+        let page = self.page.complete(desk)?;
         match self.stage {
             Stage::Stopping { at, .. } if desk.now.since(at) < UNDER_WAY => {
                 self.deadline = Some(desk.now + STOPPED);
@@ -122,7 +85,7 @@ impl Diagnostics {
                 self.stage = Stage::Reading;
                 self.deadline = Some(desk.now + NEXT_PAGE);
                 self.taken += 1;
-                desk.events.push_back(Event::Page { at: self.page_at, lines });
+                desk.events.push_back(Event::Page { at: page.at, lines: page.lines });
                 if self.wanted.is_some_and(|wanted| self.taken >= wanted) {
                     self.stop(desk, 1, false);
                 }
@@ -181,11 +144,12 @@ impl Work for Diagnostics {
             }
             Signal::Heard(_, Message::Row(_) | Message::Prompt(_)) => None,
             Signal::Heard(text, _) => {
-                self.line(text, desk.now);
+                self.heard = Some(text.span);
+                self.page.line(text, desk.now);
                 None
             }
-            Signal::Hold(_) => None,
-            Signal::Tick if self.page_due.is_some_and(|due| due <= desk.now) => self.page_complete(desk),
+            Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
+            Signal::Tick if self.page.due().is_some_and(|due| due <= desk.now) => self.page_complete(desk),
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.time_is_up(desk),
             Signal::Tick => None,
             Signal::Cancel => match self.stage {
@@ -201,6 +165,6 @@ impl Work for Diagnostics {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        [self.page_due, self.deadline].into_iter().flatten().min()
+        [self.page.due(), self.deadline].into_iter().flatten().min()
     }
 }

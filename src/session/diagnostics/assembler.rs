@@ -1,0 +1,69 @@
+//! Pages from lines: what comes in one go and has numbers in it.
+
+use crate::session::job::Desk;
+use crate::time::{Duration, Instant};
+use crate::wire::{Text, diagnostics};
+
+/// Silence that ends a page: lines follow each other within a millisecond, an adapter adds some 20.
+const QUIET: Duration = Duration::from_millis(200);
+/// How long a text without a line end must stay as it is to count as a page's last line, and not as a row of the stream
+/// under way.
+const STILL: Duration = Duration::from_millis(40);
+/// Lines of a page at most; more than a screen at 200x60 shows.
+const MOST_LINES: usize = 200;
+
+/// A page.
+#[derive(Clone, Debug)]
+pub(in crate::session) struct Page {
+    /// When its last line came.
+    pub(in crate::session) at: Instant,
+    /// Its lines, as printed.
+    pub(in crate::session) lines: Vec<Text>,
+}
+
+/// The page under construction.
+#[derive(Debug, Default)]
+pub(in crate::session) struct Assembler {
+    lines: Vec<Text>,
+    at: Instant,
+    /// When the page counts as complete.
+    due: Option<Instant>,
+    /// Where a text without a line end ended when the page was first looked at.
+    unended: Option<u64>,
+}
+
+impl Assembler {
+    /// A line that may be part of a page.
+    pub(in crate::session) fn line(&mut self, text: &Text, now: Instant) {
+        if self.lines.len() < MOST_LINES {
+            self.lines.push(text.clone());
+        }
+        self.at = now;
+        self.due = Some(now + QUIET);
+        self.unended = None;
+    }
+
+    /// When the page may be complete.
+    pub(in crate::session) fn due(&self) -> Option<Instant> {
+        self.due
+    }
+
+    /// Nothing has followed for a while: what has come is a page if it shows numbers.
+    pub(in crate::session) fn complete(&mut self, desk: &mut Desk<'_>) -> Option<Page> {
+        let unended = desk.pending.map(|text| text.span.end);
+        let looked_at = std::mem::replace(&mut self.unended, unended);
+        if unended.is_some() && looked_at.is_none() {
+            self.due = Some(desk.now + STILL);
+            return None;
+        }
+        self.due = None;
+        let mut lines = std::mem::take(&mut self.lines);
+        if let Some(text) = desk.pending.filter(|_| unended == looked_at) {
+            lines.push(text.clone());
+            // It has been read: what is painted over it is the next page.
+            desk.cut = true;
+        }
+        let has_numbers = lines.iter().any(|line| !diagnostics::quantities(&line.text).is_empty());
+        has_numbers.then_some(Page { at: self.at, lines })
+    }
+}

@@ -1,0 +1,112 @@
+//! Entries of the object dictionary from lines, in whatever order and layout they come.
+
+use std::collections::BTreeMap;
+
+use crate::canopen::ObjectAddress;
+use crate::device::Product;
+use crate::session::event::{DictionaryReading, ReadEntry};
+use crate::wire::{Text, dictionary};
+
+/// Entries that are kept at most.
+const MOST_ENTRIES: usize = 20_000;
+
+/// What has been read so far.
+#[derive(Default)]
+pub(in crate::session) struct Collector {
+    /// The product whose objects these are, once it is known.
+    pub(in crate::session) product: Option<&'static Product>,
+    entries: BTreeMap<ObjectAddress, ReadEntry>,
+    unrecognised_lines: u64,
+    /// The object whose entries follow.
+    heading: Option<u16>,
+    /// The last entry that was read: its sub-index tells how the next one is written.
+    last: Option<ObjectAddress>,
+}
+
+impl Collector {
+    /// Takes a line of the view, or something else. Says whether an entry was read from it.
+    pub(in crate::session) fn line(&mut self, text: &Text) -> bool {
+        let product = self.product;
+        let knows = |index| product.is_none_or(|product| product.dictionary.object(index).is_some());
+        let Some(line) = dictionary::line(&text.text, knows) else {
+            self.unrecognised_lines += 1;
+            return false;
+        };
+        if line.index.is_some() {
+            self.heading = line.index;
+        }
+        let Some(index) = self.heading else {
+            self.unrecognised_lines += 1;
+            return false;
+        };
+        let object = product.and_then(|product| product.dictionary.object(index));
+        let single = object.is_none_or(|object| object.entries.len() == 1);
+        let before = self.last.filter(|last| last.index == index).map(|last| last.sub);
+        let at = ObjectAddress::new(index, line.sub.map_or(0, |sub| sub.behind(before)));
+        let entry = object.and_then(|object| object.entry(at.sub));
+        let shown = match (object, entry) {
+            (Some(object), Some(entry)) if line.sub.is_some() || single => {
+                // A unit like `100 µs` holds a number, which is not the value.
+                let unit = entry.unit.as_deref().unwrap_or_default();
+                let plain = unit.replace('°', "").replace('µ', "u").replace('Ω', "Ohm");
+                dictionary::value(&line.rest, entry.data_type, &[&object.name, &entry.name, unit, &plain])
+            }
+            // A heading.
+            (Some(_), Some(_)) => return false,
+            (Some(_), None) | (None, _) => None,
+        };
+        match (shown, entry) {
+            (Some(shown), _) => {
+                let value = match shown {
+                    dictionary::Shown::Value(value) => Some(value),
+                    dictionary::Shown::Nothing => None,
+                };
+                self.keep(ReadEntry { at, value, text: line.rest, span: text.span, known: true });
+                true
+            }
+            // An object that the manual does not have is kept as it is printed.
+            (None, None) if line.sub.is_some() => {
+                self.keep(ReadEntry { at, value: None, text: line.rest, span: text.span, known: false });
+                true
+            }
+            // A heading of such an object, or of a variable whose value stands below.
+            (None, None) => false,
+            (None, Some(_)) => {
+                self.unrecognised_lines += u64::from(line.sub.is_some());
+                false
+            }
+        }
+    }
+
+    /// The view has been left: a line without an index belongs to nothing read before.
+    pub(in crate::session) fn interrupt(&mut self) {
+        (self.heading, self.last) = (None, None);
+    }
+
+    /// Number of entries.
+    pub(in crate::session) fn count(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether every entry that the product has was there.
+    pub(in crate::session) fn has_all(&self) -> bool {
+        self.product
+            .is_some_and(|product| product.dictionary.entries().all(|(at, _, _)| self.entries.contains_key(&at)))
+    }
+
+    /// Gives what was read, in the order of the addresses.
+    pub(in crate::session) fn take(&mut self, complete: bool) -> DictionaryReading {
+        DictionaryReading {
+            entries: std::mem::take(&mut self.entries).into_values().collect(),
+            complete,
+            unrecognised_lines: self.unrecognised_lines,
+        }
+    }
+
+    fn keep(&mut self, entry: ReadEntry) {
+        self.last = Some(entry.at);
+        if self.entries.len() < MOST_ENTRIES || self.entries.contains_key(&entry.at) {
+            self.entries.insert(entry.at, entry);
+        }
+    }
+}

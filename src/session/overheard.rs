@@ -1,0 +1,137 @@
+//! Jobs on a recording: nobody can be asked, so they listen to what was said, and end when the recording does.
+
+use super::diagnostics::{Assembler, Page};
+use super::dictionary::Collector;
+use super::event::{Event, Job, Outcome};
+use super::job::{Desk, Signal, Work};
+use crate::device::Product;
+use crate::record::Span;
+use crate::time::Instant;
+use crate::wire::{Message, Prompt, diagnostics};
+
+/// Reads the entries of the object dictionary that somebody walked through.
+#[derive(Default)]
+pub(super) struct Dictionary {
+    collector: Collector,
+    /// The menu came back behind entries: the walk was ended in order.
+    left: bool,
+    heard: Option<Span>,
+}
+
+impl Work for Dictionary {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Heard(_, Message::Row(_) | Message::Loader(_) | Message::Software(_) | Message::FirstStart) => None,
+            Signal::Heard(_, Message::MenuKey(_)) => {
+                self.left = self.collector.count() > 0;
+                self.collector.interrupt();
+                None
+            }
+            Signal::Heard(text, _) => {
+                let product = desk.facts.product.as_ref().and_then(|known| Product::named(&known.value));
+                self.collector.product = product.or(self.collector.product);
+                desk.understood = self.collector.line(text);
+                if desk.understood {
+                    self.heard = Some(text.span);
+                    self.left = false;
+                }
+                None
+            }
+            Signal::Over if self.collector.count() == 0 => {
+                let awaited = "an entry of the object dictionary";
+                Some(Outcome::NoAnswer { job: Job::ReadDictionary, awaited, heard: self.heard })
+            }
+            Signal::Over => {
+                let complete = self.collector.has_all() || (self.left && self.collector.product.is_none());
+                Some(Outcome::DictionaryRead(Box::new(self.collector.take(complete))))
+            }
+            Signal::Cancel | Signal::LinkLost => Some(Outcome::Cancelled(Job::ReadDictionary)),
+            Signal::Begin | Signal::Hold(_) | Signal::Typed(_) | Signal::Tick => None,
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        None
+    }
+}
+
+/// Reads the pages of diagnostics that came. A page is what comes in one go behind an S, or again with the same
+/// labels: menus and dictionaries have numbers in them as well.
+pub(super) struct Diagnostics {
+    wanted: Option<u32>,
+    taken: u32,
+    page: Assembler,
+    /// S has been typed an odd number of times.
+    switched_on: bool,
+    /// The page before, and whether it has been given out.
+    before: Option<(Page, Vec<String>, bool)>,
+    heard: Option<Span>,
+}
+
+impl Diagnostics {
+    pub(super) fn new(wanted: Option<u32>) -> Self {
+        Diagnostics { wanted, taken: 0, page: Assembler::default(), switched_on: false, before: None, heard: None }
+    }
+
+    fn page(&mut self, page: Page, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let quantities = page.lines.iter().flat_map(|line| diagnostics::quantities(&line.text));
+        let labels: Vec<String> = quantities.map(|quantity| quantity.label).collect();
+        let before = self.before.take();
+        let again = before.as_ref().is_some_and(|(_, others, _)| *others == labels);
+        let given = self.switched_on || again;
+        if let Some((first, _, false)) = before.filter(|_| again) {
+            self.give(first, desk);
+        }
+        if given {
+            self.give(page.clone(), desk);
+        }
+        self.before = Some((page, labels, given));
+        self.wanted.is_some_and(|wanted| self.taken >= wanted).then_some(Outcome::Done(Job::Diagnostics))
+    }
+
+    fn give(&mut self, page: Page, desk: &mut Desk<'_>) {
+        if self.wanted.is_none_or(|wanted| self.taken < wanted) {
+            self.taken += 1;
+            desk.events.push_back(Event::Page { at: page.at, lines: page.lines });
+        }
+    }
+}
+
+impl Work for Diagnostics {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Heard(_, Message::Row(_) | Message::MenuKey(_) | Message::Loader(_)) => None,
+            Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults | Prompt::Source(_))) => None,
+            Signal::Heard(text, _) => {
+                self.heard = Some(text.span);
+                self.page.line(text, desk.now);
+                None
+            }
+            Signal::Typed(keys) => {
+                for key in keys {
+                    match key {
+                        b's' | b'S' => self.switched_on = !self.switched_on,
+                        b'v' | b'V' | b'm' | b'M' | b'l' | b'L' => self.switched_on = false,
+                        _ => {}
+                    }
+                }
+                None
+            }
+            Signal::Tick if self.page.due().is_some_and(|due| due <= desk.now) => {
+                let page = self.page.complete(desk)?;
+                self.page(page, desk)
+            }
+            Signal::Over if self.taken == 0 => {
+                let awaited = "a page of diagnostics";
+                Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
+            }
+            Signal::Over => Some(Outcome::Done(Job::Diagnostics)),
+            Signal::Cancel | Signal::LinkLost => Some(Outcome::Cancelled(Job::Diagnostics)),
+            Signal::Begin | Signal::Hold(_) | Signal::Tick => None,
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.page.due()
+    }
+}

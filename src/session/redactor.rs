@@ -1,0 +1,163 @@
+//! Keeps the password out of the record wherever the unit repeats it.
+//!
+//! Behind the password's own prompt everything is secret up to the end of the line. This is for the rest: a unit that
+//! says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
+//! next ones tell, for a moment at most: the session hands them out when the line has been silent.
+
+use zeroize::Zeroizing;
+
+use crate::endpoint::Secrecy;
+use crate::record::REDACTED;
+
+/// A password shorter than this is found in too much that has nothing to do with it.
+const SHORTEST: usize = 4;
+/// Longer ones are compared as far as this.
+const LONGEST: usize = 128;
+
+/// Finds one secret in a stream of bytes.
+#[derive(Default)]
+pub(super) struct Redactor {
+    secret: Zeroizing<Vec<u8>>,
+    /// Length of the longest part of the secret that is both its beginning and the end of its first so many bytes.
+    fallback: Vec<usize>,
+    /// How many of the secret's first bytes have come last.
+    matched: usize,
+}
+
+/// Bytes, and whether they are the secret.
+pub(super) type Piece = (Vec<u8>, Secrecy);
+
+impl Redactor {
+    /// Looks for this secret from now on.
+    pub(super) fn look_for(&mut self, secret: &[u8]) {
+        let secret = &secret[..secret.len().min(LONGEST)];
+        *self = Redactor::default();
+        if secret.len() < SHORTEST {
+            return;
+        }
+        self.secret = Zeroizing::new(secret.to_vec());
+        self.fallback = vec![0; secret.len()];
+        let mut length = 0;
+        for at in 1..secret.len() {
+            while length > 0 && secret[at] != secret[length] {
+                length = self.fallback[length - 1];
+            }
+            length += usize::from(secret[at] == secret[length]);
+            self.fallback[at] = length;
+        }
+    }
+
+    /// Takes bytes and gives those whose nature is known, in their order.
+    pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<Piece> {
+        if self.secret.is_empty() {
+            return vec![(bytes.to_vec(), Secrecy::Open)];
+        }
+        let mut pieces = Vec::new();
+        let mut open = Vec::new();
+        for &byte in bytes {
+            while self.matched > 0 && self.secret[self.matched] != byte {
+                let shorter = self.fallback[self.matched - 1];
+                open.extend_from_slice(&self.secret[..self.matched - shorter]);
+                self.matched = shorter;
+            }
+            if self.secret[self.matched] != byte {
+                open.push(byte);
+                continue;
+            }
+            self.matched += 1;
+            if self.matched == self.secret.len() {
+                if !open.is_empty() {
+                    pieces.push((std::mem::take(&mut open), Secrecy::Open));
+                }
+                pieces.push((self.secret.to_vec(), Secrecy::Secret));
+                self.matched = 0;
+            }
+        }
+        if !open.is_empty() {
+            pieces.push((open, Secrecy::Open));
+        }
+        pieces
+    }
+
+    /// Whether bytes are kept back.
+    pub(super) fn keeps_back(&self) -> bool {
+        self.matched > 0
+    }
+
+    /// What was kept back: no more will come soon.
+    pub(super) fn flush(&mut self) -> Vec<u8> {
+        self.secret[..std::mem::take(&mut self.matched)].to_vec()
+    }
+
+    /// Replaces the secret in a text.
+    pub(super) fn scrub(&self, text: &mut String) {
+        if let Ok(secret) = std::str::from_utf8(&self.secret)
+            && !secret.is_empty()
+            && text.contains(secret)
+        {
+            *text = text.replace(secret, &char::from(REDACTED).to_string().repeat(secret.chars().count()));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn redacted(secret: &[u8], chunks: &[&[u8]]) -> Vec<u8> {
+        let mut redactor = Redactor::default();
+        redactor.look_for(secret);
+        let mut all = Vec::new();
+        for chunk in chunks {
+            for (bytes, secrecy) in redactor.push(chunk) {
+                let is_open = secrecy == Secrecy::Open;
+                all.extend(bytes.iter().map(|&byte| if is_open { byte } else { REDACTED }));
+            }
+        }
+        all.extend(redactor.flush());
+        all
+    }
+
+    #[test]
+    fn the_secret_is_found_in_pieces_and_behind_its_own_beginning() {
+        let said = |chunks: &[&str]| {
+            let chunks: Vec<&[u8]> = chunks.iter().map(|chunk| chunk.as_bytes()).collect();
+            String::from_utf8(redacted(b"ABABC", &chunks)).expect("ASCII")
+        };
+        assert_eq!(said(&["wrong: AB", "ABC", "!"]), "wrong: *****!");
+        assert_eq!(said(&["ABABABC"]), "AB*****");
+        assert_eq!(said(&["ABAB", "D"]), "ABABD");
+        assert_eq!(said(&["ABA"]), "ABA");
+        assert_eq!(String::from_utf8(redacted(b"AB", &[b"CAB"])), Ok("CAB".into()), "too short to be looked for");
+    }
+
+    #[test]
+    fn a_text_is_scrubbed() {
+        let mut redactor = Redactor::default();
+        redactor.look_for(b"AXIO-2010");
+        let mut text = "no such password: AXIO-2010".to_owned();
+        redactor.scrub(&mut text);
+        assert_eq!(text, "no such password: *********");
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_is_lost_and_the_secret_never_comes_through(
+            secret in "[ab]{4,6}",
+            text in "[abc]{0,60}",
+            cuts in prop::collection::vec(0usize..60, 0..6),
+        ) {
+            let mut cuts: Vec<usize> = cuts.into_iter().map(|cut| cut.min(text.len())).collect();
+            cuts.extend([0, text.len()]);
+            cuts.sort_unstable();
+            let chunks: Vec<&[u8]> = cuts.windows(2).map(|pair| &text.as_bytes()[pair[0]..pair[1]]).collect();
+            let found = redacted(secret.as_bytes(), &chunks);
+            prop_assert_eq!(found.len(), text.len());
+            prop_assert!(!found.windows(secret.len()).any(|window| window == secret.as_bytes()));
+            for (was, is) in text.bytes().zip(&found) {
+                prop_assert!(was == *is || *is == REDACTED);
+            }
+        }
+    }
+}
