@@ -169,10 +169,14 @@ impl Comeback {
     /// How often it is looked for: soon enough for a person, rarely enough for the machine.
     pub const RETRY: Duration = Duration::from_millis(250);
 
-    /// What has to come back. `None` for units that ended with their link.
+    /// What has to come back; to be asked while it is there. `None` for what has no name that lasts: the number of a
+    /// pseudo-terminal belongs to somebody else soon.
     pub fn of(spec: &LinkSpec, connection: &Connection) -> Option<Self> {
         match spec {
-            LinkSpec::Serial(path) => Some(Comeback { path: path.clone(), adapter: connection.adapter().cloned() }),
+            LinkSpec::Serial(path) => {
+                let adapter = connection.adapter().cloned();
+                (adapter.is_some() || path.is_symlink()).then(|| Comeback { path: path.clone(), adapter })
+            }
             LinkSpec::Emulated(_) | LinkSpec::Replay(_) => None,
         }
     }

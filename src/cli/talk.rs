@@ -8,7 +8,7 @@ use jiff::Timestamp;
 
 use super::Global;
 use super::error::{CliError, Kind};
-use super::link;
+use super::link::{self, Comeback};
 use super::output::Output;
 use super::playback::Playback;
 use crate::host::clock::Clock;
@@ -29,6 +29,7 @@ pub struct Talk {
     session: Session,
     port: String,
     spec: LinkSpec,
+    comeback: Option<Comeback>,
     inputs: SyncSender<Input>,
     _signals: Signals,
 }
@@ -98,6 +99,7 @@ impl Talk {
         let spec: LinkSpec = link::spec(global)?;
         let (sender, inputs) = host::channel();
         let signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
+        let mut comeback = None;
         let (line, session) = if let LinkSpec::Replay(path) = &spec {
             let recording = Recording::open(path).map_err(link::recording_error)?;
             let line = Line::Recorded(Box::new(Playback::new(recording, inputs)));
@@ -105,6 +107,7 @@ impl Talk {
         } else {
             let clock = Clock::start();
             let connection = link::open(&spec, global, clock, sender.clone())?;
+            comeback = Comeback::of(&spec, &connection);
             let mut recorder = Recorder::start(&link::recording(global), &connection, clock);
             if let Some(warning) = recorder.take_warning() {
                 output.remark(&format!("axcon: {warning}"));
@@ -112,7 +115,7 @@ impl Talk {
             let line = Line::Live(Box::new(Pump::new(connection, inputs, clock, recorder)));
             (line, Session::new(global.baud))
         };
-        Ok(Talk { line, session, port: spec.to_string(), spec, inputs: sender, _signals: signals })
+        Ok(Talk { line, session, port: spec.to_string(), spec, comeback, inputs: sender, _signals: signals })
     }
 
     /// Runs a job to its end; `news` hears every event on the way. An interrupt cancels the job, a second one is final.
@@ -250,8 +253,7 @@ impl Talk {
         output: &mut Output,
     ) -> Result<bool, CliError> {
         let Line::Live(pump) = &mut self.line else { return Err(lost) };
-        let spec = link::Comeback::of(&self.spec, pump.connection());
-        let Some(spec) = spec.filter(|_| !patience.is_zero()) else { return Err(lost) };
+        let Some(comeback) = self.comeback.as_ref().filter(|_| !patience.is_zero()) else { return Err(lost) };
         let clock = pump.clock();
         let gone = clock.now();
         self.session.link_lost(gone);
@@ -259,12 +261,12 @@ impl Talk {
         output.remark(&format!("axcon: {lost}; waiting {} s for it to come back", patience.as_secs()));
         let deadline = gone + patience;
         let connection = loop {
-            match pump.pause(link::Comeback::RETRY) {
+            match pump.pause(Comeback::RETRY) {
                 Err(_) => return Ok(false),
                 Ok(()) if clock.now() >= deadline => return Err(lost),
                 Ok(()) => {}
             }
-            if let Some(connection) = spec.open(global, clock, self.inputs.clone()) {
+            if let Some(connection) = comeback.open(global, clock, self.inputs.clone()) {
                 break connection;
             }
         };

@@ -63,6 +63,12 @@ pub fn open(
 }
 
 impl Lines {
+    /// A break would have to pass the thread that reads; nobody has needed one here yet.
+    #[cfg(windows)]
+    pub fn send_break(&self) -> io::Result<()> {
+        Err(io::Error::new(io::ErrorKind::Unsupported, "not possible on this system"))
+    }
+
     /// Ends the thread: what is queued may leave for this long, then everything stops.
     pub fn close(&mut self, patience: Duration) {
         let _ = self.written.recv_timeout(patience);

@@ -316,6 +316,14 @@ impl Connection {
         })
     }
 
+    /// Sends a break: the line held low for a quarter of a second and more. Does not wait for its end.
+    ///
+    /// # Errors
+    /// If the link cannot do that.
+    pub fn send_break(&self) -> io::Result<()> {
+        self.lines.send_break()
+    }
+
     /// The port as the user named it.
     pub fn port(&self) -> &str {
         &self.port

@@ -20,7 +20,7 @@ use rustix::fs::{FlockOperation, Mode, OFlags};
 use rustix::io::Errno;
 use rustix::termios::{
     Action, ControlModes, InputModes, OptionalActions, SpecialCodeIndex, Termios, ioctl_tiocexcl, ioctl_tiocnxcl,
-    isatty, tcflow, tcgetattr, tcsetattr,
+    isatty, tcflow, tcgetattr, tcsendbreak, tcsetattr,
 };
 
 use super::Input;
@@ -88,6 +88,12 @@ pub fn open(
 }
 
 impl Lines {
+    /// Sends a break, from a thread: the system waits for its end.
+    pub fn send_break(&self) -> io::Result<()> {
+        let port = self.port.clone();
+        thread::Builder::new().name("break".into()).spawn(move || tcsendbreak(&*port)).map(drop)
+    }
+
     /// Ends the threads: what is queued may leave for this long, then everything stops.
     pub fn close(&mut self, patience: Duration) {
         match self.written.recv_timeout(patience) {

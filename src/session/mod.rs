@@ -57,6 +57,8 @@ pub struct Session {
     /// L has been typed by hand: what follows up to Enter may be the password, even if the unit asks for it in words we
     /// do not know.
     load_key: bool,
+    /// What has been typed since the last Enter is no key of the menu.
+    typing_text: bool,
     redactor: Redactor,
     /// What has been typed by hand of the password so far.
     typed_secret: Zeroizing<Vec<u8>>,
@@ -106,6 +108,7 @@ impl Session {
             prompt: PromptWatch::default(),
             password_open: false,
             load_key: false,
+            typing_text: false,
             redactor: Redactor::default(),
             typed_secret: Zeroizing::default(),
             echo_due: None,
@@ -142,6 +145,7 @@ impl Session {
                 (Job::Diagnostics, Box::new(overheard::Diagnostics::new(pages)))
             }
             Command::Keys(_)
+            | Command::Bytes(_)
             | Command::Identify
             | Command::StreamOn { .. }
             | Command::StreamOff
@@ -152,6 +156,7 @@ impl Session {
                 return Err(Refusal::ReadOnly);
             }
             Command::Keys(keys) => return self.keys(&keys),
+            Command::Bytes(bytes) => return self.bytes(&bytes),
             Command::Identify => (Job::Identify, Box::new(identify::Identify::default())),
             Command::StreamOn { source, period } => {
                 if !(Duration::from_millis(1)..=Duration::from_secs(60)).contains(&period) {
@@ -202,7 +207,7 @@ impl Session {
     pub fn link_back(&mut self, now: Instant) {
         self.now = self.now.max(now);
         self.transmitter.hold(now, false);
-        (self.password_open, self.load_key) = (false, false);
+        (self.password_open, self.load_key, self.typing_text) = (false, false, false);
         self.cut_line();
     }
 
@@ -261,6 +266,19 @@ impl Session {
         self.password_open
     }
 
+    /// Whether all that was typed since the last Enter can be keys of the menu. An `l` in a word is none.
+    fn typed_menu_keys_only(&self, typed: &[u8]) -> bool {
+        !self.typing_text && typed.iter().all(|key| b"mvdtslx".contains(&key.to_ascii_lowercase()))
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) -> Result<(), Refusal> {
+        if let Some(running) = &self.running {
+            return Err(Refusal::Busy(running.job));
+        }
+        let secrecy = if self.password_open { Secrecy::Secret } else { Secrecy::Open };
+        if self.transmitter.push_text(bytes, secrecy) { Ok(()) } else { Err(Refusal::Held) }
+    }
+
     fn keys(&mut self, keys: &[u8]) -> Result<(), Refusal> {
         if let Some(running) = self.running.as_ref().filter(|running| running.job != Job::Identify) {
             return Err(Refusal::Busy(running.job));
@@ -277,7 +295,9 @@ impl Session {
                 self.note_typed(typed, !enter.is_empty());
             }
             self.password_open |= secret && !typed.is_empty();
-            self.load_key = enter.is_empty() && (secret || piece.ends_with(b"l") || piece.ends_with(b"L"));
+            let is_load_key = matches!(typed.last(), Some(b'l' | b'L')) && self.typed_menu_keys_only(typed);
+            self.load_key = enter.is_empty() && (secret || is_load_key);
+            self.typing_text = enter.is_empty() && !self.typed_menu_keys_only(typed);
         }
         Ok(())
     }

@@ -4,6 +4,7 @@
 //! is looking for: it becomes a visible sign.
 
 use crate::wire::visible;
+pub use crate::wire::visible::column;
 
 /// A text from outside (a file name, an error of the system, something a unit said) on one line, without anything that
 /// moves the cursor or turns the direction of writing.
@@ -18,13 +19,5 @@ pub fn sentence(foreign: &str) -> String {
     match characters.next() {
         Some(first) => first.to_uppercase().chain(characters).collect(),
         None => text,
-    }
-}
-
-/// One column for one byte, for the text column of a hex view.
-pub fn column(byte: u8) -> char {
-    match byte {
-        b' '..=b'~' => char::from(byte),
-        _ => '.',
     }
 }

@@ -25,6 +25,14 @@ pub fn line(bytes: &[u8]) -> String {
     text
 }
 
+/// One column for one byte, for the text column of a hex view.
+pub fn column(byte: u8) -> char {
+    match byte {
+        b' '..=b'~' => char::from(byte),
+        _ => '.',
+    }
+}
+
 /// Makes a stream of bytes visible, wherever it is cut into pieces.
 #[derive(Clone, Debug)]
 pub struct Visible {

@@ -420,7 +420,7 @@ fn the_terminal_shows_what_is_harmless_and_logs_what_came() {
     let sent = b"caf\xc3\xa9\x1b[2J\xff\x9b\ttab\r\n";
     let ran = world.run(&["terminal", "--port", text(unit.serial()), "--log", "raw.log"], sent);
     assert_eq!(ran.code, Some(0), "{}", ran.err);
-    assert_eq!(ran.out, "café^[[2J‹ff›‹9b›\ttab\r\n");
+    assert_eq!(ran.out, "café^[[2J‹ff›‹9b›\ttab\n");
     assert_eq!(fs::read(world.path("raw.log")).expect("a log"), sent);
 
     let recordings = world.files("state/axcon/recordings");

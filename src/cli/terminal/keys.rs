@@ -1,0 +1,165 @@
+//! What the user's keys mean in the plain terminal: for the unit, or for the terminal itself.
+//!
+//! Ctrl-] leaves, as in telnet; Ctrl-T makes the next key the terminal's own, as in other serial terminals. No menu of a
+//! unit uses either.
+
+use std::path::PathBuf;
+
+/// Ctrl-].
+const LEAVE: u8 = 0x1D;
+/// Ctrl-T.
+const PREFIX: u8 = 0x14;
+const ESCAPE: u8 = 0x1B;
+const CANCEL: u8 = 0x03;
+
+/// Bytes of a file's name at most.
+const LONGEST_NAME: usize = 4096;
+
+/// What is behind the prefix, for the help.
+pub const HELP: &str = "Ctrl-T and then: h hexadecimal, t times, e local echo, r raw, f send a file, b break, Ctrl-T \
+                        itself; Ctrl-] leaves";
+
+/// What the user wants.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Deed {
+    /// Bytes for the unit.
+    Send(Vec<u8>),
+    /// The end.
+    Leave,
+    /// Hexadecimal, or text again.
+    Hex,
+    /// Times before the lines, or none again.
+    Times,
+    /// What is typed is shown, or no longer.
+    Echo,
+    /// Bytes as they are, or text again.
+    Raw,
+    /// A break on the line.
+    Break,
+    /// The keys.
+    Help,
+    /// The name of a file is typed: show it so far.
+    Naming(String),
+    /// Send this file.
+    SendFile(PathBuf),
+    /// No file after all, or no more of it.
+    Cancel,
+}
+
+/// Where the keyboard stands.
+#[derive(Debug, Default)]
+pub struct Keys {
+    stage: Stage,
+    /// A file is being sent: keys for the unit wait for its end, and Ctrl-C ends it.
+    sending: bool,
+}
+
+#[derive(Debug, Default)]
+enum Stage {
+    #[default]
+    Typing,
+    AfterPrefix,
+    Naming(Vec<u8>),
+}
+
+impl Keys {
+    /// A file is being sent, or no longer.
+    pub fn set_sending(&mut self, sending: bool) {
+        self.sending = sending;
+    }
+
+    /// Takes what was typed and gives what it means.
+    pub fn press(&mut self, keys: &[u8]) -> Vec<Deed> {
+        let mut deeds = Vec::new();
+        for &key in keys {
+            match &mut self.stage {
+                _ if key == LEAVE => {
+                    deeds.push(Deed::Leave);
+                    return deeds;
+                }
+                Stage::Typing if key == PREFIX => self.stage = Stage::AfterPrefix,
+                Stage::Typing if self.sending => {
+                    if key == CANCEL {
+                        deeds.push(Deed::Cancel);
+                    }
+                }
+                Stage::Typing => match deeds.last_mut() {
+                    Some(Deed::Send(bytes)) => bytes.push(key),
+                    _ => deeds.push(Deed::Send(vec![key])),
+                },
+                Stage::AfterPrefix => {
+                    self.stage = Stage::Typing;
+                    match key.to_ascii_lowercase() {
+                        PREFIX => deeds.push(Deed::Send(vec![PREFIX])),
+                        b'h' => deeds.push(Deed::Hex),
+                        b't' => deeds.push(Deed::Times),
+                        b'e' => deeds.push(Deed::Echo),
+                        b'r' => deeds.push(Deed::Raw),
+                        b'b' => deeds.push(Deed::Break),
+                        b'f' if !self.sending => {
+                            self.stage = Stage::Naming(Vec::new());
+                            deeds.push(Deed::Naming(String::new()));
+                        }
+                        _ => deeds.push(Deed::Help),
+                    }
+                }
+                Stage::Naming(name) => match key {
+                    b'\r' | b'\n' => {
+                        let name = String::from_utf8_lossy(name).trim().to_owned();
+                        self.stage = Stage::Typing;
+                        deeds.push(if name.is_empty() { Deed::Cancel } else { Deed::SendFile(name.into()) });
+                    }
+                    ESCAPE | CANCEL => {
+                        self.stage = Stage::Typing;
+                        deeds.push(Deed::Cancel);
+                    }
+                    0x08 | 0x7F => {
+                        // A whole character goes, however many bytes it has.
+                        while name.pop().is_some_and(|byte| byte & 0xC0 == 0x80) {}
+                        deeds.push(Deed::Naming(String::from_utf8_lossy(name).into_owned()));
+                    }
+                    0..0x20 => {}
+                    _ if name.len() < LONGEST_NAME => {
+                        name.push(key);
+                        deeds.push(Deed::Naming(String::from_utf8_lossy(name).into_owned()));
+                    }
+                    _ => {}
+                },
+            }
+        }
+        deeds
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_the_units_but_for_two() {
+        let mut keys = Keys::default();
+        assert_eq!(keys.press(b"m\r\x03"), [Deed::Send(b"m\r\x03".to_vec())]);
+        assert_eq!(keys.press(b"\x14\x14v"), [Deed::Send(b"\x14v".to_vec())]);
+        assert_eq!(keys.press(b"\x14h\x14T\x14?"), [Deed::Hex, Deed::Times, Deed::Help]);
+        assert_eq!(keys.press(b"a\x1dlost"), [Deed::Send(b"a".to_vec()), Deed::Leave]);
+    }
+
+    #[test]
+    fn a_files_name_is_typed_corrected_and_given_up() {
+        let mut keys = Keys::default();
+        keys.press("\u{14}fa.Ä".as_bytes());
+        assert_eq!(keys.press(b"\x7f"), [Deed::Naming("a.".into())]);
+        assert_eq!(keys.press(b"S\r"), [Deed::Naming("a.S".into()), Deed::SendFile("a.S".into())]);
+        keys.press(b"\x14fx");
+        assert_eq!(keys.press(b"\x1b"), [Deed::Cancel]);
+        assert_eq!(keys.press(b"m"), [Deed::Send(b"m".to_vec())], "and the next key is the unit's again");
+    }
+
+    #[test]
+    fn while_a_file_is_sent_nothing_comes_between_and_ctrl_c_ends_it() {
+        let mut keys = Keys { sending: true, ..Keys::default() };
+        assert_eq!(keys.press(b"mmm"), []);
+        assert_eq!(keys.press(b"\x03"), [Deed::Cancel]);
+        assert_eq!(keys.press(b"\x14f"), [Deed::Help]);
+    }
+}

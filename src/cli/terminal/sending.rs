@@ -1,0 +1,161 @@
+//! A file on its way to the unit, a piece at a time.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
+
+use crate::cli::error::{CliError, Kind};
+
+/// What Enter is on the line, and the line ends of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum NewLine {
+    /// CR, as the units want it (manuals, chapter 4).
+    Cr,
+    /// LF.
+    Lf,
+    /// CR LF.
+    Crlf,
+    /// Whatever the file has; Enter is CR.
+    Keep,
+}
+
+impl NewLine {
+    /// What a key is on the line.
+    pub fn of_key(self, key: u8) -> &'static [u8] {
+        const KEYS: [u8; 256] = {
+            let mut keys = [0; 256];
+            let mut key = 0;
+            while key < 256 {
+                keys[key] = key as u8;
+                key += 1;
+            }
+            keys
+        };
+        match (key, self) {
+            (b'\r', NewLine::Lf) => b"\n",
+            (b'\r', NewLine::Crlf) => b"\r\n",
+            _ => &KEYS[usize::from(key)..=usize::from(key)],
+        }
+    }
+
+    fn text(self) -> &'static [u8] {
+        match self {
+            NewLine::Cr | NewLine::Keep => b"\r",
+            NewLine::Lf => b"\n",
+            NewLine::Crlf => b"\r\n",
+        }
+    }
+}
+
+/// A file being sent.
+pub struct Sending {
+    path: PathBuf,
+    file: Box<dyn Read + Send>,
+    new_line: NewLine,
+    /// The last byte of the piece before was a CR: an LF at the beginning of the next belongs to it.
+    after_return: bool,
+    sent: u64,
+}
+
+/// Bytes of a piece.
+const PIECE: usize = 256;
+
+impl Sending {
+    /// A file from its beginning.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn open(path: &Path, new_line: NewLine) -> Result<Self, CliError> {
+        let file = File::open(path).and_then(|file| match file.metadata()?.is_dir() {
+            true => Err(ErrorKind::IsADirectory.into()),
+            false => Ok(file),
+        });
+        let file = file.map_err(|error| failed(path, error))?;
+        Ok(Sending { path: path.to_owned(), file: Box::new(file), new_line, after_return: false, sent: 0 })
+    }
+
+    /// The next bytes for the line; none at the end.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn next(&mut self) -> Result<Vec<u8>, CliError> {
+        let mut buffer = [0; PIECE];
+        loop {
+            let count = match self.file.read(&mut buffer) {
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error) => return Err(failed(&self.path, error)),
+                Ok(count) => count,
+            };
+            let piece = self.with_line_ends(&buffer[..count]);
+            if count == 0 || !piece.is_empty() {
+                self.sent += piece.len() as u64;
+                return Ok(piece);
+            }
+        }
+    }
+
+    /// Bytes handed out so far.
+    pub fn sent(&self) -> u64 {
+        self.sent
+    }
+
+    fn with_line_ends(&mut self, bytes: &[u8]) -> Vec<u8> {
+        if self.new_line == NewLine::Keep {
+            return bytes.to_vec();
+        }
+        let mut piece = Vec::with_capacity(bytes.len() + 8);
+        for &byte in bytes {
+            let follows_return = std::mem::replace(&mut self.after_return, byte == b'\r');
+            match byte {
+                b'\n' if follows_return => {}
+                b'\r' | b'\n' => piece.extend_from_slice(self.new_line.text()),
+                _ => piece.push(byte),
+            }
+        }
+        piece
+    }
+}
+
+fn failed(path: &Path, error: std::io::Error) -> CliError {
+    CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot send '{}'", path.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn line_ends_of_a_file_become_those_of_the_line_wherever_it_is_cut() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("file");
+        // The CR LF of some line falls between two pieces.
+        for shift in 0..4 {
+            let line = "x".repeat(60);
+            let text = "y".repeat(shift) + &format!("{line}\r\n{line}\n{line}\r").repeat(20);
+            std::fs::write(&path, &text).expect("written");
+            for (new_line, end) in [(NewLine::Cr, "\r"), (NewLine::Crlf, "\r\n"), (NewLine::Lf, "\n")] {
+                let mut sending = Sending::open(&path, new_line).expect("opened");
+                let mut all = Vec::new();
+                loop {
+                    let piece = sending.next().expect("read");
+                    if piece.is_empty() {
+                        break;
+                    }
+                    all.extend(piece);
+                }
+                let expected = "y".repeat(shift) + &format!("{line}{end}").repeat(60);
+                assert_eq!(String::from_utf8(all).expect("ASCII"), expected, "{new_line:?}, {shift}");
+            }
+        }
+        assert!(Sending::open(folder.path(), NewLine::Cr).is_err(), "a folder is no file");
+    }
+
+    #[test]
+    fn enter_is_what_the_line_wants_and_every_other_key_itself() {
+        assert_eq!(NewLine::Crlf.of_key(b'\r'), b"\r\n");
+        assert_eq!(NewLine::Keep.of_key(b'\r'), b"\r");
+        for key in 0..=255u8 {
+            assert!(key == b'\r' || NewLine::Lf.of_key(key) == [key]);
+        }
+    }
+}
