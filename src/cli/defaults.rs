@@ -7,7 +7,7 @@ use super::confirm::confirm;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
-use super::talk::{Talk, expect_done};
+use super::talk::Talk;
 use crate::session::{Command, Outcome};
 
 /// Arguments of `axcon defaults`.
@@ -42,7 +42,7 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
             Err(CliError::message(Kind::NoAnswer, message)
                 .hint("'axcon identify' says whether the unit runs; 'axcon dictionary dump' shows its parameters"))
         }
-        outcome => expect_done(outcome),
+        outcome => talk.expect_done(outcome),
     };
     let facts = talk.session().facts().clone();
     talk.close(output);

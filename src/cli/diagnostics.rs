@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::Global;
 use super::error::{CliError, Kind};
 use super::output::{Closed, Output};
-use super::talk::{Ended, Talk, expect_done};
+use super::talk::{Ended, Talk};
 use crate::session::{Command, Event};
 use crate::wire::{diagnostics, visible};
 
@@ -82,7 +82,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         // Without a count, the interrupt is the way to end.
         Ended::Finished { interrupted: true, .. } if args.count.is_none() => Ok(()),
         Ended::Finished { interrupted: true, .. } => Err(CliError::message(Kind::Interrupted, "interrupted")),
-        Ended::Finished { outcome, interrupted: false } => expect_done(outcome),
+        Ended::Finished { outcome, interrupted: false } => talk.expect_done(outcome),
         Ended::Lost { error, .. } => Err(error),
     }
 }

@@ -11,7 +11,7 @@ use super::confirm::confirm;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
-use super::talk::{Ended, Talk, expect_done};
+use super::talk::{Ended, Talk};
 use crate::canopen::{DataType, ObjectAddress, Value};
 use crate::device::dictionary::{Access, Entry, Object};
 use crate::device::{Product, eds};
@@ -143,7 +143,8 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
             return Err(CliError::message(Kind::Interrupted, "interrupted; the view has been left"));
         }
         Ended::Finished { outcome, interrupted: false } => {
-            return expect_done(outcome)
+            return talk
+                .expect_done(outcome)
                 .and_then(|()| Err(CliError::message(Kind::Failed, "the reading ended without a result")));
         }
         Ended::Lost { error, .. } => {

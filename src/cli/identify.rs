@@ -9,7 +9,7 @@ use super::confirm::confirm;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
-use super::talk::{Talk, expect_done, no_answer_hints};
+use super::talk::{Talk, no_answer_hints};
 use crate::canopen::ObjectAddress;
 use crate::device::Product;
 use crate::record::Span;
@@ -120,7 +120,8 @@ impl Deep {
         let reading = match talk.ask(Command::ReadDictionary)? {
             Outcome::DictionaryRead(reading) => reading,
             outcome => {
-                return expect_done(outcome)
+                return talk
+                    .expect_done(outcome)
                     .and_then(|()| Err(CliError::message(Kind::Failed, "the reading ended without a result")));
             }
         };

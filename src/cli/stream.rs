@@ -12,7 +12,7 @@ use super::Global;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::{Closed, Output};
-use super::talk::{Calendar, Ended, Talk, expect_done};
+use super::talk::{Calendar, Ended, Talk};
 use crate::device::Product;
 use crate::session::{Command, Event, Outcome};
 use crate::time::{BITS_PER_CHARACTER, Duration, Instant};
@@ -93,7 +93,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if args.off {
         let outcome = talk.ask(Command::StreamOff)?;
         talk.close(output);
-        return expect_done(outcome);
+        return talk.expect_done(outcome);
     }
     let sink = Sink { file, format, source: wanted, calendar: talk.calendar(), header_written: false, rows: 0 };
     let period = args.period.map(Duration::from_millis);
@@ -156,7 +156,7 @@ impl Stream {
         })?;
         let was_on = match ended {
             Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => was_on,
-            Ended::Finished { outcome, interrupted: false } => return expect_done(outcome).map(|()| false),
+            Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(outcome).map(|()| false),
             Ended::Finished { interrupted: true, .. } => {
                 return Err(CliError::message(Kind::Interrupted, "interrupted"));
             }
@@ -264,9 +264,13 @@ fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
 /// Puts the stream back to what it was.
 fn leave_as_found(talk: &mut Talk, was_on: bool, found: Option<Found>, output: &mut Output) -> Result<(), CliError> {
     match (was_on, found) {
-        (false, _) => expect_done(talk.ask(Command::StreamOff)?),
+        (false, _) => {
+            let outcome = talk.ask(Command::StreamOff)?;
+            talk.expect_done(outcome)
+        }
         (true, Some(Found { source, period: Some(period) })) => {
-            expect_done(talk.ask(Command::StreamOn { source, period })?)
+            let outcome = talk.ask(Command::StreamOn { source, period })?;
+            talk.expect_done(outcome)
         }
         (true, _) => {
             output.remark("axcon: the stream was on before, at a rate too slow to be seen; it is left at the new one");

@@ -18,7 +18,7 @@ use crate::host::recorder::Recorder;
 use crate::host::replay::Recording;
 use crate::host::signal::Signals;
 use crate::host::{self, Input};
-use crate::record::Ending;
+use crate::record::{Ending, Span};
 use crate::session::{Command, Event, Outcome, Session, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::visible;
@@ -361,13 +361,49 @@ impl Talk {
         .hint("a unit at another line rate sends garbage: the units have 115200 baud")
     }
 
+    /// The error that a job's outcome is, where it is one, with what the unit said.
+    ///
+    /// # Errors
+    /// If the outcome is not what was wanted.
+    pub fn expect_done(&self, outcome: Outcome) -> Result<(), CliError> {
+        let (error, heard) = match outcome {
+            Outcome::Identified | Outcome::Done(_) | Outcome::StreamRuns { .. } | Outcome::DictionaryRead(_) => {
+                return Ok(());
+            }
+            Outcome::Cancelled(_) => return Err(CliError::message(Kind::Interrupted, "interrupted")),
+            Outcome::Loaded(report) => return Err(CliError::message(Kind::Failed, report.what)),
+            Outcome::Refused { reason, heard, .. } => (CliError::message(Kind::UnitRefused, reason), heard),
+            Outcome::NoAnswer { awaited, heard, .. } if self.is_recorded() => {
+                let message = format!("the recording does not show what was looked for: {awaited}");
+                (CliError::message(Kind::NoAnswer, message), heard)
+            }
+            Outcome::NoAnswer { awaited, heard, .. } => {
+                let message = format!("the unit did not answer as expected: {awaited} did not come");
+                let error = CliError::message(Kind::NoAnswer, message)
+                    .hint("no guess was made: the question was left with Enter, and nothing is changed")
+                    .hint("'axcon terminal' shows what the unit prints, and takes the answer by hand");
+                (error, heard)
+            }
+        };
+        let said = heard.map(|span| self.quoted(span)).filter(|said| !said.is_empty());
+        Err(match said {
+            Some(said) => {
+                CliError { hints: [vec![format!("the unit said: \"{said}\"")], error.hints].concat(), ..error }
+            }
+            None => error,
+        })
+    }
+
     /// The end of what the unit has said, on one line.
     fn last_words(&self) -> String {
-        let record = self.session.record();
-        let end = record.received();
-        let start = end.saturating_sub(4 * QUOTED as u64);
-        let text = visible::line(&record.bytes(crate::record::Span { start, end }));
-        let characters: Vec<char> = text.chars().collect();
+        let end = self.session.record().received();
+        self.quoted(Span { start: end.saturating_sub(4 * QUOTED as u64), end })
+    }
+
+    /// What lies there in the record, on one line; of a long text its end.
+    fn quoted(&self, span: Span) -> String {
+        let text = visible::line(&self.session.record().bytes(span));
+        let characters: Vec<char> = text.trim().chars().collect();
         characters[characters.len().saturating_sub(QUOTED)..].iter().collect()
     }
 }
@@ -394,22 +430,4 @@ fn finished(
         }
     }
     None
-}
-
-/// The error that a job's outcome is, where it is one.
-///
-/// # Errors
-/// If the outcome is not what was wanted.
-pub fn expect_done(outcome: Outcome) -> Result<(), CliError> {
-    match outcome {
-        Outcome::Identified | Outcome::Done(_) | Outcome::StreamRuns { .. } | Outcome::DictionaryRead(_) => Ok(()),
-        Outcome::NoAnswer { awaited, .. } => {
-            let message = format!("the unit did not answer as expected: {awaited} did not come");
-            Err(CliError::message(Kind::NoAnswer, message)
-                .hint("'axcon terminal' shows what it prints; the dialogue has been left with Enter"))
-        }
-        Outcome::Refused { reason, .. } => Err(CliError::message(Kind::UnitRefused, reason)),
-        Outcome::Cancelled(_) => Err(CliError::message(Kind::Interrupted, "interrupted")),
-        Outcome::Loaded(report) => Err(CliError::message(Kind::Failed, report.what)),
-    }
 }

@@ -15,6 +15,8 @@ pub(super) struct Dictionary {
     collector: Collector,
     /// The menu came back behind entries: the walk was ended in order.
     left: bool,
+    /// Whether the view is open, once a key has shown that the recording holds keys.
+    viewing: Option<bool>,
     heard: Option<Span>,
 }
 
@@ -27,6 +29,7 @@ impl Work for Dictionary {
                 self.collector.interrupt();
                 None
             }
+            Signal::Heard(..) if self.viewing == Some(false) => None,
             Signal::Heard(text, _) => {
                 let product = desk.facts.product.as_ref().and_then(|known| Product::named(&known.value));
                 self.collector.product = product.or(self.collector.product);
@@ -46,7 +49,17 @@ impl Work for Dictionary {
                 Some(Outcome::DictionaryRead(Box::new(self.collector.take(complete))))
             }
             Signal::Cancel | Signal::LinkLost => Some(Outcome::Cancelled(Job::ReadDictionary)),
-            Signal::Begin | Signal::Hold(_) | Signal::Typed(_) | Signal::Tick => None,
+            Signal::Typed(keys) => {
+                for key in keys {
+                    match key.to_ascii_lowercase() {
+                        b'v' => self.viewing = Some(true),
+                        b'x' | b'm' | b'd' | b't' | b's' | b'l' => self.viewing = Some(false),
+                        _ => {}
+                    }
+                }
+                None
+            }
+            Signal::Begin | Signal::Hold(_) | Signal::Tick => None,
         }
     }
 

@@ -13,6 +13,8 @@ mod images;
 mod live;
 #[cfg(unix)]
 mod ptys;
+#[cfg(unix)]
+mod recordings;
 mod stranger;
 mod support;
 mod talks;

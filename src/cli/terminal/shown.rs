@@ -296,10 +296,7 @@ mod tests {
         shown.break_line(time_of, &mut out);
         let text = String::from_utf8(out).expect("UTF-8");
         let rows: Vec<&str> = text.lines().collect();
-        assert_eq!(
-            rows[0],
-            "< 00000000  30 31 32 33 34 35 36 37 38 39 61 62 63 64 65 66  0123456789abcdef"
-        );
+        assert_eq!(rows[0], "< 00000000  30 31 32 33 34 35 36 37 38 39 61 62 63 64 65 66  0123456789abcdef");
         assert!(rows[1].starts_with("< 00000010  13   ") && rows[2].starts_with("> 00000000  6d   "), "{text}");
     }
 }

@@ -2,6 +2,8 @@
 
 pub mod bench;
 #[cfg(unix)]
+pub mod puppet;
+#[cfg(unix)]
 pub mod screen;
 #[cfg(unix)]
 pub mod shell;

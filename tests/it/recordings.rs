@@ -1,0 +1,280 @@
+//! Recordings: every byte in them, whatever ends the program, the password never; and every reading command on them.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+
+use axcon::record::{Direction, Ending, Piece, Reader};
+
+use crate::support::puppet::Puppet;
+use crate::support::shell::World;
+
+/// What a recording holds, and how it ends.
+fn read(path: &Path) -> (Vec<Piece>, Ending) {
+    let text = fs::read(path).expect("a recording");
+    let mut reader = Reader::default();
+    let mut pieces = Vec::new();
+    reader.push(&text, |piece| pieces.push(piece)).expect("a sound recording");
+    let ending = reader.finish(|piece| pieces.push(piece)).expect("a recording");
+    (pieces, ending)
+}
+
+fn bytes(pieces: &[Piece], wanted: Direction) -> Vec<u8> {
+    let bytes = pieces.iter().filter_map(|piece| match piece {
+        Piece::Bytes { direction, bytes, .. } if *direction == wanted => Some(bytes.as_slice()),
+        _ => None,
+    });
+    bytes.flatten().copied().collect()
+}
+
+fn marks(pieces: &[Piece]) -> Vec<String> {
+    let marks = pieces.iter().filter_map(|piece| match piece {
+        Piece::Mark { text, .. } => Some(text.clone()),
+        _ => None,
+    });
+    marks.collect()
+}
+
+#[test]
+fn every_reading_command_gives_from_its_recording_what_it_gave_from_the_unit() {
+    let world = World::new();
+    let stories: [&[&str]; 5] = [
+        &["stream", "--period", "100", "--count", "8"],
+        &["stream", "--source", "pv", "--period", "100", "--count", "8", "--json"],
+        &["dictionary", "dump", "--yes", "--json"],
+        &["diagnostics", "--count", "2", "--json"],
+        &["identify", "--json"],
+    ];
+    for story in stories {
+        // The smaller one where a whole dictionary goes over the line.
+        let port = if story[0] == "dictionary" { "emu:axtc4co" } else { "emu:axrtd8co" };
+        let live = world.run(&[story, &["--port", port, "--record", "it.cast"]].concat(), b"");
+        assert_eq!(live.code, Some(0), "{story:?}: {}", live.err);
+        // What only a unit can be told is left out.
+        let keeps = |word: &&&str| !matches!(**word, "--period" | "100" | "--yes");
+        let asked: Vec<&str> = story.iter().filter(keeps).copied().collect();
+        let replayed = world.run(&[&asked[..], &["--port", "replay:it.cast"]].concat(), b"");
+        assert_eq!(replayed.code, Some(0), "{story:?}: {}", replayed.err);
+        let (again, first) = (comparable(&replayed.out), comparable(&live.out));
+        let at = again.bytes().zip(first.bytes()).position(|(one, other)| one != other);
+        let at = at.unwrap_or(again.len().min(first.len()));
+        let near = |text: &str| text.chars().skip(at.saturating_sub(40)).take(80).collect::<String>();
+        assert!(again == first, "{story:?}: {:?}, not {:?}", near(&again), near(&first));
+    }
+}
+
+/// Without what may differ: a moment is recorded to the microsecond and written to the millisecond, so rounding may be
+/// one off; and a prompt that stands alone counts as a line or not.
+fn comparable(text: &str) -> String {
+    let mut text = text.to_owned();
+    while let Some(at) = text.find('Z') {
+        let digits = at.checked_sub(4).filter(|&dot| text.as_bytes()[dot] == b'.').unwrap_or(at);
+        text.replace_range(digits..=at, "");
+    }
+    let count = "\"unrecognised_lines\":";
+    if let Some(at) = text.find(count).map(|at| at + count.len()) {
+        let digits = text[at..].bytes().take_while(u8::is_ascii_digit).count();
+        text.replace_range(at..at + digits, "");
+    }
+    text
+}
+
+#[test]
+fn what_writes_to_a_unit_refuses_a_recording() {
+    let world = World::new();
+    let made = world.run(&["identify", "--port", "emu:axtc4co", "--record", "it.cast"], b"");
+    assert_eq!(made.code, Some(0), "{}", made.err);
+    let image = concat!(env!("CARGO_MANIFEST_DIR"), "/firmware_images/AXTC4CO_V1.2.0.elf.S");
+    fs::write(world.path("password"), "AXIO-2010").expect("written");
+    let commands: [&[&str]; 5] = [
+        &["defaults", "--yes"],
+        &["stream", "--off"],
+        &["stream", "--period", "100"],
+        &["load", image, "--yes", "--password-file", "password"],
+        &["terminal", "--send", "password"],
+    ];
+    for command in commands {
+        let ran = world.run(&[command, &["--port", "replay:it.cast"]].concat(), b"");
+        assert_eq!(ran.code, Some(2), "{command:?}: {}", ran.err);
+        assert!(ran.err.contains("a recording cannot be told to"), "{command:?}: {}", ran.err);
+    }
+}
+
+#[test]
+fn what_is_no_recording_is_said_with_its_place() {
+    let world = World::new();
+    let head = "{\"version\":2,\"axcon\":{\"schema\":\"axcon.recording/1\",\"encoding\":\"latin-1\"}}\n";
+    for (name, text, said) in [
+        ("text", "S0030000FC\n".to_owned(), "text:1:1: this is no asciicast recording"),
+        ("empty", String::new(), "empty:1:1: the file is empty"),
+        ("later", format!("{head}[0.1,\"o\",\"a\"]\n[0.2,\"o\"\n[0.3,\"o\",\"b\"]\n"), "later:3:8: this is no event"),
+    ] {
+        fs::write(world.path(name), text).expect("written");
+        for command in ["identify", "stream", "terminal", "diagnostics"] {
+            let ran = world.run(&[command, "--port", &format!("replay:{name}")], b"");
+            assert_eq!(ran.code, Some(2), "{command} {name}: {}", ran.err);
+            assert!(ran.err.contains(said), "{command} {name}: {}", ran.err);
+        }
+    }
+    let ran = world.run(&["stream", "--port", "replay:missing"], b"");
+    assert_eq!(ran.code, Some(3), "{}", ran.err);
+    assert!(ran.err.contains("recordings lie in"), "{}", ran.err);
+    // A killed writer's last line is no fault, and is told.
+    fs::write(world.path("cut"), format!("{head}[0.1,\"o\",\"hello\\r\\n\"]\n[0.2,\"o\",\"wor")).expect("written");
+    let ran = world.run(&["terminal", "--port", "replay:cut"], b"");
+    assert_eq!((ran.code, ran.out.as_str()), (Some(0), "hello\n"), "{}", ran.err);
+    assert!(ran.err.contains("ends in the middle of a line"), "{}", ran.err);
+}
+
+#[test]
+fn a_killed_program_has_recorded_whatever_it_had_shown() {
+    for round in 0..25usize {
+        let world = World::new();
+        let puppet = Puppet::silent();
+        let running = world.start(&["terminal", "--port", puppet.port(), "--record", "it.cast"]);
+        puppet.wait_for_client();
+        // Another moment each time: behind a few bytes, or in the middle of a flood.
+        let lines: String = (0..20 + round * 300).map(|number| format!("line {number:06}\r\n")).collect();
+        puppet.say(lines.as_bytes());
+        running.wait_out(&format!("line {:06}", round * 150));
+        running.signal(rustix::process::Signal::KILL);
+        let shown = running.wait().out.replace('\n', "\r\n");
+        let (pieces, _) = read(&world.path("it.cast"));
+        let recorded = bytes(&pieces, Direction::FromUnit);
+        assert!(lines.as_bytes().starts_with(&recorded), "round {round}: another order, or a byte lost");
+        // Half of a line's end is shown as a whole one.
+        let shown = shown.trim_end().as_bytes();
+        assert!(recorded.len() >= shown.len() && recorded.starts_with(shown), "round {round}: shown and not recorded");
+    }
+}
+
+#[test]
+fn the_password_is_nowhere_however_the_unit_repeats_it() {
+    let world = World::new();
+    // It asks in words nobody knows, echoes, and says it again on a later line and at its next start.
+    let mut line = Vec::new();
+    let puppet = Puppet::start(Box::new(move |keys| {
+        let mut said = Vec::new();
+        for &key in keys {
+            match key {
+                b'l' if line.is_empty() => said.extend_from_slice(b"\r\nParole bitte: "),
+                b'\r' => {
+                    let typed = String::from_utf8_lossy(&std::mem::take(&mut line)).into_owned();
+                    said.extend_from_slice(format!("\r\nwrong.\r\nyou said <{typed}>, {typed}!\r\n").as_bytes());
+                }
+                _ => {
+                    line.push(key);
+                    said.push(key);
+                }
+            }
+        }
+        said
+    }));
+    let args = ["terminal", "--echo", "--port", puppet.port(), "--log", "it.log", "--record", "it.cast"];
+    let mut running = world.start(&args);
+    puppet.wait_for_client();
+    running.input(b"l");
+    running.wait_out("Parole");
+    for key in "Geheim-77".bytes() {
+        running.input(&[key]);
+    }
+    running.input(b"\r");
+    running.wait_out("you said");
+    running.end_input();
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(puppet.heard().windows(9).any(|window| window == b"Geheim-77"), "it was sent");
+    let log = fs::read(world.path("it.log")).expect("a log");
+    let cast = fs::read(world.path("it.cast")).expect("a recording");
+    for (what, text) in
+        [("screen", ran.out.as_bytes()), ("log", &log), ("recording", &cast), ("err", ran.err.as_bytes())]
+    {
+        let text = String::from_utf8_lossy(text);
+        assert!(!text.contains("Geheim"), "{what}: {text}");
+    }
+    assert!(String::from_utf8_lossy(&log).contains("you said <*********>, *********!"), "its place and length stay");
+}
+
+#[test]
+fn a_row_of_a_flood_is_never_dropped() {
+    const ROWS: usize = 20_000;
+    let world = World::new();
+    let puppet = Puppet::silent();
+    let mut running = world.start(&["terminal", "--port", puppet.port(), "--record", "it.cast"]);
+    puppet.wait_for_client();
+    for chunk in 0..ROWS / 100 {
+        let rows = (chunk * 100..(chunk + 1) * 100)
+            .map(|row| format!("{:8.3};{:8.3};Disabled;OpenCct ;  -3.250\r\n", 25.0, row as f64 / 1000.0));
+        puppet.say(rows.collect::<String>().as_bytes());
+    }
+    running.wait_out(&format!("{:8.3};Disabled", (ROWS - 1) as f64 / 1000.0));
+    running.end_input();
+    assert_eq!(running.wait().code, Some(0));
+    let ran = world.run(&["stream", "--port", "replay:it.cast"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let rows: Vec<&str> = ran.out.lines().skip(1).collect();
+    assert_eq!(rows.len(), ROWS);
+    for (number, row) in rows.iter().enumerate() {
+        let expected = format!(",fv,25.000,{:.3},disabled,open,-3.250", number as f64 / 1000.0);
+        assert!(row.ends_with(&expected), "row {number}: {row}");
+    }
+}
+
+#[test]
+fn a_cable_that_comes_back_goes_on_in_the_same_recording() {
+    let world = World::new();
+    let link = world.path("unit");
+    let row = |number: usize| format!("{:8.3};{:8.3};Disabled;OpenCct ;  -3.250\r\n", 25.0, number as f64);
+    let menu = "AXTC4CO V1.1.0\r\nV - view object dictionary\r\nT - toggle stream\r\nS - show diagnostics\r\n";
+    let answers = |keys: &[u8]| if keys.contains(&b'm') { menu.as_bytes().to_vec() } else { Vec::new() };
+    let first = Puppet::start(Box::new(answers));
+    symlink(first.path(), &link).expect("a link");
+    let args = ["stream", "--port", link.to_str().expect("UTF-8"), "--record", "it.cast", "--count", "9"];
+    let running = world.start(&args);
+    first.wait_for_client();
+    // A stream that runs already is joined; rows keep coming until one has been written.
+    let mut number = 0;
+    while number < 3 {
+        first.say(row(number).as_bytes());
+        let said = running.wait_out("");
+        number = said.lines().count().saturating_sub(1);
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    drop(first);
+    running.wait_err("waiting 10 s for it to come back");
+    fs::remove_file(&link).expect("pulled out");
+    let second = Puppet::start(Box::new(answers));
+    symlink(second.path(), &link).expect("plugged in again");
+    running.wait_err("link back after");
+    for number in 100..110 {
+        second.say(row(number).as_bytes());
+    }
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.out.contains(",100.000,"), "{}", ran.out);
+    let (pieces, ending) = read(&world.path("it.cast"));
+    assert_eq!(ending, Ending::Whole);
+    let marks = marks(&pieces);
+    assert!(marks[0] == "link lost" && marks[1].starts_with("link back after "), "{marks:?}");
+    assert!(marks[2].starts_with("end: ") && marks[2].contains("bytes received"), "{marks:?}");
+}
+
+#[test]
+fn a_cable_that_stays_away_is_exit_code_3() {
+    let world = World::new();
+    let link = world.path("unit");
+    let puppet = Puppet::start(Box::new(|_| b"AXTC4CO V1.1.0\r\nM - menu\r\n".to_vec()));
+    symlink(puppet.path(), &link).expect("a link");
+    let args = ["stream", "--port", link.to_str().expect("UTF-8"), "--reconnect", "1", "--json"];
+    let running = world.start(&args);
+    puppet.wait_for_client();
+    // It is asked for its stream: until then there is nothing to lose.
+    while !puppet.heard().contains(&b't') {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        puppet.say(b"    25.0;    25.0;    25.0;    25.0;    25.0\r\n");
+    }
+    drop(puppet);
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(3), "{}", ran.err);
+    assert!(ran.err.contains("\"port-gone\""), "{}", ran.err);
+}
