@@ -230,7 +230,8 @@ impl Work for RestoreDefaults {
                     desk.leave_dialogue();
                 }
                 let awaited = if self.confirmed { "the banner after the reset" } else { "the question for Yes" };
-                Some(Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard: self.heard })
+                let heard = desk.pending.map(|text| text.span).or(self.heard);
+                Some(Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard })
             }
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Cancel => {

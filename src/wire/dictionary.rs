@@ -150,6 +150,9 @@ fn sub_at_head(tokens: &[&str]) -> Option<(SubIndex, usize)> {
 /// that could be meant.
 pub fn value(rest: &str, data_type: DataType, names: &[&str]) -> Option<Shown> {
     let mut tokens: Vec<Option<&str>> = rest.split_whitespace().map(Some).collect();
+    // A name may begin another: `Heartbeat Time` and `Heartbeat Time 1`.
+    let mut names = names.to_vec();
+    names.sort_by_key(|name| std::cmp::Reverse(name.len()));
     for name in names {
         forget(&mut tokens, name);
     }
@@ -204,7 +207,9 @@ fn plain(word: &str) -> String {
 
 fn parse(word: &str, data_type: DataType) -> Option<Shown> {
     let lower = word.to_ascii_lowercase();
-    if data_type == DataType::Real32 && matches!(lower.as_str(), "nan" | "-nan" | "+nan" | "----" | "n/a" | "inf") {
+    let dashes = lower.len() >= 2 && lower.bytes().all(|sign| sign == b'-');
+    let no_number = data_type == DataType::Real32 && matches!(lower.as_str(), "nan" | "-nan" | "+nan" | "inf");
+    if dashes || no_number || lower == "n/a" {
         return Some(Shown::Nothing);
     }
     if data_type == DataType::Boolean {

@@ -58,48 +58,49 @@ pub(super) fn recognise(text: &str, words: &Words) -> Option<Prompt> {
     None
 }
 
-/// Which keys a question for the source offers: `(F)ield value or (P)rocess value`, `1=FV 6100h, 2=PV`, `F/P`.
+/// Which keys a question for the source offers: `(F)ield value or (P)rocess value`, `1=FV 6100h, 2=PV`,
+/// `field value <F> / process value <P>`, `F/P`. Both keys stand in the same place to their names.
 fn source_keys(text: &str) -> Option<SourceKeys> {
     let lower: Vec<char> = text.to_lowercase().chars().collect();
-    let field = offered_key(&lower, &["field", "fv"]);
-    let process = offered_key(&lower, &["process", "pv"]);
-    match (field, process) {
-        (Some(field_value), Some(process_value)) if field_value != process_value => {
-            Some(SourceKeys { field_value, process_value })
-        }
-        _ if offers(text, 'f', 'p') => Some(SourceKeys { field_value: 'f', process_value: 'p' }),
-        _ => None,
-    }
+    let offered = [bracketed, before, behind].into_iter().find_map(|place: Place| {
+        let field_value = offered_key(&lower, &["field", "fv"], place)?;
+        let process_value = offered_key(&lower, &["process", "pv"], place)?;
+        (field_value != process_value).then_some(SourceKeys { field_value, process_value })
+    });
+    let letters = SourceKeys { field_value: 'f', process_value: 'p' };
+    offered.or_else(|| offers(text, 'f', 'p').then_some(letters))
 }
 
-/// The key offered for one of these names: bracketed as the name's first letter, or standing before or behind it.
-fn offered_key(text: &[char], names: &[&str]) -> Option<char> {
-    names.iter().find_map(|name| {
-        let name: Vec<char> = name.chars().collect();
-        // `(F)ield`, `[f]ield`, `<F>ield`
-        let bracketed = text.windows(3).enumerate().find_map(|(at, window)| {
-            let rest = &text[at + 3..];
-            (is_bracket(window[0]) && window[1] == name[0] && is_bracket(window[2]) && rest.starts_with(&name[1..]))
-                .then_some(window[1])
-        });
-        if bracketed.is_some() {
-            return bracketed;
-        }
-        let at = text.windows(name.len()).position(|window| window == name.as_slice())?;
-        // `1=FV`, `f - field value`, `[1] Field value`: nothing but signs between the key and the name.
-        let before = text[..at].iter().rposition(|c| c.is_alphanumeric()).filter(|&key| {
-            let gap = &text[key + 1..at];
-            stands_alone(text, key) && gap.iter().any(|&c| "=-:)]>.".contains(c))
-        });
-        // `FV=1`, `field value (1)`, `Field value: f`
-        let behind = text[at + name.len()..]
-            .iter()
-            .position(|c| "=(:[<".contains(*c))
-            .map(|sign| at + name.len() + sign + 1)
-            .and_then(|from| text[from..].iter().position(|c| c.is_alphanumeric()).map(|key| from + key))
-            .filter(|&key| stands_alone(text, key) && !text[at..key].contains(&','));
-        before.or(behind).map(|key| text[key])
+/// Looks for the key of a name at some place in a text.
+type Place = fn(&[char], &[char]) -> Option<char>;
+
+fn offered_key(text: &[char], names: &[&str], place: Place) -> Option<char> {
+    names.iter().find_map(|name| place(text, &name.chars().collect::<Vec<char>>()))
+}
+
+/// The name's first letter in brackets: `(F)ield`, `[f]ield`, `<F>ield`.
+fn bracketed(text: &[char], name: &[char]) -> Option<char> {
+    text.windows(3).enumerate().find_map(|(at, window)| {
+        let rest = &text[at + 3..];
+        (is_bracket(window[0]) && window[1] == name[0] && is_bracket(window[2]) && rest.starts_with(&name[1..]))
+            .then_some(window[1])
     })
+}
+
+/// `1=FV`, `f - field value`, `[1] Field value`: nothing but signs between the key and the name.
+fn before(text: &[char], name: &[char]) -> Option<char> {
+    let at = text.windows(name.len()).position(|window| window == name)?;
+    let key = text[..at].iter().rposition(|c| c.is_alphanumeric())?;
+    let gap = &text[key + 1..at];
+    (stands_alone(text, key) && gap.iter().any(|&c| "=-:)]>.".contains(c))).then(|| text[key])
+}
+
+/// `FV=1`, `field value (1)`, `Field value: f`: in brackets, or behind a sign, before anything else is listed.
+fn behind(text: &[char], name: &[char]) -> Option<char> {
+    let end = text.windows(name.len()).position(|window| window == name)? + name.len();
+    let sign = end + text[end..].iter().position(|c| "=(:[<".contains(*c))? + 1;
+    let key = sign + text[sign..].iter().position(|c| c.is_alphanumeric())?;
+    (stands_alone(text, key) && !text[end..key].contains(&',')).then(|| text[key])
 }
 
 /// Whether the letter or digit is not part of a longer word.
@@ -139,6 +140,8 @@ mod tests {
             ("Send field value (1) or process value (2)? ", keys('1', '2')),
             ("F - field value, P - process value", keys('f', 'p')),
             ("Source [F/P]: ", keys('f', 'p')),
+            ("Field value <F> / process value <P>: ", keys('f', 'p')),
+            ("process value: 2 / field value: 1 ?", keys('1', '2')),
             ("Repetition rate in ms (1..60000): ", Some(Prompt::Period)),
             ("Interval [milliseconds]? ", Some(Prompt::Period)),
             ("Restore defaults? Enter Yes: ", Some(Prompt::ConfirmDefaults)),

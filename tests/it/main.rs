@@ -8,6 +8,9 @@ mod dialects;
 #[cfg(unix)]
 mod eds;
 mod emulator;
+mod foreigner;
+#[cfg(unix)]
+mod hostile;
 mod images;
 #[cfg(unix)]
 mod live;

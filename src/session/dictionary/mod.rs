@@ -13,7 +13,7 @@ use super::job::{Desk, Signal, Work};
 use crate::device::Product;
 use crate::record::Span;
 use crate::time::{Duration, Instant};
-use crate::wire::{Message, Prompt};
+use crate::wire::{Message, Prompt, Text};
 
 /// How long the unit may take to begin an answer.
 const ANSWER: Duration = Duration::from_millis(1200);
@@ -67,6 +67,15 @@ impl ReadDictionary {
         }
     }
 
+    /// Takes a line of an answer. What has been read before is no progress: a unit may repaint for ever.
+    fn take(&mut self, text: &Text) -> bool {
+        self.answered = true;
+        let before = self.collector.count();
+        let understood = self.collector.line(text);
+        self.fresh |= self.collector.count() > before;
+        understood
+    }
+
     fn step(&mut self, desk: &mut Desk<'_>) {
         self.steps += 1;
         (self.fresh, self.answered) = (false, false);
@@ -97,6 +106,10 @@ impl ReadDictionary {
     }
 
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        // The last line of an answer may have no end.
+        if let (Some(text), Stage::Opening | Stage::Walking) = (desk.pending, &self.stage) {
+            self.take(text);
+        }
         let menu_is_back = self.menu.count_ones() >= MENU_ENTRIES;
         match &mut self.stage {
             Stage::Opening if self.collector.count() == 0 && !self.answered => {
@@ -172,9 +185,7 @@ impl Work for ReadDictionary {
                         return Some(self.no_answer("the object dictionary"));
                     }
                     (_, Stage::Opening | Stage::Walking) => {
-                        self.answered = true;
-                        desk.understood = self.collector.line(text);
-                        self.fresh |= desk.understood;
+                        desk.understood = self.take(text);
                     }
                 }
                 None

@@ -122,6 +122,13 @@ impl Running {
         rustix::process::kill_process(pid, signal).expect("the signal goes out");
     }
 
+    /// The most memory it has had so far, in bytes.
+    pub fn peak_memory(&self) -> usize {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).expect("it runs");
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a peak");
+        line.trim().trim_end_matches(" kB").parse::<usize>().expect("a number") * 1024
+    }
+
     /// Waits for the end.
     pub fn wait(mut self) -> Ran {
         let end = Instant::now() + PATIENCE;
