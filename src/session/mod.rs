@@ -52,8 +52,10 @@ pub struct Session {
     queued: Option<Running>,
     events: VecDeque<Event>,
     prompt: PromptWatch,
-    /// The unit asks for the password, or its answer may echo it: bytes both ways are secret until the line ends.
-    password_open: bool,
+    /// The unit asks for the password: what is typed now is secret.
+    password_asked: bool,
+    /// A password has been typed or sent, and the unit may echo it: what comes is secret until its line ends.
+    echo_is_secret: bool,
     /// L has been typed by hand: what follows up to Enter may be the password, even if the unit asks for it in words we
     /// do not know.
     load_key: bool,
@@ -83,6 +85,16 @@ struct PromptWatch {
     due: Option<Instant>,
     /// End of the text that has been looked at already.
     seen: u64,
+    /// The last text that was understood without its line end.
+    heard: Option<Text>,
+}
+
+impl PromptWatch {
+    /// Whether this line is a text that has been understood already, and only its end has come since.
+    fn was(&self, line: &Text) -> bool {
+        let same = |heard: &Text| heard.span.start == line.span.start && heard.text.trim() == line.text.trim();
+        self.heard.as_ref().is_some_and(same)
+    }
 }
 
 impl Session {
@@ -106,7 +118,8 @@ impl Session {
             queued: None,
             events: VecDeque::new(),
             prompt: PromptWatch::default(),
-            password_open: false,
+            password_asked: false,
+            echo_is_secret: false,
             load_key: false,
             typing_text: false,
             redactor: Redactor::default(),
@@ -207,7 +220,8 @@ impl Session {
     pub fn link_back(&mut self, now: Instant) {
         self.now = self.now.max(now);
         self.transmitter.hold(now, false);
-        (self.password_open, self.load_key, self.typing_text) = (false, false, false);
+        (self.password_asked, self.echo_is_secret) = (false, false);
+        (self.load_key, self.typing_text) = (false, false);
         self.cut_line();
     }
 
@@ -263,7 +277,7 @@ impl Session {
 
     /// Whether the unit is asking for the password: what is typed now is secret.
     pub fn password_open(&self) -> bool {
-        self.password_open
+        self.password_asked || self.echo_is_secret
     }
 
     /// Whether all that was typed since the last Enter can be keys of the menu. An `l` in a word is none.
@@ -275,7 +289,7 @@ impl Session {
         if let Some(running) = &self.running {
             return Err(Refusal::Busy(running.job));
         }
-        let secrecy = if self.password_open { Secrecy::Secret } else { Secrecy::Open };
+        let secrecy = if self.password_open() { Secrecy::Secret } else { Secrecy::Open };
         if self.transmitter.push_text(bytes, secrecy) { Ok(()) } else { Err(Refusal::Held) }
     }
 
@@ -284,7 +298,7 @@ impl Session {
             return Err(Refusal::Busy(running.job));
         }
         for piece in keys.split_inclusive(|key| matches!(key, b'\r' | b'l' | b'L')) {
-            let secret = self.password_open || self.load_key;
+            let secret = self.password_open() || self.load_key;
             let (typed, enter) =
                 if piece.ends_with(b"\r") { piece.split_at(piece.len() - 1) } else { (piece, &[][..]) };
             let secrecy = if secret { Secrecy::Secret } else { Secrecy::Open };
@@ -294,7 +308,7 @@ impl Session {
             if secret {
                 self.note_typed(typed, !enter.is_empty());
             }
-            self.password_open |= secret && !typed.is_empty();
+            self.echo_is_secret |= secret && !typed.is_empty();
             let is_load_key = matches!(typed.last(), Some(b'l' | b'L')) && self.typed_menu_keys_only(typed);
             self.load_key = enter.is_empty() && (secret || is_load_key);
             self.typing_text = enter.is_empty() && !self.typed_menu_keys_only(typed);
@@ -323,14 +337,14 @@ impl Session {
     fn append(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
-            let (part, is_echo) = if self.password_open {
+            let (part, is_echo) = if self.echo_is_secret {
                 let end = rest.iter().position(|&byte| byte == b'\r' || byte == b'\n');
                 (&rest[..end.unwrap_or(rest.len())], true)
             } else {
                 (rest, false)
             };
             if part.is_empty() {
-                self.password_open = false;
+                self.echo_is_secret = false;
                 continue;
             }
             rest = &rest[part.len()..];
@@ -366,7 +380,11 @@ impl Session {
         for item in items {
             match item {
                 Item::Line(mut text) => {
+                    self.password_asked = false;
                     self.redactor.scrub(&mut text.text);
+                    if self.prompt.was(&text) {
+                        continue;
+                    }
                     let message = self.vocabulary.line(&text.text);
                     self.heard(text, message);
                 }
@@ -381,7 +399,7 @@ impl Session {
         let asks_password = pending.as_ref().is_some_and(|text| {
             text.span.end > self.prompt.seen && self.vocabulary.prompt(&text.text) == Some(Prompt::Password)
         });
-        self.password_open |= asks_password;
+        self.password_asked |= asks_password;
         self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);
     }
 
@@ -396,6 +414,7 @@ impl Session {
             None => self.vocabulary.line(&text.text),
         };
         if message != Message::Text {
+            self.prompt.heard = Some(text.clone());
             self.heard(text, message);
         }
     }
@@ -487,7 +506,7 @@ impl Session {
             cut: false,
             understood: false,
             received: self.record.received(),
-            echo_is_secret: &mut self.password_open,
+            echo_is_secret: &mut self.echo_is_secret,
         };
         let outcome = running.work.handle(signal, &mut desk);
         let cut = desk.cut;

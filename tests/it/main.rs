@@ -22,4 +22,5 @@ mod stranger;
 mod support;
 mod talks;
 mod tidy;
+mod transcripts;
 mod uploads;
