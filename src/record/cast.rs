@@ -50,6 +50,8 @@ pub struct Cast<W> {
     to: W,
     begun: Instant,
     written: u64,
+    /// The line being made, kept for its memory.
+    line: Vec<u8>,
 }
 
 /// What the recordings of this program are called in their header.
@@ -86,8 +88,8 @@ impl<W: Write> Cast<W> {
     /// # Errors
     /// If writing fails.
     pub fn begin(to: W, header: &Header, begun: Instant) -> io::Result<Self> {
-        let mut cast = Cast { to, begun, written: 0 };
-        cast.line(&HeaderLine {
+        let mut cast = Cast { to, begun, written: 0, line: Vec::new() };
+        let head = HeaderLine {
             version: 2,
             width: 80,
             height: 24,
@@ -104,7 +106,9 @@ impl<W: Write> Cast<W> {
                 adapter: header.adapter.as_ref(),
                 part: header.part,
             },
-        })?;
+        };
+        serde_json::to_writer(&mut cast.line, &head)?;
+        cast.end_line()?;
         Ok(cast)
     }
 
@@ -117,11 +121,13 @@ impl<W: Write> Cast<W> {
             Direction::FromUnit => "o",
             Direction::ToUnit => "i",
         };
-        let text: String = match secrecy {
-            Secrecy::Open => bytes.iter().map(|&byte| char::from(byte)).collect(),
-            Secrecy::Secret => bytes.iter().map(|_| char::from(REDACTED)).collect(),
-        };
-        self.event(at, code, &text)
+        self.begin_event(at, code)?;
+        match secrecy {
+            Secrecy::Open => latin_1(bytes, &mut self.line),
+            Secrecy::Secret => self.line.extend(bytes.iter().map(|_| REDACTED)),
+        }
+        self.line.extend_from_slice(b"\"]");
+        self.end_line()
     }
 
     /// Appends a remark, which players show as a marker: that the cable was away, how much has gone over it.
@@ -129,7 +135,12 @@ impl<W: Write> Cast<W> {
     /// # Errors
     /// If writing fails.
     pub fn mark(&mut self, at: Instant, text: &str) -> io::Result<()> {
-        self.event(at, "m", text)
+        self.begin_event(at, "m")?;
+        // The quotation mark is the library's here.
+        self.line.pop();
+        serde_json::to_writer(&mut self.line, text)?;
+        self.line.push(b']');
+        self.end_line()
     }
 
     /// What it was written to.
@@ -142,17 +153,48 @@ impl<W: Write> Cast<W> {
         self.written
     }
 
-    fn event(&mut self, at: Instant, code: &str, text: &str) -> io::Result<()> {
+    /// `[1.5,"o","`
+    fn begin_event(&mut self, at: Instant, code: &str) -> io::Result<()> {
         // Six digits: microseconds, as the format has them; a character takes 87.
         let seconds = (at.since(self.begun).as_secs_f64() * 1e6).round() / 1e6;
-        self.line(&(seconds, code, text))
+        write!(self.line, "[{seconds},\"{code}\",\"")
     }
 
-    fn line(&mut self, value: &impl Serialize) -> io::Result<()> {
-        let mut line = serde_json::to_vec(value)?;
-        line.push(b'\n');
-        self.written += line.len() as u64;
-        self.to.write_all(&line)
+    fn end_line(&mut self) -> io::Result<()> {
+        self.line.push(b'\n');
+        self.written += self.line.len() as u64;
+        let written = self.to.write_all(&self.line);
+        self.line.clear();
+        written
+    }
+}
+
+/// Appends bytes as the inside of a JSON text: each is the character of its number. Made by hand, since a flood goes
+/// through here.
+fn latin_1(bytes: &[u8], line: &mut Vec<u8>) {
+    const HEX: &[u8; 16] = b"0123456789abcdef";
+    let mut rest = bytes;
+    while let Some(&first) = rest.first() {
+        let plain = rest.iter().position(|byte| !matches!(byte, b' '..=b'!' | b'#'..=b'[' | b']'..=0x7F));
+        let (run, behind) = rest.split_at(plain.unwrap_or(rest.len()));
+        if !run.is_empty() {
+            line.extend_from_slice(run);
+            rest = behind;
+            continue;
+        }
+        rest = &rest[1..];
+        match first {
+            b'"' | b'\\' => line.extend_from_slice(&[b'\\', first]),
+            b'\n' => line.extend_from_slice(b"\\n"),
+            b'\r' => line.extend_from_slice(b"\\r"),
+            b'\t' => line.extend_from_slice(b"\\t"),
+            0..0x20 => {
+                let digits = [HEX[usize::from(first >> 4)], HEX[usize::from(first & 0xF)]];
+                line.extend_from_slice(b"\\u00");
+                line.extend_from_slice(&digits);
+            }
+            _ => line.extend_from_slice(&[0xC0 | first >> 6, 0x80 | first & 0x3F]),
+        }
     }
 }
 

@@ -36,6 +36,9 @@ use transmitter::Transmitter;
 /// adapter's latency of 16 ms.
 const PROMPT_QUIET: Duration = Duration::from_millis(60);
 
+/// Bytes of a question for the password at most; what goes on longer is looked at when the unit has fallen silent.
+const LONGEST_PROMPT: usize = 200;
+
 /// How long bytes that may be the beginning of the password wait for the next ones.
 const ECHO_QUIET: Duration = Duration::from_millis(30);
 
@@ -68,6 +71,8 @@ pub struct Session {
     echo_due: Option<Instant>,
     /// It listens to a recording: nothing is ever sent.
     passive: bool,
+    /// Lines are looked at for what they mean.
+    recognises: bool,
     /// The last thing that was sent was the question for the menu.
     asked_for_menu: bool,
 }
@@ -126,8 +131,18 @@ impl Session {
             typed_secret: Zeroizing::default(),
             echo_due: None,
             passive: false,
+            recognises: true,
             asked_for_menu: false,
         }
+    }
+
+    /// A conversation in which nothing is recognised but flow control and prompts, for a terminal that must keep up with
+    /// any flood: facts and rows stay unknown, and no job has a chance.
+    ///
+    /// # Panics
+    /// If `baud` is 0.
+    pub fn plain(baud: u32) -> Self {
+        Session { recognises: false, ..Session::new(baud) }
     }
 
     /// A conversation that has been: it is told what both ends said ([`Session::handle_sent`]), sends nothing, and jobs
@@ -353,6 +368,10 @@ impl Session {
                 self.take_in(part, Secrecy::Secret);
                 continue;
             }
+            if self.redactor.is_idle() {
+                self.take_in(part, Secrecy::Open);
+                continue;
+            }
             for (bytes, secrecy) in self.redactor.push(part) {
                 self.take_in(&bytes, secrecy);
             }
@@ -381,6 +400,9 @@ impl Session {
             match item {
                 Item::Line(mut text) => {
                     self.password_asked = false;
+                    if !self.recognises {
+                        continue;
+                    }
                     self.redactor.scrub(&mut text.text);
                     if self.prompt.was(&text) {
                         continue;
@@ -397,7 +419,9 @@ impl Session {
         }
         let pending = self.framer.pending();
         let asks_password = pending.as_ref().is_some_and(|text| {
-            text.span.end > self.prompt.seen && self.vocabulary.prompt(&text.text) == Some(Prompt::Password)
+            text.text.len() <= LONGEST_PROMPT
+                && text.span.end > self.prompt.seen
+                && self.vocabulary.prompt(&text.text) == Some(Prompt::Password)
         });
         self.password_asked |= asks_password;
         self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);

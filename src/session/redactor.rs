@@ -47,6 +47,11 @@ impl Redactor {
         }
     }
 
+    /// Whether there is nothing to look for.
+    pub(super) fn is_idle(&self) -> bool {
+        self.secret.is_empty()
+    }
+
     /// Takes bytes and gives those whose nature is known, in their order.
     pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<Piece> {
         if self.secret.is_empty() {

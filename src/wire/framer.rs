@@ -69,7 +69,15 @@ enum Escape {
 impl Framer {
     /// Takes the next bytes and hands out what they complete.
     pub fn push(&mut self, bytes: &[u8], mut out: impl FnMut(Item)) {
-        for &byte in bytes {
+        let mut rest = bytes;
+        while let Some(&byte) = rest.first() {
+            let run = self.plain_run(rest);
+            if run > 0 {
+                self.text_run(&rest[..run], &mut out);
+                rest = &rest[run..];
+                continue;
+            }
+            rest = &rest[1..];
             let at = self.offset;
             self.offset += 1;
             if byte == XON || byte == XOFF {
@@ -97,6 +105,27 @@ impl Framer {
         (!text.trim().is_empty()).then_some(Text { span: Span { start: self.start, end: self.offset }, text })
     }
 
+    /// Bytes at the beginning that are text and nothing else, as many as the line has room for.
+    fn plain_run(&self, bytes: &[u8]) -> usize {
+        if self.escape != Escape::None {
+            return 0;
+        }
+        let room = LONGEST_LINE - self.line.len();
+        let bytes = &bytes[..bytes.len().min(room)];
+        bytes.iter().position(|&byte| byte < b' ' || byte == 0x7F).unwrap_or(bytes.len())
+    }
+
+    fn text_run(&mut self, run: &[u8], out: &mut impl FnMut(Item)) {
+        if self.line.is_empty() {
+            self.start = self.offset;
+        }
+        self.offset += run.len() as u64;
+        self.line.extend_from_slice(run);
+        if self.line.len() >= LONGEST_LINE {
+            self.end_line(self.offset, out);
+        }
+    }
+
     fn in_escape(&self, byte: u8) -> bool {
         const ESC: u8 = 0x1B;
         self.escape != Escape::None || byte == ESC
@@ -122,9 +151,11 @@ impl Framer {
     }
 
     fn end_line(&mut self, end: u64, out: &mut impl FnMut(Item)) {
-        let text = clean(&self.line);
-        if !text.trim().is_empty() {
-            out(Item::Line(Text { span: Span { start: self.start, end }, text }));
+        if !self.line.iter().all(u8::is_ascii_whitespace) {
+            let text = clean(&self.line);
+            if !text.trim().is_empty() {
+                out(Item::Line(Text { span: Span { start: self.start, end }, text }));
+            }
         }
         self.line.clear();
         self.start = self.offset;
@@ -161,6 +192,9 @@ fn moves_cursor(escape: Escape, byte: u8) -> bool {
 /// Bytes as text: tabs as blanks; NUL and BEL, which old devices send between words, left out; any other control
 /// character is damage, and shows as what is not UTF-8 does.
 fn clean(bytes: &[u8]) -> String {
+    if bytes.iter().all(|byte| matches!(byte, b' '..=b'~')) {
+        return String::from_utf8_lossy(bytes).into_owned();
+    }
     let shown = |c: char| match c {
         '\t' => Some(' '),
         '\0' | '\u{7}' => None,

@@ -49,6 +49,20 @@ impl Visible {
 
     /// Appends what `bytes` look like to `text`. The beginning of a character is kept back until its end comes.
     pub fn push(&mut self, bytes: &[u8], text: &mut String) {
+        let mut rest = bytes;
+        // Printable ASCII is most of what comes, and goes through as it is.
+        if self.begun.is_empty() {
+            let plain = bytes.iter().position(|byte| !matches!(byte, b' '..=b'~')).unwrap_or(bytes.len());
+            let (run, behind) = bytes.split_at(plain);
+            text.push_str(std::str::from_utf8(run).unwrap_or_default());
+            rest = behind;
+        }
+        if !rest.is_empty() {
+            self.push_mixed(rest, text);
+        }
+    }
+
+    fn push_mixed(&mut self, bytes: &[u8], text: &mut String) {
         let joined;
         let bytes = if self.begun.is_empty() {
             bytes

@@ -38,7 +38,8 @@ fn hostile() -> Vec<u8> {
 fn acts(text: &str) -> Option<char> {
     text.chars().find(|&c| {
         let laid_out = matches!(c, '\n' | '\t' | '\r' | '\u{8}');
-        let turns = matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
+        let turns =
+            matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
         (c.is_control() && !laid_out) || turns
     })
 }

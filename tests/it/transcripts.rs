@@ -25,7 +25,8 @@ struct Quotation {
 
 fn transcripts() -> Vec<(String, Vec<Quotation>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/transcripts");
-    let mut files: Vec<_> = fs::read_dir(folder).expect("transcripts").map(|entry| entry.expect("one").path()).collect();
+    let mut files: Vec<_> =
+        fs::read_dir(folder).expect("transcripts").map(|entry| entry.expect("one").path()).collect();
     files.sort();
     files.into_iter().map(|path| (path.display().to_string(), quotations(&path))).collect()
 }

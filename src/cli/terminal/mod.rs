@@ -137,7 +137,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         sending,
         new_line: args.newline_out,
         echo: args.echo,
-        session: Session::new(global.baud),
+        session: Session::plain(global.baud),
         followed: 0,
         shown: Shown::new(look, args.timestamps, args.newline_in, io::stdout().is_terminal() && interactive),
         interactive,
