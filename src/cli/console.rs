@@ -27,6 +27,7 @@ pub fn run(global: &Global) -> Result<(), CliError> {
         colour: std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty()),
         open,
         explain: |error| failure(&link::link_error(error)),
+        unreadable: |error| failure(&link::recording_error(error)),
         check,
         note,
     };

@@ -1,7 +1,7 @@
 //! From `--port` to an open link: which port, and what to do when it does not open.
 
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::SyncSender;
 
 use super::Global;
@@ -13,8 +13,6 @@ use crate::host::ports::{self, Port};
 use crate::host::pump::PumpError;
 use crate::host::recorder::{self, Plan};
 use crate::host::replay::RecordingError;
-use crate::record::Adapter;
-use crate::time::Duration;
 
 /// The link that the user named, or the only USB serial port there is.
 ///
@@ -53,7 +51,7 @@ pub fn spec_error(error: LinkSpecError) -> CliError {
 /// # Errors
 /// If it does not open, with what to do about it.
 pub fn open(spec: &LinkSpec, global: &Global, clock: Clock, inputs: SyncSender<Input>) -> Result<Connection, CliError> {
-    Connection::open(spec, Options { baud: global.baud }, clock, inputs).map_err(link_error)
+    Connection::open(spec, options(global), clock, inputs).map_err(link_error)
 }
 
 /// What the journal of uploads calls the port: the adapter's serial number where it has one, since its name may be
@@ -159,34 +157,9 @@ pub fn read_only(deed: &str) -> CliError {
         .hint("name the unit's port with --port")
 }
 
-/// A link that may come back after it was lost.
-pub struct Comeback {
-    path: PathBuf,
-    adapter: Option<Adapter>,
-}
-
-impl Comeback {
-    /// How often it is looked for: soon enough for a person, rarely enough for the machine.
-    pub const RETRY: Duration = Duration::from_millis(250);
-
-    /// What has to come back; to be asked while it is there. `None` for what has no name that lasts: the number of a
-    /// pseudo-terminal belongs to somebody else soon.
-    pub fn of(spec: &LinkSpec, connection: &Connection) -> Option<Self> {
-        match spec {
-            LinkSpec::Serial(path) => {
-                let adapter = connection.adapter().cloned();
-                (adapter.is_some() || path.is_symlink()).then(|| Comeback { path: path.clone(), adapter })
-            }
-            LinkSpec::Emulated(_) | LinkSpec::Replay(_) => None,
-        }
-    }
-
-    /// The link, if it is there and opens. One that does not is tried again: the system sets rights and names a moment
-    /// after the device.
-    pub fn open(&self, global: &Global, clock: Clock, inputs: SyncSender<Input>) -> Option<Connection> {
-        let path = ports::find_again(&self.path, self.adapter.as_ref())?;
-        Connection::open(&LinkSpec::Serial(path), Options { baud: global.baud }, clock, inputs).ok()
-    }
+/// How serial ports are opened, as the command line says.
+pub fn options(global: &Global) -> Options {
+    Options { baud: global.baud }
 }
 
 /// The port with this name among those the system names by what they are.

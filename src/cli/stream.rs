@@ -114,7 +114,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         warn_of_rate(&stream.talk, source, period, global.baud, output);
         was_on |= stream.switch_on(source, period, output)?;
     }
-    let written = stream.keep_writing(Duration::from_secs(args.reconnect), global, output);
+    let written = stream.keep_writing(Duration::from_secs(args.reconnect), output);
     let Stream { mut talk, mut sink, .. } = stream;
     let left = if args.keep || (joins && was_on) { Ok(()) } else { leave_as_found(&mut talk, was_on, found, output) };
     let flushed = sink.flush();
@@ -169,13 +169,13 @@ impl Stream {
     }
 
     /// Writes rows until it is enough, also over a cable that was pulled out in between.
-    fn keep_writing(&mut self, patience: Duration, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    fn keep_writing(&mut self, patience: Duration, output: &mut Output) -> Result<(), CliError> {
         loop {
             let lost = match self.write_rows(output) {
                 Err(error) if error.kind == Kind::PortGone => error,
                 ended => return ended,
             };
-            if !self.talk.reconnect(lost, patience, global, output)? {
+            if !self.talk.reconnect(lost, patience, output)? {
                 return Ok(());
             }
             self.ask_again(output)?;

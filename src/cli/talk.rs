@@ -8,10 +8,11 @@ use jiff::Timestamp;
 
 use super::Global;
 use super::error::{CliError, Kind};
-use super::link::{self, Comeback};
+use super::link;
 use super::output::Output;
 use super::playback::Playback;
 use crate::host::clock::Clock;
+use crate::host::comeback::Comeback;
 use crate::host::link::LinkSpec;
 use crate::host::pump::{Pump, PumpError};
 use crate::host::recorder::Recorder;
@@ -107,7 +108,7 @@ impl Talk {
         } else {
             let clock = Clock::start();
             let connection = link::open(&spec, global, clock, sender.clone())?;
-            comeback = Comeback::of(&spec, &connection);
+            comeback = Comeback::of(&spec, &connection, link::options(global));
             let mut recorder = Recorder::start(&link::recording(global), &connection, clock);
             if let Some(warning) = recorder.take_warning() {
                 output.remark(&format!("axcon: {warning}"));
@@ -245,13 +246,7 @@ impl Talk {
     ///
     /// # Errors
     /// If it has not come back within `patience`: the error is the one that it was lost with.
-    pub fn reconnect(
-        &mut self,
-        lost: CliError,
-        patience: Duration,
-        global: &Global,
-        output: &mut Output,
-    ) -> Result<bool, CliError> {
+    pub fn reconnect(&mut self, lost: CliError, patience: Duration, output: &mut Output) -> Result<bool, CliError> {
         let Line::Live(pump) = &mut self.line else { return Err(lost) };
         let Some(comeback) = self.comeback.as_ref().filter(|_| !patience.is_zero()) else { return Err(lost) };
         let clock = pump.clock();
@@ -266,7 +261,7 @@ impl Talk {
                 Ok(()) if clock.now() >= deadline => return Err(lost),
                 Ok(()) => {}
             }
-            if let Some(connection) = comeback.open(global, clock, self.inputs.clone()) {
+            if let Some(connection) = comeback.open(clock, self.inputs.clone()) {
                 break connection;
             }
         };

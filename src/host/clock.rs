@@ -40,10 +40,23 @@ impl Clock {
 impl Clock {
     /// Local time of day at the start of this clock; UTC where the system does not say its zone.
     pub fn time_of_day(&self) -> Duration {
-        let local = self.wall(Instant::ZERO).to_zoned(TimeZone::system());
-        let seconds = i64::from(local.hour()) * 3600 + i64::from(local.minute()) * 60 + i64::from(local.second());
-        Duration::from_secs(seconds.unsigned_abs()) + Duration::from_millis(local.millisecond().unsigned_abs().into())
+        time_of_day(self.wall(Instant::ZERO).as_millisecond())
     }
+}
+
+/// Local time of day at a moment, in milliseconds since 1970; UTC where the system does not say its zone.
+pub fn time_of_day(unix_millis: i64) -> Duration {
+    let moment = Timestamp::from_millisecond(unix_millis).unwrap_or(Timestamp::UNIX_EPOCH);
+    let local = moment.to_zoned(TimeZone::system());
+    let seconds = i64::from(local.hour()) * 3600 + i64::from(local.minute()) * 60 + i64::from(local.second());
+    Duration::from_secs(seconds.unsigned_abs()) + Duration::from_millis(local.millisecond().unsigned_abs().into())
+}
+
+/// The time of day so long before another one.
+pub fn day_before(time_of_day: Duration, earlier: Duration) -> Duration {
+    const DAY: u128 = 24 * 3600 * 1_000_000_000;
+    let nanos = (time_of_day.as_nanos() % DAY + DAY - earlier.as_nanos() % DAY) % DAY;
+    Duration::from_nanos(u64::try_from(nanos).unwrap_or_default())
 }
 
 /// A moment of the file system as local date and time, to the minute.

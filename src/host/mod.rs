@@ -5,6 +5,7 @@
 //! named in this directory and nowhere else.
 
 pub mod clock;
+pub mod comeback;
 pub mod journal;
 pub mod link;
 pub mod ports;

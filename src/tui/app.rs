@@ -41,8 +41,6 @@ pub struct Options {
     pub directory: PathBuf,
     /// Whether to use colours (`NO_COLOR`).
     pub colour: bool,
-    /// Local time of day at [`Instant::ZERO`].
-    pub start_of_day: Duration,
     /// Columns and rows of the terminal at the start.
     pub size: (u16, u16),
 }
@@ -52,6 +50,8 @@ pub struct App {
     options: Options,
     theme: Theme,
     size: (u16, u16),
+    /// Local time of day at [`Instant::ZERO`], as the link has it.
+    start_of_day: Duration,
     now: Instant,
     dirty: bool,
     session: Option<Session>,
@@ -75,6 +75,7 @@ impl App {
         App {
             theme: Theme::new(options.colour),
             size: options.size,
+            start_of_day: Duration::ZERO,
             now: Instant::ZERO,
             dirty: true,
             session: None,
@@ -121,6 +122,14 @@ impl App {
             Input::LinkOpened(info) => self.link_opened(now, info, &mut effects),
             Input::LinkFailed(failure) => self.link_failed(failure),
             Input::LinkGone(failure) => self.link_gone(now, failure),
+            Input::LinkBack(name) => self.link_back(now, &name),
+            Input::Sent(bytes) => {
+                if let Some(session) = &mut self.session {
+                    session.handle_sent(now, &bytes);
+                }
+            }
+            Input::Mark(text) => self.scrollback.note(now, super::visible::text(&text)),
+            Input::RecordingOver(failure) => self.recording_over(now, failure),
             Input::FilesListed { directory, entries } => {
                 self.load.listed(directory, entries);
                 self.dirty = true;
@@ -217,7 +226,7 @@ impl App {
             scrollback: &self.scrollback,
             theme: self.theme,
             now: self.now,
-            start_of_day: self.options.start_of_day,
+            start_of_day: self.start_of_day,
         };
         match self.front {
             ScreenId::Connect => self.connect.draw(scene, area, frame),
@@ -314,7 +323,8 @@ impl App {
             Cmd::Next => self.perform(Action::Go(self.front.step(1)), effects),
             Cmd::Previous => self.perform(Action::Go(self.front.step(ScreenId::ALL.len() - 1)), effects),
             Cmd::Help => self.help = Some(Help::default()),
-            Cmd::Quit if self.view.job.is_some() => self.ask(Question::Quit),
+            // Being asked who it is leaves a unit as it was.
+            Cmd::Quit if self.view.job.is_some_and(|job| job != Job::Identify) => self.ask(Question::Quit),
             Cmd::Quit if self.view.viewing => self.ask(Question::QuitViewing),
             Cmd::Quit => effects.push(Effect::Quit),
             Cmd::Reconnect => {
@@ -486,7 +496,7 @@ impl App {
     fn can_send(&mut self) -> bool {
         let why = match &self.view.link.state {
             LinkState::Open { read_only: false } => return true,
-            LinkState::Open { read_only: true } => "Not sent: this link is read only.",
+            LinkState::Open { read_only: true } => "Not sent: this is a recording. Press 1 to choose a link.",
             LinkState::Opening | LinkState::Closed => "Not sent: no unit is connected. Press 1 to choose a link.",
             LinkState::Lost(_) => "Not sent: the link is lost. Press C to connect again.",
         };
@@ -525,7 +535,9 @@ impl App {
         }
         self.popup = None;
         self.scrollback.begin(now, format!("connected to {}", super::visible::text(&info.link)));
-        self.session = Some(Session::new(info.baud));
+        let session = if info.read_only { Session::of_recording } else { Session::new };
+        self.session = Some(session(info.baud));
+        self.start_of_day = info.start_of_day;
         self.view.begin_link(Link {
             name: Some(info.link),
             baud: info.baud,
@@ -556,6 +568,32 @@ impl App {
                 session.link_lost(now);
             }
             self.popup = None;
+        }
+    }
+
+    /// The cable is plugged in again. What stood on the screen goes on; the unit is asked who it is, since it may have
+    /// started anew.
+    fn link_back(&mut self, now: Instant, name: &str) {
+        self.dirty = true;
+        if matches!(self.view.link.state, LinkState::Lost(_)) {
+            self.scrollback.note(now, format!("link back as {}", super::visible::text(name)));
+            self.view.link.state = LinkState::Open { read_only: false };
+            self.view.tell(Tone::Good, "The link is back.");
+            if let Some(session) = &mut self.session {
+                session.link_back(now);
+            }
+            self.command(Command::Identify);
+        }
+    }
+
+    fn recording_over(&mut self, now: Instant, failure: Option<Failure>) {
+        self.dirty = true;
+        if let Some(session) = &mut self.session {
+            session.recording_over(now);
+        }
+        match failure {
+            None => self.view.tell(Tone::Quiet, "This is the end of the recording. 3 shows all of it."),
+            Some(failure) => self.view.tell(Tone::Bad, failure.text),
         }
     }
 

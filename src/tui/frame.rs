@@ -123,7 +123,7 @@ pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let LinkState::Lost(failure) = &view.link.state else { return Vec::new() };
     let text = format!("Link lost: {}", visible::text(&failure.text));
     let mut rows = vec![Line::styled(format::left(&format!(" {text}"), columns), theme.alarm())];
-    let then = " What you see is history. C connects again, 1 chooses another link.";
+    let then = " Below is history. Plug the cable in again; C connects, 1 chooses another link.";
     rows.push(Line::styled(format::left(then, columns), theme.warning()));
     rows
 }

@@ -8,6 +8,7 @@ use ratatui::crossterm::event::Event as TerminalEvent;
 
 use crate::endpoint::Transmit;
 use crate::image::{CheckedImage, Report, Severity};
+use crate::time::Duration;
 use crate::version::Version;
 
 /// What can happen.
@@ -27,6 +28,14 @@ pub enum Input {
     LinkFailed(Failure),
     /// The open link has ended by itself: adapter pulled out, host gone, write refused. Nothing more will come from it.
     LinkGone(Failure),
+    /// The lost link is there again, under this name.
+    LinkBack(String),
+    /// In a recording: these bytes were sent then.
+    Sent(Vec<u8>),
+    /// In a recording: a remark.
+    Mark(String),
+    /// The recording has ended, well or (why) not.
+    RecordingOver(Option<Failure>),
     /// Answer to [`Effect::ListFiles`].
     FilesListed {
         /// The folder, absolute where that could be found out.
@@ -43,7 +52,8 @@ pub enum Input {
 /// What the console wants done.
 #[derive(Debug, PartialEq)]
 pub enum Effect {
-    /// Open a link (`/dev/ttyUSB0`, `emu:axtc4co`, `tcp://...`) and start its recording. Answered by
+    /// Open a link (`/dev/ttyUSB0`, `emu:axtc4co`) and start its recording, or play a recording (`replay:FILE`): its
+    /// bytes come as [`Input::Bytes`] and [`Input::Sent`] at the times they had. Answered by
     /// [`Input::LinkOpened`] or [`Input::LinkFailed`].
     OpenLink(String),
     /// Close the open link. Not answered; what still comes from it must not be handed in.
@@ -96,6 +106,8 @@ pub struct LinkInfo {
     pub read_only: bool,
     /// Where the recording is written, if one is.
     pub recording: Option<String>,
+    /// Local time of day at [`Instant::ZERO`](crate::time::Instant::ZERO): another one in a recording.
+    pub start_of_day: Duration,
 }
 
 /// Something that did not work outside.

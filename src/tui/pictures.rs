@@ -37,13 +37,7 @@ struct Stage {
 
 impl Stage {
     fn new(size: (u16, u16)) -> Self {
-        let options = Options {
-            link: None,
-            directory: PathBuf::from("/home/service/images"),
-            colour: false,
-            start_of_day: NOON,
-            size,
-        };
+        let options = Options { link: None, directory: PathBuf::from("/home/service/images"), colour: false, size };
         let mut app = App::new(options);
         let effects = app.start();
         Stage { app, size, now: Instant::ZERO, effects }
@@ -96,6 +90,7 @@ impl Stage {
             baud: 115_200,
             read_only: false,
             recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
+            start_of_day: NOON,
         }));
     }
 
@@ -545,13 +540,8 @@ fn connecting_asks_the_unit_who_it_is() {
 
 #[test]
 fn the_link_given_at_the_start_is_opened_at_once() {
-    let mut app = App::new(Options {
-        link: Some("emu:axtc4co".into()),
-        directory: "/".into(),
-        colour: true,
-        start_of_day: NOON,
-        size: SMALL,
-    });
+    let mut app =
+        App::new(Options { link: Some("emu:axtc4co".into()), directory: "/".into(), colour: true, size: SMALL });
     assert_eq!(app.start(), [Effect::ListPorts, Effect::OpenLink("emu:axtc4co".into())]);
 }
 

@@ -16,11 +16,14 @@ use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
 use super::{App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, PortEntry};
 use crate::host;
 use crate::host::clock::Clock;
-use crate::host::link::{Connection, LinkError};
+use crate::host::comeback::Comeback;
+use crate::host::link::{self, Connection, LinkError, LinkSpec};
 use crate::host::ports;
 use crate::host::recorder::{Plan, Recorder};
+use crate::host::replay::{Recording, RecordingError};
 use crate::host::signal::Signals;
 use crate::host::terminal::{self, Screen};
+use crate::record::{Direction, Ending, Piece};
 use crate::time::{Duration, Instant};
 
 /// Least time between two pictures that no key asked for: thirty a second.
@@ -44,6 +47,8 @@ pub struct World {
     pub open: fn(&str, u32, Clock, SyncSender<host::Input>) -> Result<Connection, Failure>,
     /// Says what a lost link means.
     pub explain: fn(LinkError) -> Failure,
+    /// Says why a recording cannot be read.
+    pub unreadable: fn(RecordingError) -> Failure,
     /// Reads and checks an image file.
     pub check: fn(PathBuf) -> ImageFacts,
     /// Notes that an upload of this product begins on this link, or (`None`) that the unit on it runs.
@@ -74,7 +79,6 @@ pub fn run(world: World) -> io::Result<End> {
         link: world.link.clone(),
         directory: std::env::current_dir().unwrap_or_else(|_| PathBuf::from(".")),
         colour: world.colour,
-        start_of_day: clock.time_of_day(),
         size: (size.width, size.height),
     });
     let (answer, answers) = channel();
@@ -87,6 +91,10 @@ pub fn run(world: World) -> io::Result<End> {
         answer,
         answers,
         link: None,
+        comeback: None,
+        retry: None,
+        replay: None,
+        skew: Duration::ZERO,
         recorder: Recorder::nothing(),
         left: VecDeque::new(),
     };
@@ -103,12 +111,33 @@ struct Console {
     answer: Sender<Input>,
     answers: Receiver<Input>,
     link: Option<Connection>,
+    /// What has to come back should the link be lost, and when it is looked for again once it is.
+    comeback: Option<Comeback>,
+    retry: Option<Instant>,
+    /// A recording that is being played.
+    replay: Option<Replay>,
+    /// By how much the console's time is ahead of the clock: recordings pass faster than they were made.
+    skew: Duration,
     recorder: Recorder,
     /// Inputs taken from the channel while a link was closed.
     left: VecDeque<host::Input>,
 }
 
+/// A recording that is being played.
+struct Replay {
+    recording: Recording,
+    begun: Instant,
+}
+
+/// Pieces of a recording between two looks at the keyboard.
+const PIECES: usize = 64;
+
 impl Console {
+    /// The console's time. Never runs backward.
+    fn now(&self) -> Instant {
+        self.clock.now() + self.skew
+    }
+
     fn serve(&mut self, screen: &mut Screen) -> io::Result<End> {
         let mut next_frame = Instant::ZERO;
         let effects = self.app.start();
@@ -116,7 +145,7 @@ impl Console {
             return Ok(End::Quit);
         }
         loop {
-            let now = self.clock.now();
+            let now = self.now();
             if self.app.is_dirty() && now >= next_frame {
                 screen.terminal.draw(|frame| self.app.draw(frame))?;
                 self.app.drawn();
@@ -126,8 +155,16 @@ impl Console {
             if self.app.poll_timeout().is_some_and(|due| due <= now) && self.handle(Input::Timeout) {
                 return Ok(End::Quit);
             }
+            if self.retry.is_some_and(|due| due <= now) {
+                self.look_for_link();
+            }
+            if self.replay.is_some() {
+                self.play();
+            }
             let due = self.app.is_dirty().then_some(next_frame);
-            let wake = [due, self.app.poll_timeout()].into_iter().flatten().min().unwrap_or(Instant::NEVER);
+            let at_once = self.replay.as_ref().map(|_| now);
+            let wake = [due, self.retry, at_once, self.app.poll_timeout()].into_iter().flatten().min();
+            let wake = wake.unwrap_or(Instant::NEVER);
             let Some(input) = self.next_input(wake) else { continue };
             let leaves = match input {
                 host::Input::Terminal(event) => {
@@ -170,12 +207,12 @@ impl Console {
             return Some(input);
         }
         // An error is the time that is over: the channel cannot be closed, since this struct holds a sender.
-        self.inputs.recv_timeout(self.clock.until(wake).min(LONGEST_WAIT)).ok()
+        self.inputs.recv_timeout(wake.since(self.now()).min(LONGEST_WAIT)).ok()
     }
 
     /// Tells the app, and does what it wants. Gives `true` when that is to end.
     fn handle(&mut self, input: Input) -> bool {
-        let effects = self.app.handle(self.clock.now(), input);
+        let effects = self.app.handle(self.now(), input);
         self.recorder.follow(self.app.record());
         self.perform(effects)
     }
@@ -216,41 +253,130 @@ impl Console {
     }
 
     fn open(&mut self, name: &str) -> Input {
+        let spec = name.parse::<LinkSpec>();
+        if let Ok(LinkSpec::Replay(path)) = &spec {
+            return match Recording::open(path) {
+                Ok(recording) => self.begin_replay(name, recording),
+                Err(error) => Input::LinkFailed((self.world.unreadable)(error)),
+            };
+        }
         match (self.world.open)(name, self.world.baud, self.clock, self.sender.clone()) {
             Ok(connection) => {
                 self.recorder = Recorder::start(&self.world.recording, &connection, self.clock);
                 let recording = self.recorder.path().map(|path| path.display().to_string());
                 let recording = recording.or_else(|| self.recorder.take_warning());
+                let options = link::Options { baud: self.world.baud };
+                self.comeback = spec.ok().and_then(|spec| Comeback::of(&spec, &connection, options));
                 self.link = Some(connection);
+                let start_of_day = host::clock::day_before(self.clock.time_of_day(), self.skew);
                 Input::LinkOpened(LinkInfo {
                     link: name.to_owned(),
                     baud: self.world.baud,
                     read_only: false,
                     recording,
+                    start_of_day,
                 })
             }
             Err(failure) => Input::LinkFailed(failure),
         }
     }
 
+    fn begin_replay(&mut self, name: &str, recording: Recording) -> Input {
+        let begun = self.now();
+        let time_of_day = host::clock::time_of_day(recording.header().unix_millis);
+        self.replay = Some(Replay { recording, begun });
+        Input::LinkOpened(LinkInfo {
+            link: name.to_owned(),
+            baud: self.world.baud,
+            read_only: true,
+            recording: None,
+            start_of_day: host::clock::day_before(time_of_day, begun.since_start()),
+        })
+    }
+
+    /// Plays the next pieces of a recording: as fast as they can be read, each at its own time.
+    fn play(&mut self) {
+        for _ in 0..PIECES {
+            let Some(replay) = &mut self.replay else { return };
+            let begun = replay.begun;
+            let input = match replay.recording.next() {
+                Ok(Some(Piece::Header(_))) => continue,
+                Ok(Some(Piece::Bytes { at, direction: Direction::FromUnit, bytes })) => (at, Input::Bytes(bytes)),
+                Ok(Some(Piece::Bytes { at, direction: Direction::ToUnit, bytes })) => (at, Input::Sent(bytes)),
+                Ok(Some(Piece::Mark { at, text })) => (at, Input::Mark(text)),
+                Ok(None) => {
+                    let cut = replay.recording.ending() == Some(Ending::CutShort);
+                    let text = "The recording ends in the middle of a line: whoever wrote it was killed.".to_owned();
+                    let failure = cut.then(|| Failure { text, hints: Vec::new() });
+                    self.replay = None;
+                    self.handle(Input::RecordingOver(failure));
+                    return;
+                }
+                Err(error) => {
+                    self.replay = None;
+                    let failure = (self.world.unreadable)(error);
+                    self.handle(Input::RecordingOver(Some(failure)));
+                    return;
+                }
+            };
+            let (at, input) = input;
+            let then = begun + at.since_start();
+            while let Some(due) = self.app.poll_timeout().filter(|due| *due <= then && *due > self.now()) {
+                self.pass_time_to(due);
+                self.handle(Input::Timeout);
+            }
+            self.pass_time_to(then);
+            self.handle(input);
+        }
+    }
+
+    fn pass_time_to(&mut self, then: Instant) {
+        self.skew += then.since(self.now());
+    }
+
     fn lose_link(&mut self, failure: Failure) -> bool {
         if self.link.is_none() {
             return false;
         }
+        let recorder = std::mem::take(&mut self.recorder);
+        let comeback = self.comeback.take();
         self.close_link();
+        if comeback.is_some() {
+            self.recorder = recorder;
+            self.recorder.mark(self.now(), "link lost");
+            self.retry = Some(self.now() + Comeback::RETRY);
+        }
+        self.comeback = comeback;
         self.handle(Input::LinkGone(failure))
+    }
+
+    /// Looks whether the lost link is there again.
+    fn look_for_link(&mut self) {
+        let Some(comeback) = &self.comeback else { return self.retry = None };
+        let Some(connection) = comeback.open(self.clock, self.sender.clone()) else {
+            self.retry = Some(self.now() + Comeback::RETRY);
+            return;
+        };
+        self.retry = None;
+        let name = connection.port().to_owned();
+        self.recorder.mark(self.now(), &format!("link back as {name}"));
+        self.link = Some(connection);
+        self.handle(Input::LinkBack(name));
     }
 
     /// Closes the link; what it has put on the channel and nobody has taken is forgotten.
     fn close_link(&mut self) {
+        self.replay = None;
+        self.comeback = None;
+        self.retry = None;
         if self.link.take().is_some() {
             let waiting = self
                 .inputs
                 .try_iter()
                 .filter(|input| !matches!(input, host::Input::Bytes { .. } | host::Input::Gone(_)));
             self.left.extend(waiting);
-            self.recorder = Recorder::nothing();
         }
+        self.recorder = Recorder::nothing();
     }
 
     /// Finds something out in a thread, which wakes the loop when it has.

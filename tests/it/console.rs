@@ -40,7 +40,6 @@ impl Desk {
             link: Some("emu:axtc4co".into()),
             directory: PathBuf::from("/images"),
             colour: false,
-            start_of_day: Duration::ZERO,
             size: (100, 30),
         });
         let latency = Duration::from_millis(1);
@@ -66,7 +65,13 @@ impl Desk {
         for effect in effects {
             match effect {
                 Effect::OpenLink(link) => {
-                    self.input(Input::LinkOpened(LinkInfo { link, baud: BAUD, read_only: false, recording: None }));
+                    self.input(Input::LinkOpened(LinkInfo {
+                        link,
+                        baud: BAUD,
+                        read_only: false,
+                        recording: None,
+                        start_of_day: Duration::ZERO,
+                    }));
                 }
                 Effect::Transmit(transmit) => self.unit.send(self.now, &transmit.bytes),
                 Effect::ListFiles(directory) => {

@@ -118,14 +118,19 @@ fn no_picture_of_the_console_holds_what_a_terminal_obeys() {
             link: Some("/dev/ttyUSB0".into()),
             directory: PathBuf::from("/images"),
             colour: true,
-            start_of_day: Duration::ZERO,
             size: (columns, rows),
         });
         let mut now = Instant::ZERO;
         let mut pending = app.start();
         for effect in std::mem::take(&mut pending) {
             if let Effect::OpenLink(link) = effect {
-                let info = LinkInfo { link, baud: 115_200, read_only: false, recording: Some("\x1b]0;x\x07".into()) };
+                let info = LinkInfo {
+                    link,
+                    baud: 115_200,
+                    read_only: false,
+                    recording: Some("\x1b]0;x\x07".into()),
+                    start_of_day: Duration::ZERO,
+                };
                 app.handle(now, Input::LinkOpened(info));
             }
         }

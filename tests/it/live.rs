@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use crate::support::puppet::Puppet;
 use crate::support::screen::Screen;
 use crate::support::shell::World;
 
@@ -111,4 +112,54 @@ fn without_a_terminal_the_console_says_what_it_needs() {
     let ran = world.run(&["--port", "emu:axtc5co"], b"");
     assert_eq!(ran.code, Some(2), "{}", ran.err);
     assert!(ran.err.contains("axtc4co"), "what there is: {}", ran.err);
+}
+
+#[test]
+fn a_recording_is_played_to_its_end_with_the_times_it_had() {
+    let world = World::new();
+    let head = "{\"version\":2,\"timestamp\":1769860800,\"axcon\":{\"schema\":\"axcon.recording/1\",\"begun_ms\":1769860800123,\"encoding\":\"latin-1\"}}";
+    let menu = "AXTC4CO V1.1.0\\r\\nV - view object dictionary\\r\\nT - toggle stream\\r\\nS - diagnostics\\r\\n";
+    let row = "  23.500;  24.125;Disabled;OpenCct ; -12.750\\r\\n";
+    let events = format!(
+        "[1.0,\"o\",\"{menu}\"]\n[2.0,\"i\",\"t\"]\n[3.0,\"o\",\"{row}\"]\n[60.0,\"m\",\"link lost\"]\n[3600.5,\"o\",\"{row}\"]\n"
+    );
+    fs::write(world.path("it.cast"), format!("{head}\n{events}")).expect("written");
+    let mut command = world.command(&["--port", "replay:it.cast"]);
+    command.env("TZ", "UTC");
+    let mut screen = Screen::start(command, 24, 80);
+    let overview = screen.wait("end of the recording");
+    assert!(overview.contains("read only") && overview.contains("AXTC4CO 1.1.0"), "{overview}");
+    assert!(overview.contains("-12.750") && overview.contains("newest 13:00:00"), "{overview}");
+    screen.keys("t");
+    screen.wait("Not sent: this is a recording.");
+    screen.keys(NEXT_SCREEN);
+    screen.wait("── link lost");
+    screen.keys("\x1dw");
+    screen.wait("13:00:00.623");
+    screen.keys("\x1dq");
+    assert_eq!(screen.wait_end(), Some(0));
+}
+
+#[test]
+fn a_cable_that_is_plugged_in_again_is_connected_by_itself() {
+    let world = World::new();
+    let link = world.path("unit");
+    let menu = b"AXTC4CO V1.1.0\r\nV - view object dictionary\r\nT - toggle stream\r\nS - diagnostics\r\n";
+    let unit = || Puppet::start(Box::new(|keys| if keys.contains(&b'm') { menu.to_vec() } else { Vec::new() }));
+    let first = unit();
+    std::os::unix::fs::symlink(first.path(), &link).expect("a link");
+    let mut screen = Screen::start(world.command(&["--port", link.to_str().expect("UTF-8")]), 24, 80);
+    screen.wait("application runs");
+    drop(first);
+    screen.wait("Plug the cable in again");
+    fs::remove_file(&link).expect("pulled out");
+    let second = unit();
+    std::os::unix::fs::symlink(second.path(), &link).expect("plugged in again");
+    screen.wait("connected");
+    screen.keys("q");
+    assert_eq!(screen.wait_end(), Some(0));
+    let recordings = world.files("state/axcon/recordings");
+    assert_eq!(recordings.len(), 1, "one conversation, one recording");
+    let recording = fs::read_to_string(&recordings[0]).expect("a recording");
+    assert!(recording.contains("\"m\",\"link lost\"") && recording.contains("\"m\",\"link back as"), "{recording}");
 }

@@ -16,11 +16,12 @@ use jiff::tz::TimeZone;
 
 use super::Global;
 use super::error::{CliError, Kind};
-use super::link::{self, Comeback};
+use super::link;
 use super::output::Output;
 use super::talk::Calendar;
 use crate::endpoint::Endpoint;
 use crate::host::clock::Clock;
+use crate::host::comeback::Comeback;
 use crate::host::link::{Connection, LinkSpec};
 use crate::host::recorder::Recorder;
 use crate::host::replay::Recording;
@@ -110,7 +111,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         output.remark(&warning);
     }
     let interactive = io::stdin().is_terminal();
-    let comeback = Comeback::of(&spec, &connection).filter(|_| interactive);
+    let comeback = Comeback::of(&spec, &connection, link::options(global)).filter(|_| interactive);
     if interactive {
         output.remark(&format!("{} at {}; Ctrl-] leaves, Ctrl-T ? helps", connection.port(), connection.settings()));
     }
@@ -127,7 +128,6 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         comeback,
         retry: None,
         inputs: sender,
-        global: global.clone(),
         recorder,
         log,
         clock,
@@ -165,7 +165,6 @@ struct Conversation {
     /// When a lost link is tried again.
     retry: Option<Instant>,
     inputs: SyncSender<Input>,
-    global: Global,
     recorder: Recorder,
     log: Option<(PathBuf, File)>,
     clock: Clock,
@@ -420,7 +419,7 @@ impl Conversation {
 
     fn try_again(&mut self, now: Instant, output: &mut Output) {
         let comeback = self.comeback.as_ref();
-        let connection = comeback.and_then(|it| it.open(&self.global, self.clock, self.inputs.clone()));
+        let connection = comeback.and_then(|it| it.open(self.clock, self.inputs.clone()));
         match connection {
             Some(connection) => {
                 let text = format!("link back as {}", connection.port());

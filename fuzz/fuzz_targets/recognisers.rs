@@ -1,0 +1,24 @@
+//! Every recogniser on any line.
+#![no_main]
+
+use axcon::canopen::DataType;
+use axcon::device::Product;
+use axcon::wire::{Vocabulary, diagnostics, dictionary, visible};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|line: &str| {
+    let products = Product::all();
+    let vocabulary = Vocabulary {
+        products: products.iter().map(|product| product.name.as_str()).collect(),
+        layouts: products.iter().map(|product| &product.stream).collect(),
+    };
+    let _ = vocabulary.line(line);
+    let _ = vocabulary.prompt(line);
+    let _ = diagnostics::quantities(line);
+    if let Some(read) = dictionary::line(line, |index| index & 1 == 0) {
+        for data_type in [DataType::Boolean, DataType::Integer16, DataType::Unsigned32, DataType::Real32] {
+            let _ = dictionary::value(&read.rest, data_type, &["Field Value", "RTD1", "°C"]);
+        }
+    }
+    assert!(!visible::line(line.as_bytes()).chars().any(char::is_control));
+});
