@@ -403,12 +403,14 @@ impl Talk {
     }
 }
 
-/// Hints for a unit that does not answer.
+/// Hints for a unit that does not answer: what has to be checked, most likely first (manuals, chapter 4).
 pub fn no_answer_hints(error: CliError) -> CliError {
     error
-        .hint("is the unit powered, and the cable the right way round? AXTC4CO, grey connector: pin 1 GND, 2 transmit,")
-        .hint("3 receive go to pins 5, 2, 3 of the DB-9")
-        .hint("is it the right port? 'axcon ports' lists them; 'axcon terminal' shows everything that comes")
+        .hint("is the unit powered? Is it the right port? 'axcon ports' lists them")
+        .hint("is the cable the right way round? Ground, transmit and receive of the unit go to pins 5, 2, 3 of the DB-9:")
+        .hint("pins 1, 2, 3 of the AXTC4CO's grey connector, pins 6, 7, 8 of the AXRTD8CO's")
+        .hint("is the port as fast as the unit? They have 115200 baud, and so has axcon without --baud")
+        .hint("a unit that another program has stopped by Xoff was sent an Xon; 'axcon terminal' shows all that comes")
 }
 
 /// Hands the session's events to `news`, up to the one that ends the job.

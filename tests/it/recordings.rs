@@ -278,3 +278,23 @@ fn a_cable_that_stays_away_is_exit_code_3() {
     assert_eq!(ran.code, Some(3), "{}", ran.err);
     assert!(ran.err.contains("\"port-gone\""), "{}", ran.err);
 }
+
+#[test]
+fn a_stream_goes_on_behind_a_reset_of_the_unit() {
+    let world = World::new();
+    let link = world.path("unit");
+    let port = link.to_str().expect("UTF-8");
+    let mut emulator = world.start(&["emulate", "axtc4co", "--link", port]);
+    emulator.wait_out("\n");
+    let running = world.start(&["stream", "--port", port, "--period", "100", "--duration", "9"]);
+    // Its power is cut while rows come; the stream is stored in the unit and comes back with it.
+    running.wait_out(",fv,");
+    emulator.input(b"power off\npower on\n");
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let moments: Vec<jiff::Timestamp> =
+        ran.out.lines().skip(1).map(|row| row.split(',').next().expect("a time").parse().expect("a time")).collect();
+    let gap = moments.windows(2).position(|pair| pair[1].duration_since(pair[0]).as_millis() > 2_000);
+    let gap = gap.unwrap_or_else(|| panic!("no gap:\n{}", ran.out));
+    assert!(moments.len() > gap + 10, "rows come again:\n{}", ran.out);
+}
