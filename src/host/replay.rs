@@ -64,10 +64,9 @@ impl Recording {
             ending: None,
             fault: None,
         };
-        match recording.next()? {
-            Some(Piece::Header(header)) => recording.header = header,
-            // The reader gives the head first or complains.
-            Some(_) | None => {}
+        // The reader gives the head first or complains.
+        if let Some(Piece::Header(header)) = recording.next()? {
+            recording.header = header;
         }
         Ok(recording)
     }

@@ -455,8 +455,8 @@ pictures! {
         stage
     };
     quit_question: |size| {
-        let mut stage = Stage::connected(size);
-        stage.keys("mq");
+        let mut stage = Stage::streaming(size);
+        stage.keys("tq");
         stage
     };
 }
