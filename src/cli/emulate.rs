@@ -46,7 +46,11 @@ pub struct Args {
 /// Units of one run: each has a pseudo-terminal and a thread.
 const MOST_UNITS: usize = 256;
 
-fn loader(name: &str) -> Result<LoaderKind, String> {
+/// A loader by its name.
+///
+/// # Errors
+/// If there is none of this name; the message says which there are.
+pub fn loader(name: &str) -> Result<LoaderKind, String> {
     LoaderKind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
         let known = LoaderKind::ALL.map(LoaderKind::name).join(", ");
         format!("there is no such loader; there is {known}")

@@ -10,7 +10,7 @@ use super::image::{self as image_cli, DefectObject};
 use super::output::Output;
 use super::talk::{Ended, Talk, no_answer_hints};
 use super::{Global, link, password};
-use crate::device::Product;
+use crate::device::{LoaderKind, Product};
 use crate::host::journal::{Journal, Note};
 use crate::image::{CheckedImage, DefectId, Report};
 use crate::session::{
@@ -33,6 +33,13 @@ pub struct Args {
     /// The unit's product, where the unit itself cannot say it (it waits in its loader).
     #[arg(long, value_name = "NAME", value_parser = image_cli::product)]
     product: Option<&'static Product>,
+    /// Send long records instead of the file's own: the same words in fewer characters, a sixth less time.
+    #[arg(long)]
+    pack: bool,
+    /// The loader the unit has, where it is known to be another than its product's (g1, g2, g3); what it really does
+    /// shows behind the first record in any case.
+    #[arg(long, value_name = "PROFILE", value_parser = super::emulate::loader)]
+    loader: Option<LoaderKind>,
     /// Read the password from FILE; otherwise AXCON_PASSWORD is taken, or it is asked for.
     #[arg(long, value_name = "FILE")]
     password_file: Option<PathBuf>,
@@ -100,7 +107,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let product = args.product.map(|product| product.name.clone()).or(noted);
     journal.begin(&facts, product.as_deref(), &name, &talk, output);
     let mut meter = Meter::new(output.json);
-    let order = LoadOrder { image, password, product };
+    let order = LoadOrder { product, loader: args.loader, packed: args.pack, ..LoadOrder::new(image, password) };
     let ended = talk.run(Command::Load(Box::new(order)), |_, event| match event {
         Event::Progress(progress) => meter.show(progress, output),
         _ => Ok(()),

@@ -3,6 +3,7 @@
 //! Events carry spans into the record: a fact always points at the bytes it was read from.
 
 use crate::canopen::{ObjectAddress, Value};
+use crate::device::LoaderKind;
 use crate::image::CheckedImage;
 use crate::record::Span;
 use crate::secret::Secret;
@@ -55,6 +56,18 @@ pub struct LoadOrder {
     pub password: Secret,
     /// The product, where the user says it or a journal knows it; otherwise the unit is asked.
     pub product: Option<String>,
+    /// The loader it has, where the user knows better than the product's file. How it really paces its sender shows
+    /// behind the header in any case.
+    pub loader: Option<LoaderKind>,
+    /// Send long records instead of the file's: fewer characters for the same words.
+    pub packed: bool,
+}
+
+impl LoadOrder {
+    /// An upload in the file's own records, to whatever is at the other end.
+    pub fn new(image: CheckedImage, password: Secret) -> Self {
+        LoadOrder { image, password, product: None, loader: None, packed: false }
+    }
 }
 
 /// Which job.

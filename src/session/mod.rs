@@ -11,6 +11,7 @@ mod event;
 mod identify;
 mod job;
 mod overheard;
+mod records;
 mod redactor;
 mod transfer;
 mod transmitter;

@@ -21,10 +21,10 @@
 
 use std::collections::VecDeque;
 
+use super::records::{self, Outgoing, Size};
 use super::transmitter::Transmitter;
 use crate::device::{PROGRAM_TIME, Pacing, RING, longest_erase};
 use crate::endpoint::Transmit;
-use crate::image::srecord::{self, Kind, Record};
 use crate::image::{FlashMap, Image};
 use crate::time::{Duration, Instant};
 
@@ -44,6 +44,9 @@ const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
 /// were pressed before. More than the 372 that a line carries in the 32 ms an adapter makes of the way there and back.
 const WINDOW: usize = RING - 50;
 
+/// A hold that comes so soon behind its record costs less than a shorter record would.
+const PROMPT_HOLD: Duration = Duration::from_millis(2);
+
 /// Why a transfer cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stall {
@@ -55,20 +58,12 @@ pub(super) enum Stall {
     Unacknowledged,
 }
 
-/// One record ready to leave.
-#[derive(Debug)]
-struct Outgoing {
-    /// The text with its line end.
-    text: Vec<u8>,
-    /// Address of a data record.
-    address: Option<u32>,
-    /// The loader will stop us behind it.
-    crosses: bool,
-}
-
 /// An image on its way.
 #[derive(Debug)]
 pub(super) struct Transfer {
+    image: Image,
+    flash: FlashMap,
+    size: Size,
     records: Vec<Outgoing>,
     bytes_total: usize,
     /// Records let go.
@@ -97,31 +92,15 @@ pub(super) struct Transfer {
 }
 
 impl Transfer {
-    /// Builds the records: upper case, CR behind each (the newer loaders take nothing else), a four-byte header address,
-    /// no count records.
-    pub(super) fn new(image: &Image, flash: &FlashMap, pacing: Pacing) -> Self {
-        let header = header(image);
-        let header = line(|text| srecord::write_header(&header, text));
-        let mut records = vec![Outgoing { text: header, address: None, crosses: false }];
-        let mut page = None;
-        for block in &image.blocks {
-            let words = block.data.len().div_ceil(2) as u32;
-            let first = block.address / flash.page_words;
-            let last = block.address.saturating_add(words.saturating_sub(1)) / flash.page_words;
-            let crosses = page.is_some_and(|page| page != first) || first != last;
-            page = Some(last);
-            let mut data = block.data.clone();
-            if data.len() % 2 == 1 {
-                data.push(0xFF); // Half a word is filled up as erased flash reads.
-            }
-            let record = Record { kind: Kind::Data32, address: block.address, data: &data };
-            let text = line(|text| record.write(text));
-            records.push(Outgoing { text, address: Some(block.address), crosses });
-        }
-        let end = Record { kind: Kind::Start32, address: image.entry, data: &[] };
-        records.push(Outgoing { text: line(|text| end.write(text)), address: None, crosses: false });
+    /// An image for this flash. `packed`: in records as long as the loader can keep, instead of the file's.
+    pub(super) fn new(image: &Image, flash: &FlashMap, pacing: Pacing, packed: bool) -> Self {
+        let size = if packed { Size::Packed(records::LONGEST) } else { Size::AsInFile };
+        let records = records::build(image, flash, size);
         let bytes_total = records.iter().map(|record| record.text.len()).sum();
         Transfer {
+            image: image.clone(),
+            flash: *flash,
+            size,
             records,
             bytes_total,
             sent: 0,
@@ -199,6 +178,9 @@ impl Transfer {
             }
             Pacing::Records => {
                 self.alive = true;
+                if held && self.taken == 0 && self.sent == 1 {
+                    self.choose_size(now);
+                }
                 let was_stopped = self.stopped_since.is_some();
                 self.stopped_since = held.then(|| self.stopped_since.unwrap_or(now));
                 // Only both together count: what is damaged on the line must not count twice.
@@ -211,6 +193,17 @@ impl Transfer {
                     }
                 }
             }
+        }
+    }
+
+    /// The hold behind the header shows how late an adapter is, before any data has left: where its way there and back
+    /// would be waited for behind each long record, two shorter ones keep the line busy.
+    fn choose_size(&mut self, now: Instant) {
+        let late = self.left_at.front().is_some_and(|&left_at| now.since(left_at) > PROMPT_HOLD);
+        if late && self.size == Size::Packed(records::LONGEST) {
+            self.size = Size::Packed(records::TWO_IN_A_RING);
+            self.records = records::build(&self.image, &self.flash, self.size);
+            self.bytes_total = self.records.iter().map(|record| record.text.len()).sum();
         }
     }
 
@@ -340,16 +333,3 @@ const DATA_CHARACTERS: usize = 79;
 
 /// Records that have to be acknowledged one by one before more than one is on its way: the header, and the first data.
 const PROVEN: usize = 2;
-
-/// The header's text: no more than fits a record, and nothing that would act on us when a loader echoes it.
-pub(super) fn header(image: &Image) -> Vec<u8> {
-    let printable = |&byte: &u8| if matches!(byte, b' '..=b'~') { byte } else { b'.' };
-    image.header.iter().take(srecord::LONGEST_HEADER).map(printable).collect()
-}
-
-fn line(write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
-    let mut text = Vec::new();
-    write(&mut text);
-    text.push(b'\r');
-    text
-}

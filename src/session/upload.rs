@@ -10,7 +10,8 @@
 use super::event::{Event, Facts, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitNow, UnitState, Verdict};
 use super::identify::Identify;
 use super::job::{Desk, Signal, Work};
-use super::transfer::{self, Stall, Transfer};
+use super::records;
+use super::transfer::{Stall, Transfer};
 use crate::device::{Pacing, Product};
 use crate::time::{Duration, Instant};
 use crate::version::Version;
@@ -174,7 +175,9 @@ impl Upload {
             return self.end(desk, Verdict::Refused, unit, what);
         };
         self.product = Some(known.name.clone());
-        self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash, known.loader.kind.pacing()));
+        let pacing = self.order.loader.unwrap_or(known.loader.kind).pacing();
+        let packed = self.order.packed;
+        self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash, pacing, packed));
         self.mark = desk.received;
         match unit {
             UnitNow::Loader => {
@@ -204,7 +207,8 @@ impl Upload {
     /// takes every question for the rest of it.
     fn may_be_lost_in_a_record(&self) -> bool {
         let product = self.order.product.as_deref().and_then(Product::named);
-        !self.filled && product.is_some_and(|product| product.loader.kind.pacing() == Pacing::Records)
+        let loader = self.order.loader.or(product.map(|product| product.loader.kind));
+        !self.filled && loader.is_some_and(|loader| loader.pacing() == Pacing::Records)
     }
 
     fn fill_up(&mut self, desk: &mut Desk<'_>) {
@@ -266,7 +270,7 @@ impl Upload {
 
     /// Whether the text is the header's, which some loaders echo, whatever it says.
     fn is_echo_of_header(&self, text: &Text) -> bool {
-        let header = transfer::header(self.order.image.image());
+        let header = records::header(self.order.image.image());
         let header = String::from_utf8_lossy(&header);
         !header.trim().is_empty() && text.text.trim() == header.trim()
     }

@@ -445,7 +445,7 @@ impl App {
                     let image = facts.path.display().to_string();
                     effects.push(Effect::UploadBegins { link, product, image });
                 }
-                self.command(Command::Load(Box::new(LoadOrder { image, password, product })));
+                self.command(Command::Load(Box::new(LoadOrder { product, ..LoadOrder::new(image, password) })));
             }
             Action::DismissReport => self.view.load.report = None,
             Action::RestartExtremes => self.view.restart_extremes(),

@@ -205,16 +205,26 @@ fn a_loader_that_wants_a_key_and_erases_everything_gets_its_key_and_its_time() {
     assert!(bench.unit.unit().flash() == flash_with(&image), "and nothing else is left in the flash");
 }
 
+/// Whatever the product's file says, and the user does not know either: what the loader does decides.
 #[test]
-fn a_unit_with_another_loader_than_its_product_file_says_is_uploaded_to_all_the_same() {
-    let units = [(axrtd8co(), LoaderKind::G1, "2.1.1", "2.2.0"), (axtc4co(), LoaderKind::G3, "1.1.0", "1.2.0")];
-    for (product, loader, before, after) in units {
-        for latency in [0, 16] {
-            let flash = flash_with(&small_image(&product.name, before));
-            let mut bench = Bench::of(product, loader, flash, Duration::from_millis(latency));
-            bench.run_for(Duration::from_secs(6));
-            let report = bench.load(order(small_image(&product.name, after)));
-            assert_eq!(report.verdict, Verdict::Done, "{} {loader:?} {latency} ms: {report:?}", product.name);
+fn every_loader_in_every_unit_is_uploaded_to_at_any_latency_packed_or_not() {
+    for (product, before, after) in [(axtc4co(), "1.1.0", "1.2.0"), (axrtd8co(), "2.1.1", "2.2.0")] {
+        let image = small_image(&product.name, after);
+        for loader in LoaderKind::ALL {
+            for (latency, packed) in [(0, false), (0, true), (1, true), (4, true), (16, false), (16, true), (20, true)]
+            {
+                let flash = flash_with(&small_image(&product.name, before));
+                let mut bench = Bench::of(product, loader, flash, Duration::from_millis(latency));
+                bench.run_for(Duration::from_secs(6));
+                let mut order = order(image.clone());
+                order.packed = packed;
+                let report = bench.load(order);
+                let story = format!("{} {loader:?} {latency} ms, packed {packed}: {report:?}", product.name);
+                assert_eq!(report.verdict, Verdict::Done, "{story}\n{}", bench.transcript());
+                let wanted = flash_with(&image);
+                let end = image.identity().expect("an identity").program_words as usize * 2;
+                assert!(bench.unit.unit().flash()[..end] == wanted[..end], "{story}");
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The loaders a unit may have in its boot flash: they take an S-record file and write it to program flash.
 //!
-//! Two generations, each with its own habits ([`g1`], [`g3`]), behind one door. A loader lives in flash of its own: no
+//! Three generations, two of them with the same habits ([`g1`]), the third with its own ([`g3`]), behind one door. A loader lives in flash of its own: no
 //! file can damage it. It knows nothing of what it loads: success means that the end record has come. Which program
 //! runs after the reset is decided by the unit (`emulator/mod.rs`).
 //!
@@ -18,7 +18,7 @@ use crate::time::Instant;
 /// The loader while it runs.
 #[derive(Debug)]
 pub enum Bootloader {
-    /// The SDK's.
+    /// The SDK's, or the one for the 56F83xx, which differs in its texts only as far as anybody knows.
     G1(g1::Loader),
     /// The one with a circular buffer.
     G3(g3::Loader),
@@ -29,7 +29,8 @@ impl Bootloader {
     /// start instead.
     pub fn start(kind: LoaderKind, board: &mut Board<'_>, may_leave: bool) -> Self {
         match kind {
-            LoaderKind::G1 => Bootloader::G1(g1::Loader::start(board)),
+            LoaderKind::G1 => Bootloader::G1(g1::Loader::start(board, &g1::SDK)),
+            LoaderKind::G2 => Bootloader::G1(g1::Loader::start(board, &g1::FOR_56F83XX)),
             LoaderKind::G3 => Bootloader::G3(g3::Loader::start(board, may_leave)),
         }
     }

@@ -261,7 +261,7 @@ pub fn flash_with(image: &CheckedImage) -> Vec<u8> {
 
 /// An order to upload with the right password.
 pub fn order(image: CheckedImage) -> LoadOrder {
-    LoadOrder { image, password: Secret::new(b"AXIO-2010".to_vec()), product: None }
+    LoadOrder::new(image, Secret::new(b"AXIO-2010".to_vec()))
 }
 
 fn checked(product: &str, version: &str, words: u32) -> CheckedImage {

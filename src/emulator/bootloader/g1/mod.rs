@@ -1,4 +1,4 @@
-//! The G1 loader: takes an S-record file and writes it to program flash, page by page.
+//! The G1 loader, and the G2 loader in other words: takes an S-record file and writes it to program flash, page by page.
 //!
 //! A public fact about the Motorola SDK's loaders for 16-bit parts, likely but not proven for these units. Its
 //! texts are its own, the manual's prompt and the manual's dots (AXTC4CO manual, section 4.1.5).
@@ -18,8 +18,24 @@ use record::{DataRecord, Decoder, Fault, Record};
 /// Silence on the line after which the loader stops to listen and begins to write (about 0.6 ms, public fact).
 pub const SILENCE: Duration = Duration::from_micros(600);
 
-/// Copyright and name; the middle of the line is not known to the letter.
-const HEADER: &str = "(c) Motorola Inc. S-Record loader. Version 1.3";
+/// What a generation says. Everything else of the second one is unknown, and believed to be as in the first.
+#[derive(Debug)]
+pub struct Texts {
+    /// Copyright and name, printed at its start.
+    header: Option<&'static str>,
+    /// The line that tells how much was loaded.
+    loaded: bool,
+    /// The words before the start address; `None` where none is printed.
+    started_from: Option<&'static str>,
+}
+
+/// The SDK's loader; the middle of its header is not known to the letter.
+pub static SDK: Texts =
+    Texts { header: Some("(c) Motorola Inc. S-Record loader. Version 1.3"), loaded: true, started_from: None };
+
+/// The loader for the 56F83xx.
+pub static FOR_56F83XX: Texts =
+    Texts { header: None, loaded: false, started_from: Some("Application started from address 0x") };
 
 /// Address flag of data memory in CodeWarrior's files.
 const DATA_FLAG: u32 = 0x0200_0000;
@@ -29,6 +45,7 @@ const DATA_HIGH_HALF: u32 = 0x0020;
 /// The loader while it runs.
 #[derive(Debug)]
 pub struct Loader {
+    texts: &'static Texts,
     decoder: Decoder,
     activity: Activity,
     load: Option<Load>,
@@ -71,6 +88,8 @@ struct Load {
     page: Option<PageBuffer>,
     program_words: u32,
     data_words: u32,
+    /// The address of the end record.
+    entry: u32,
 }
 
 #[derive(Debug)]
@@ -88,8 +107,9 @@ enum Place {
 
 impl Loader {
     /// Starts the loader: it says who it is and what it wants.
-    pub fn start(board: &mut Board<'_>) -> Self {
+    pub fn start(board: &mut Board<'_>, texts: &'static Texts) -> Self {
         let mut loader = Loader {
+            texts,
             decoder: Decoder::default(),
             activity: Activity::Listening,
             load: None,
@@ -98,7 +118,9 @@ impl Loader {
             holds_sender: false,
             line_begun: false,
         };
-        loader.say(board, &format!("{HEADER}\r\n"));
+        if let Some(header) = texts.header {
+            loader.say(board, &format!("{header}\r\n"));
+        }
         loader.deaf_until = board.uart.finished_at();
         loader.prompt(board);
         loader
@@ -162,7 +184,12 @@ impl Loader {
             Record::Data(_) if self.activity != Activity::Listening => self.fail(board, Fault::Overrun),
             Record::Data(data) => self.collect(board, data),
             // A record that is parked is lost here, and success is reported all the same.
-            Record::End => self.activity = Activity::AwaitingSilence(Then::Finish),
+            Record::End { entry } => {
+                if let Some(load) = &mut self.load {
+                    load.entry = entry;
+                }
+                self.activity = Activity::AwaitingSilence(Then::Finish);
+            }
         }
     }
 
@@ -232,11 +259,14 @@ impl Loader {
             values.first_start = true;
         });
         self.end_line(board);
-        self.say(
-            board,
-            &format!("Loaded 0x{:04X} Program and 0x{:04X} Data words.\r\n", load.program_words, load.data_words),
-        );
-        self.say(board, "Application started.\r\n");
+        if self.texts.loaded {
+            let (program, data) = (load.program_words, load.data_words);
+            self.say(board, &format!("Loaded 0x{program:04X} Program and 0x{data:04X} Data words.\r\n"));
+        }
+        match self.texts.started_from {
+            Some(words) => self.say(board, &format!("{words}{:04X}\r\n", load.entry)),
+            None => self.say(board, "Application started.\r\n"),
+        }
         self.activity = Activity::Leaving;
         *board.reset = Some(Reset::Start);
     }

@@ -41,8 +41,11 @@ pub enum Record {
     Header,
     /// S3.
     Data(DataRecord),
-    /// S7. The entry point is not used: the application starts by a reset.
-    End,
+    /// S7. The entry point is printed at most: the application starts by a reset.
+    End {
+        /// The address it names.
+        entry: u32,
+    },
 }
 
 /// Data of an S3 record.
@@ -142,16 +145,18 @@ fn complete(kind: Kind, bytes: &[u8]) -> Result<Record, Fault> {
     if sum != 0xFF {
         return Err(Fault::Checksum);
     }
+    if kind == Kind::Header {
+        return Ok(Record::Header);
+    }
+    let (address, data) = bytes[1..bytes.len() - 1].split_at(ADDRESS_BYTES);
+    let address = address.iter().fold(0, |address, byte| address << 8 | u32::from(*byte));
     Ok(match kind {
         Kind::Header => Record::Header,
-        Kind::End => Record::End,
-        Kind::Data => {
-            let (address, data) = bytes[1..bytes.len() - 1].split_at(ADDRESS_BYTES);
-            Record::Data(DataRecord {
-                address: address.iter().fold(0, |address, byte| address << 8 | u32::from(*byte)),
-                words: data.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect(),
-            })
-        }
+        Kind::End => Record::End { entry: address },
+        Kind::Data => Record::Data(DataRecord {
+            address,
+            words: data.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect(),
+        }),
     })
 }
 
@@ -181,7 +186,7 @@ mod tests {
             "S0030000FC\r\nS309000000803412cdabb8\r\nS70500000000fa\r\n",
             "S0110000000050524F4752414D264441544196\nS3\t09\x7f000000803412CDABB8\x00S70500000000FA",
         ] {
-            assert_eq!(decode(text), Ok(vec![Record::Header, data.clone(), Record::End]), "{text:?}");
+            assert_eq!(decode(text), Ok(vec![Record::Header, data.clone(), Record::End { entry: 0 }]), "{text:?}");
         }
     }
 

@@ -1,0 +1,151 @@
+//! The records of an upload, built anew from the image: upper case, CR behind each (the newer loaders take nothing
+//! else), a four-byte header address, whole words, no count records.
+
+use crate::image::srecord::{self, Kind, Record};
+use crate::image::{FlashMap, Image};
+
+/// Data bytes of a packed record: as many as fit one, less two (facts: 250, so that address, count and sum do).
+pub(super) const LONGEST: usize = 250;
+/// Data bytes of a packed record of which a ring of 550 characters holds two: what an adapter keeps unanswered is then
+/// filled by the second.
+pub(super) const TWO_IN_A_RING: usize = 110;
+
+/// One record ready to leave.
+#[derive(Clone, Debug)]
+pub(super) struct Outgoing {
+    /// The text with its line end.
+    pub(super) text: Vec<u8>,
+    /// Address of a data record.
+    pub(super) address: Option<u32>,
+    /// Its data goes on in another flash page than the data before it ended in: a loader that keeps one page stops us.
+    pub(super) crosses: bool,
+}
+
+/// How many data bytes a record gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Size {
+    /// As many as in the file.
+    AsInFile,
+    /// So many, where the image goes on without a gap.
+    Packed(usize),
+}
+
+/// All records: header, data, end.
+pub(super) fn build(image: &Image, flash: &FlashMap, size: Size) -> Vec<Outgoing> {
+    let header = header(image);
+    let header = line(|text| srecord::write_header(&header, text));
+    let mut records = vec![Outgoing { text: header, address: None, crosses: false }];
+    let mut page = None;
+    let mut push = |address: u32, data: &[u8]| {
+        let words = data.len().div_ceil(2) as u32;
+        let first = address / flash.page_words;
+        let last = address.saturating_add(words.saturating_sub(1)) / flash.page_words;
+        let crosses = page.is_some_and(|page| page != first) || first != last;
+        page = Some(last);
+        let mut data = data.to_vec();
+        if data.len() % 2 == 1 {
+            data.push(0xFF); // Half a word is filled up as erased flash reads.
+        }
+        let record = Record { kind: Kind::Data32, address, data: &data };
+        records.push(Outgoing { text: line(|text| record.write(text)), address: Some(address), crosses });
+    };
+    match size {
+        Size::AsInFile => image.blocks.iter().for_each(|block| push(block.address, &block.data)),
+        Size::Packed(bytes) => {
+            for (address, data) in runs(image) {
+                for (number, piece) in data.chunks(bytes).enumerate() {
+                    push(address + (number * bytes / 2) as u32, piece);
+                }
+            }
+        }
+    }
+    let end = Record { kind: Kind::Start32, address: image.entry, data: &[] };
+    records.push(Outgoing { text: line(|text| end.write(text)), address: None, crosses: false });
+    records
+}
+
+/// The header's text: no more than fits a record, and nothing that would act on us when a loader echoes it.
+pub(super) fn header(image: &Image) -> Vec<u8> {
+    let printable = |&byte: &u8| if matches!(byte, b' '..=b'~') { byte } else { b'.' };
+    image.header.iter().take(srecord::LONGEST_HEADER).map(printable).collect()
+}
+
+/// Stretches of the image without a gap, in the file's order.
+fn runs(image: &Image) -> Vec<(u32, Vec<u8>)> {
+    let mut runs: Vec<(u32, Vec<u8>)> = Vec::new();
+    for block in &image.blocks {
+        match runs.last_mut() {
+            Some((address, data))
+                if data.len() % 2 == 0 && u64::from(*address) + data.len() as u64 / 2 == u64::from(block.address) =>
+            {
+                data.extend_from_slice(&block.data);
+            }
+            _ => runs.push((block.address, block.data.clone())),
+        }
+    }
+    runs
+}
+
+fn line(write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let mut text = Vec::new();
+    write(&mut text);
+    text.push(b'\r');
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{AddressUnit, Block};
+
+    fn image(blocks: &[(u32, usize)]) -> Image {
+        let block = |&(address, length): &(u32, usize)| Block {
+            address,
+            data: (0..length).map(|at| (address as usize * 2 + at) as u8).collect(),
+        };
+        Image {
+            header: b"\0\0it".to_vec(),
+            blocks: blocks.iter().map(block).collect(),
+            entry: 0,
+            address_unit: AddressUnit::Word,
+        }
+    }
+
+    const FLASH: FlashMap = FlashMap { address_unit: AddressUnit::Word, program_words: 0x10000, page_words: 256 };
+
+    fn words(records: &[Outgoing]) -> Vec<(u32, u8)> {
+        let mut words = Vec::new();
+        for record in records.iter().filter(|record| record.address.is_some()) {
+            let text = std::str::from_utf8(&record.text).expect("ASCII").trim_end();
+            let address = record.address.expect("data");
+            let data = &text[12..text.len() - 2];
+            for at in 0..data.len() / 4 {
+                words.push((address + at as u32, u8::from_str_radix(&data[at * 4..at * 4 + 2], 16).expect("hex")));
+            }
+        }
+        words
+    }
+
+    #[test]
+    fn packed_records_hold_the_same_words_and_no_gap_is_filled() {
+        let blocks: Vec<(u32, usize)> =
+            (0..20).map(|number| (number * 16, 32)).chain([(0x400, 32), (0x410, 7)]).collect();
+        let image = image(&blocks);
+        let plain = words(&build(&image, &FLASH, Size::AsInFile));
+        for bytes in [TWO_IN_A_RING, LONGEST] {
+            let packed = build(&image, &FLASH, Size::Packed(bytes));
+            assert_eq!(words(&packed), plain, "{bytes}");
+            assert!(packed.iter().all(|record| record.text.len() <= 15 + 2 * bytes));
+        }
+        assert_eq!(build(&image, &FLASH, Size::Packed(LONGEST)).len(), 2 + 3 + 1, "header, end, 640 and 39 bytes");
+    }
+
+    #[test]
+    fn a_record_that_leaves_its_page_crosses_wherever_in_it_that_is() {
+        let image = image(&[(0, 500), (250, 500), (512, 10)]);
+        let crossing: Vec<bool> =
+            build(&image, &FLASH, Size::Packed(LONGEST)).iter().map(|record| record.crosses).collect();
+        // Words 0-124, 125-249, 250-374 (page 0 to 1), 375-499, 512-516 (page 1 to 2).
+        assert_eq!(crossing, [false, false, false, true, false, true, false]);
+    }
+}
