@@ -103,7 +103,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     }
     let password = password.map_or_else(password::ask, Ok)?;
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
-    let noted = journal.note.as_ref().filter(|_| facts.state == UnitState::Loader).map(|note| note.product.clone());
+    let noted = journal.note.as_ref().map(|note| note.product.clone());
     let product = args.product.map(|product| product.name.clone()).or(noted);
     journal.begin(&facts, product.as_deref(), &name, &talk, output);
     let mut meter = Meter::new(output.json);
@@ -148,8 +148,9 @@ struct Desk {
 impl Desk {
     fn of(talk: &Talk) -> Self {
         let journal = link::journal_key(talk.spec()).and_then(|key| Some((Journal::of_user()?, key)));
-        let in_loader = talk.session().facts().state == UnitState::Loader;
-        let note = journal.as_ref().filter(|_| in_loader).and_then(|(journal, key)| journal.note(key));
+        // A loader that erases its flash, or has lost its place in a record, does not say that it is one.
+        let says_nothing = talk.session().facts().state != UnitState::Application;
+        let note = journal.as_ref().filter(|_| says_nothing).and_then(|(journal, key)| journal.note(key));
         Desk { journal, note }
     }
 
@@ -227,7 +228,12 @@ fn plan(
                 None => "waits in its loader".to_owned(),
             },
             (Some(product), _) => format!("{}{version}", product.value),
-            (None, UnitState::Silent) => "does not answer".to_owned(),
+            (None, UnitState::Silent) => match note {
+                Some(note) => {
+                    format!("does not answer; an upload of '{}' was begun here and may still erase", note.image)
+                }
+                None => "does not answer".to_owned(),
+            },
             (None, _) => "does not say what it is".to_owned(),
         };
         output.remark(&format!("unit   {port}: {unit}"));

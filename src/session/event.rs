@@ -2,6 +2,7 @@
 //!
 //! Events carry spans into the record: a fact always points at the bytes it was read from.
 
+use super::flaw::Flaw;
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::LoaderKind;
 use crate::image::CheckedImage;
@@ -61,12 +62,15 @@ pub struct LoadOrder {
     pub loader: Option<LoaderKind>,
     /// Send long records instead of the file's: fewer characters for the same words.
     pub packed: bool,
+    /// A defect on purpose, to prove the proof.
+    #[doc(hidden)]
+    pub flaw: Option<Flaw>,
 }
 
 impl LoadOrder {
     /// An upload in the file's own records, to whatever is at the other end.
     pub fn new(image: CheckedImage, password: Secret) -> Self {
-        LoadOrder { image, password, product: None, loader: None, packed: false }
+        LoadOrder { image, password, product: None, loader: None, packed: false, flaw: None }
     }
 }
 

@@ -8,6 +8,8 @@ mod console;
 mod diagnostics;
 mod dictionary;
 mod event;
+#[doc(hidden)]
+pub mod flaw;
 mod identify;
 mod job;
 mod overheard;

@@ -30,10 +30,19 @@ pub(super) enum Size {
     Packed(usize),
 }
 
+/// What ends a record. The newer loaders take nothing else (facts: LF behind it is an error, LF alone mutes them).
+pub(super) const LINE_END: &[u8] = b"\r";
+
 /// All records: header, data, end.
-pub(super) fn build(image: &Image, flash: &FlashMap, size: Size) -> Vec<Outgoing> {
+pub(super) fn build(image: &Image, flash: &FlashMap, size: Size, line_end: &[u8]) -> Vec<Outgoing> {
+    let line = |write: &dyn Fn(&mut Vec<u8>)| {
+        let mut text = Vec::new();
+        write(&mut text);
+        text.extend_from_slice(line_end);
+        text
+    };
     let header = header(image);
-    let header = line(|text| srecord::write_header(&header, text));
+    let header = line(&|text| srecord::write_header(&header, text));
     let mut records = vec![Outgoing { text: header, address: None, crosses: false }];
     let mut page = None;
     let mut push = |address: u32, data: &[u8]| {
@@ -47,7 +56,7 @@ pub(super) fn build(image: &Image, flash: &FlashMap, size: Size) -> Vec<Outgoing
             data.push(0xFF); // Half a word is filled up as erased flash reads.
         }
         let record = Record { kind: Kind::Data32, address, data: &data };
-        records.push(Outgoing { text: line(|text| record.write(text)), address: Some(address), crosses });
+        records.push(Outgoing { text: line(&|text| record.write(text)), address: Some(address), crosses });
     };
     match size {
         Size::AsInFile => image.blocks.iter().for_each(|block| push(block.address, &block.data)),
@@ -60,7 +69,7 @@ pub(super) fn build(image: &Image, flash: &FlashMap, size: Size) -> Vec<Outgoing
         }
     }
     let end = Record { kind: Kind::Start32, address: image.entry, data: &[] };
-    records.push(Outgoing { text: line(|text| end.write(text)), address: None, crosses: false });
+    records.push(Outgoing { text: line(&|text| end.write(text)), address: None, crosses: false });
     records
 }
 
@@ -84,13 +93,6 @@ fn runs(image: &Image) -> Vec<(u32, Vec<u8>)> {
         }
     }
     runs
-}
-
-fn line(write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
-    let mut text = Vec::new();
-    write(&mut text);
-    text.push(b'\r');
-    text
 }
 
 #[cfg(test)]
@@ -131,20 +133,24 @@ mod tests {
         let blocks: Vec<(u32, usize)> =
             (0..20).map(|number| (number * 16, 32)).chain([(0x400, 32), (0x410, 7)]).collect();
         let image = image(&blocks);
-        let plain = words(&build(&image, &FLASH, Size::AsInFile));
+        let plain = words(&build(&image, &FLASH, Size::AsInFile, LINE_END));
         for bytes in [TWO_IN_A_RING, LONGEST] {
-            let packed = build(&image, &FLASH, Size::Packed(bytes));
+            let packed = build(&image, &FLASH, Size::Packed(bytes), LINE_END);
             assert_eq!(words(&packed), plain, "{bytes}");
             assert!(packed.iter().all(|record| record.text.len() <= 15 + 2 * bytes));
         }
-        assert_eq!(build(&image, &FLASH, Size::Packed(LONGEST)).len(), 2 + 3 + 1, "header, end, 640 and 39 bytes");
+        assert_eq!(
+            build(&image, &FLASH, Size::Packed(LONGEST), LINE_END).len(),
+            2 + 3 + 1,
+            "header, end, 640 and 39 bytes"
+        );
     }
 
     #[test]
     fn a_record_that_leaves_its_page_crosses_wherever_in_it_that_is() {
         let image = image(&[(0, 500), (250, 500), (512, 10)]);
         let crossing: Vec<bool> =
-            build(&image, &FLASH, Size::Packed(LONGEST)).iter().map(|record| record.crosses).collect();
+            build(&image, &FLASH, Size::Packed(LONGEST), LINE_END).iter().map(|record| record.crosses).collect();
         // Words 0-124, 125-249, 250-374 (page 0 to 1), 375-499, 512-516 (page 1 to 2).
         assert_eq!(crossing, [false, false, false, true, false, true, false]);
     }

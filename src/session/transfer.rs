@@ -21,6 +21,7 @@
 
 use std::collections::VecDeque;
 
+use super::flaw::Flaw;
 use super::records::{self, Outgoing, Size};
 use super::transmitter::Transmitter;
 use crate::device::{PROGRAM_TIME, Pacing, RING, longest_erase};
@@ -31,6 +32,9 @@ use crate::time::{Duration, Instant};
 /// How long behind the last character of a record that crosses into another page the loader's XOFF may take: an
 /// adapter shows it 20 ms late at worst, a busy computer later still.
 const HOLD_EXPECTED: Duration = Duration::from_millis(300);
+/// How long behind the header the XOFF of a loader may take that was not expected to send one: the echo of the header's
+/// text, and an adapter of 20 ms.
+const HEADER_HOLD: Duration = Duration::from_millis(120);
 /// How long behind a record the XON may take that says it is taken, if the loader shows otherwise that it is there:
 /// words are programmed in 3 ms, but here the end of it is a failed upload, so a busy computer gets more time.
 const ACKNOWLEDGED: Duration = Duration::from_millis(1000);
@@ -64,6 +68,7 @@ pub(super) struct Transfer {
     image: Image,
     flash: FlashMap,
     size: Size,
+    flaw: Option<Flaw>,
     records: Vec<Outgoing>,
     bytes_total: usize,
     /// Records let go.
@@ -76,6 +81,8 @@ pub(super) struct Transfer {
     pacing: Pacing,
     /// Characters on their way to a ring at most. None: one record at a time.
     window: Option<usize>,
+    /// No hold came behind the header where none was expected.
+    header_passed: bool,
     /// Everything is being sent once more.
     again: bool,
     /// Since when a loader that stops us behind every record does so. The transmitter's own knowledge will not do: it
@@ -93,14 +100,16 @@ pub(super) struct Transfer {
 
 impl Transfer {
     /// An image for this flash. `packed`: in records as long as the loader can keep, instead of the file's.
-    pub(super) fn new(image: &Image, flash: &FlashMap, pacing: Pacing, packed: bool) -> Self {
+    pub(super) fn new(image: &Image, flash: &FlashMap, pacing: Pacing, packed: bool, flaw: Option<Flaw>) -> Self {
         let size = if packed { Size::Packed(records::LONGEST) } else { Size::AsInFile };
-        let records = records::build(image, flash, size);
+        let line_end = if flaw == Some(Flaw::SendsCrLf) { b"\r\n" } else { records::LINE_END };
+        let records = records::build(image, flash, size, line_end);
         let bytes_total = records.iter().map(|record| record.text.len()).sum();
         Transfer {
             image: image.clone(),
             flash: *flash,
             size,
+            flaw,
             records,
             bytes_total,
             sent: 0,
@@ -109,6 +118,7 @@ impl Transfer {
             left_at: VecDeque::new(),
             pacing,
             window: Some(WINDOW),
+            header_passed: false,
             again: false,
             stopped_since: None,
             longest_erase: longest_erase(flash),
@@ -202,7 +212,7 @@ impl Transfer {
         let late = self.left_at.front().is_some_and(|&left_at| now.since(left_at) > PROMPT_HOLD);
         if late && self.size == Size::Packed(records::LONGEST) {
             self.size = Size::Packed(records::TWO_IN_A_RING);
-            self.records = records::build(&self.image, &self.flash, self.size);
+            self.records = records::build(&self.image, &self.flash, self.size, records::LINE_END);
             self.bytes_total = self.records.iter().map(|record| record.text.len()).sum();
         }
     }
@@ -265,7 +275,14 @@ impl Transfer {
 
     /// Until when an answer of the loader is awaited before the next record may go, if one is.
     fn waits_until(&self) -> Option<Instant> {
+        match self.flaw {
+            Some(Flaw::IgnoresHolds) => return None,
+            Some(Flaw::EndsAtOnce) if self.sent + 1 == self.records.len() => return None,
+            Some(_) | None => {}
+        }
         match self.pacing {
+            // The header may be what an unexpected g3 stops us behind; its ring is soon full.
+            Pacing::Pages if self.sent == 1 && !self.header_passed => Some(*self.left_at.back()? + HEADER_HOLD),
             Pacing::Pages => Some(self.crossing? + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE }),
             Pacing::Records => {
                 let &left_at = self.left_at.back()?;
@@ -306,6 +323,11 @@ impl Transfer {
         match self.pacing {
             // G1 says nothing behind the header.
             Pacing::Records if self.taken == 0 && !self.again => self.pacing = Pacing::Pages,
+            // That proves nothing: it may not have come.
+            Pacing::Pages if self.sent == 1 => {
+                self.header_passed = true;
+                return Ok(());
+            }
             _ if !self.alive => return Err(Stall::Silent),
             Pacing::Records if self.again => return Err(Stall::Unacknowledged),
             Pacing::Records if self.taken < PROVEN => self.pacing = Pacing::Pages,

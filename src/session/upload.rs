@@ -8,11 +8,12 @@
 //! - every wait has an end, and every end says what the unit is now.
 
 use super::event::{Event, Facts, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitNow, UnitState, Verdict};
+use super::flaw::Flaw;
 use super::identify::Identify;
 use super::job::{Desk, Signal, Work};
 use super::records;
 use super::transfer::{Stall, Transfer};
-use crate::device::{Pacing, Product};
+use crate::device::{Product, longest_erase};
 use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::{Confidence, LoaderText, Message, Prompt, Text, visible};
@@ -40,6 +41,8 @@ const ASK_VERSION: Duration = Duration::from_millis(1000);
 const UNASKED_KEY: Duration = Duration::from_millis(3000);
 /// The same behind its header.
 const UNASKED_KEY_BEHIND_HEADER: Duration = Duration::from_millis(1000);
+/// How long a loader may take behind the longest erasing until it says something.
+const BEHIND_THE_ERASE: Duration = Duration::from_secs(4);
 /// How long a loader with a ring may be silent behind the end record, before it is taken to wait for the rest of it.
 const END_UNHEARD: Duration = Duration::from_millis(1500);
 /// What brings a loader out of a record it has lost its place in: as many digits as the longest record has (it takes
@@ -61,6 +64,8 @@ pub(super) struct Upload {
     unheard: Option<(Instant, Unheard)>,
     /// The loader has been brought out of a record once.
     filled: bool,
+    /// How long a silent unit is asked again and again.
+    patience: Option<Instant>,
     /// Text that begins before this offset is history.
     mark: u64,
     /// The last text heard in this job that was not a row of the stream.
@@ -119,6 +124,7 @@ impl Upload {
             deadline: None,
             unheard: None,
             filled: false,
+            patience: None,
             mark: 0,
             heard: String::new(),
             cancelled: false,
@@ -129,13 +135,12 @@ impl Upload {
 
     /// Decides, once it is known who is there, whether the image may be sent.
     fn checked(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let facts: &Facts = desk.facts;
+        let facts: Facts = desk.facts.clone();
         self.version_before = facts.version.as_ref().map(|known| known.value);
         let said = facts.product.as_ref().map(|known| known.value.clone());
         let image_product = self.order.image.identity().map(|identity| identity.product.clone());
         match facts.state {
-            UnitState::Silent if self.may_be_lost_in_a_record() => {
-                self.fill_up(desk);
+            UnitState::Silent if self.may_come_back(desk) => {
                 let mut identify = Identify::default();
                 let outcome = identify.handle(Signal::Begin, desk);
                 self.deadline = identify.deadline();
@@ -176,8 +181,8 @@ impl Upload {
         };
         self.product = Some(known.name.clone());
         let pacing = self.order.loader.unwrap_or(known.loader.kind).pacing();
-        let packed = self.order.packed;
-        self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash, pacing, packed));
+        let (packed, flaw) = (self.order.packed, self.order.flaw);
+        self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash, pacing, packed, flaw));
         self.mark = desk.received;
         match unit {
             UnitNow::Loader => {
@@ -203,12 +208,16 @@ impl Upload {
         self.deadline = Some(self.deadline.map_or(quiet, |deadline| deadline.max(quiet)));
     }
 
-    /// Whether the silent unit may be a loader that has lost its place in a record of an upload before this one: it
-    /// takes every question for the rest of it.
-    fn may_be_lost_in_a_record(&self) -> bool {
-        let product = self.order.product.as_deref().and_then(Product::named);
-        let loader = self.order.loader.or(product.map(|product| product.loader.kind));
-        !self.filled && loader.is_some_and(|loader| loader.pacing() == Pacing::Records)
+    /// Whether the silent unit may be a loader: one that has lost its place in a record of an upload before this one, and
+    /// takes every question for the rest of it, or one that erases its flash and listens to nobody. That somebody says
+    /// which product it is speaks for it.
+    fn may_come_back(&mut self, desk: &mut Desk<'_>) -> bool {
+        let Some(product) = self.order.product.as_deref().and_then(Product::named) else { return false };
+        if self.patience.is_none() {
+            self.patience = Some(desk.now + longest_erase(&product.flash) + BEHIND_THE_ERASE);
+            self.fill_up(desk);
+        }
+        self.patience.is_some_and(|until| desk.now < until)
     }
 
     fn fill_up(&mut self, desk: &mut Desk<'_>) {
@@ -280,6 +289,7 @@ impl Upload {
         let failed = match message {
             Message::Loader(LoaderText::Progress | LoaderText::Header) | Message::Text | Message::Refusal => None,
             _ if self.is_echo_of_header(text) => None,
+            _ if self.order.flaw == Some(Flaw::SendsBehindErrors) => None,
             Message::Loader(LoaderText::Error(error)) => {
                 Some((format!("the loader reports error {error}"), UnitNow::Loader))
             }
@@ -329,6 +339,14 @@ impl Upload {
     /// It ends at `end` in the record.
     fn finishing(&mut self, message: &Message, end: u64, desk: &mut Desk<'_>) {
         let quiet = desk.now + BANNER_QUIET;
+        if self.order.flaw == Some(Flaw::BelievesTheLoader)
+            && matches!(message, Message::Loader(LoaderText::Loaded | LoaderText::Started))
+            && let Some(identity) = self.order.image.identity()
+        {
+            self.after.product = Some(identity.product.clone());
+            self.after.version = Some((Confidence::WithProduct, identity.version));
+            self.deadline = Some(desk.now);
+        }
         match message {
             Message::Loader(LoaderText::Error(error)) => {
                 let what = format!("the loader reports error {error} at the end of the file");
@@ -416,11 +434,7 @@ impl Upload {
     fn cancel(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         match &self.stage {
             Stage::Check(_) => {
-                let unit = match desk.facts.state {
-                    UnitState::Application => UnitNow::Application,
-                    UnitState::Loader => UnitNow::Loader,
-                    UnitState::Silent | UnitState::Unknown => UnitNow::Unknown,
-                };
+                let unit = self.as_found(desk);
                 self.end(desk, Verdict::Interrupted, unit, "cancelled before anything was changed")
             }
             Stage::AskedForLoader => {
@@ -452,12 +466,20 @@ impl Upload {
         }
     }
 
+    /// What the unit is, as long as nothing has been done to it.
+    fn as_found(&self, desk: &Desk<'_>) -> UnitNow {
+        match desk.facts.state {
+            UnitState::Application => UnitNow::Application,
+            UnitState::Loader => UnitNow::Loader,
+            UnitState::Silent | UnitState::Unknown => UnitNow::Unknown,
+        }
+    }
+
     /// The port is gone. What the unit is now follows from how far it was seen to come.
     fn link_lost(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let (unit, what) = match self.stage {
-            Stage::Check(_) | Stage::AskedForLoader => {
-                (UnitNow::Application, "the connection was lost before anything was changed")
-            }
+            Stage::Check(_) => (self.as_found(desk), "the connection was lost before anything was changed"),
+            Stage::AskedForLoader => (UnitNow::Application, "the connection was lost before anything was changed"),
             Stage::PasswordSent => (UnitNow::Unknown, "the connection was lost while the unit reset into its loader"),
             Stage::Settle => (UnitNow::Loader, "the connection was lost before the file was sent"),
             Stage::Transfer => (UnitNow::Loader, "the connection was lost in the middle of the file"),

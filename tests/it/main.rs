@@ -20,6 +20,7 @@ mod ptys;
 mod recordings;
 mod stranger;
 mod support;
+mod swarm;
 mod talks;
 mod tidy;
 mod transcripts;

@@ -1,9 +1,7 @@
 //! Stories of uploads: console and unit on one cable, in virtual time.
 
-use axcon::device::{LoaderKind, Product};
-use axcon::emulator::Running;
+use axcon::device::LoaderKind;
 use axcon::image::{Identity, make, srecord};
-use axcon::rng::Rng;
 use axcon::secret::Secret;
 use axcon::session::{Command, Event, Outcome, Phase, UnitNow, UnitState, Verdict};
 use axcon::time::Duration;
@@ -376,106 +374,5 @@ fn what_a_ring_of_550_characters_costs_at_any_latency() {
         // Erasing, and what is waited for behind the end record until the new banner is complete.
         let ratio = (report.duration.as_secs_f64() - 10.24 - 0.6) / line;
         assert!(ratio > 0.9 && ratio <= most, "{latency} ms: {ratio}");
-    }
-}
-
-/// A product to upload to, the version in the unit and the one to upload.
-struct Target {
-    product: &'static Product,
-    before: &'static str,
-    after: &'static str,
-    /// How long an upload takes, about, in ms.
-    takes_ms: u64,
-    /// How many characters the unit says meanwhile, about.
-    says: u64,
-}
-
-/// Which product a seed draws.
-fn target(seed: u64) -> Target {
-    if Rng::new(seed).fork("product").chance(50) {
-        Target { product: axtc4co(), before: "1.1.0", after: "1.2.0", takes_ms: 3_000, says: 700 }
-    } else {
-        Target { product: axrtd8co(), before: "2.1.1", after: "2.2.0", takes_ms: 14_000, says: 1_800 }
-    }
-}
-
-/// What a seed does to an upload: characters changed, lost or doubled on either way, a power cut, an adapter's latency.
-fn disturbed(seed: u64, target: &Target) -> Bench {
-    let mut rng = Rng::new(seed).fork("upload faults");
-    let flash = flash_with(&small_image(&target.product.name, target.before));
-    let latency = Duration::from_millis(rng.below(21));
-    let mut bench = Bench::of(target.product, target.product.loader.kind, flash, latency);
-    bench.run_for(Duration::from_secs(4));
-    let fault = |rng: &mut Rng, span: u64| {
-        let (at, kind, bit) = (rng.below(span), rng.below(3), rng.below(8));
-        move |number: u64, byte: u8| match kind {
-            _ if number != at => vec![byte],
-            0 => vec![byte ^ (1 << bit)],
-            1 => vec![],
-            _ => vec![byte, byte],
-        }
-    };
-    if rng.chance(60) {
-        bench.disturb(fault(&mut rng, 15_000));
-    }
-    if rng.chance(60) {
-        bench.disturb_answers(fault(&mut rng, target.says));
-    }
-    bench
-}
-
-/// Runs one seed: the verdict has to be true, and the next upload has to succeed.
-fn upload_with_faults(seed: u64) {
-    let target = target(seed);
-    let image = small_image(&target.product.name, target.after);
-    let wanted = flash_with(&image);
-    let end = image.identity().expect("an identity").program_words as usize * 2;
-    let mut bench = disturbed(seed, &target);
-    let mut rng = Rng::new(seed).fork("power");
-    bench.command(Command::Load(Box::new(order(image.clone()))));
-    if rng.chance(30) {
-        let moment = Duration::from_millis(rng.below(target.takes_ms));
-        bench.run_for(moment);
-        // What was said before a power cut says nothing about after it.
-        if bench.session.job().is_some() {
-            bench.power_cycle(Duration::from_millis(rng.below(2_000)));
-        }
-    }
-    let begun = bench.now;
-    let Outcome::Loaded(report) = bench.outcome() else { panic!("seed {seed}: no report") };
-    assert!(bench.now.since(begun) < Duration::from_secs(90), "seed {seed} took {:?}", bench.now.since(begun));
-    bench.run_for(Duration::from_millis(200)); // A unit that has just got its power starts.
-    let flash_is_right = bench.unit.unit().flash()[..end] == wanted[..end];
-    let running = bench.unit.unit().running();
-    match report.verdict {
-        Verdict::Done => {
-            assert!(flash_is_right, "seed {seed}: a false success: {report:?}");
-            assert_eq!(running, Running::Application, "seed {seed}: {report:?}");
-        }
-        _ if report.unit == UnitNow::Loader => assert_eq!(running, Running::Loader, "seed {seed}: {report:?}"),
-        _ if report.unit == UnitNow::Application => {
-            assert_eq!(running, Running::Application, "seed {seed}: {report:?}");
-        }
-        _ => {}
-    }
-    assert!(!bench.transcript().contains("AXIO"), "seed {seed}: the password is in the record");
-    bench.leave_in_peace();
-    bench.run_for(Duration::from_secs(3));
-    let mut again = order(image);
-    again.product = Some(target.product.name.clone());
-    let second = bench.load(again);
-    assert_eq!(second.verdict, Verdict::Done, "seed {seed}: first {report:?}\nthen {second:?}\n{}", bench.transcript());
-    assert!(bench.unit.unit().flash()[..end] == wanted[..end], "seed {seed}: the second upload");
-}
-
-/// `AXCON_SEED=N cargo test whatever_the_line_does` replays a single one.
-#[test]
-fn whatever_the_line_does_the_verdict_is_true_and_the_next_upload_succeeds() {
-    let seeds = match std::env::var("AXCON_SEED").ok().and_then(|seed| seed.parse().ok()) {
-        Some(seed) => seed..seed + 1,
-        None => 0..std::env::var("AXCON_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(300),
-    };
-    for seed in seeds {
-        upload_with_faults(seed);
     }
 }

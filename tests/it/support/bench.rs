@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
-use axcon::emulator::{Setup, Unit};
+use axcon::emulator::{Running, Setup, Unit};
 use axcon::endpoint::Endpoint;
 use axcon::image::{CheckedImage, make};
 use axcon::secret::Secret;
@@ -36,6 +36,9 @@ pub struct Bench {
     pub events: VecDeque<Event>,
     /// How the job ended that ended while time was let pass.
     ended: Option<Outcome>,
+    strays: u64,
+    /// The last two characters let go.
+    tail: [u8; 2],
 }
 
 impl Bench {
@@ -60,6 +63,17 @@ impl Bench {
         Bench::made_of(Setup { product, loader, seed: 1, dialect, flash, parameters: Vec::new() }, Duration::ZERO)
     }
 
+    /// A unit of which everything is drawn.
+    pub fn story(
+        product: &'static Product,
+        loader: LoaderKind,
+        dialect: u64,
+        flash: Vec<u8>,
+        latency: Duration,
+    ) -> Self {
+        Bench::made_of(Setup { product, loader, seed: 1, dialect, flash, parameters: Vec::new() }, latency)
+    }
+
     fn made_of(setup: Setup, latency: Duration) -> Self {
         let mut unit = Unit::new(setup);
         unit.power_on(Instant::ZERO);
@@ -75,7 +89,36 @@ impl Bench {
             wire: Vec::new(),
             events: VecDeque::new(),
             ended: None,
+            strays: 0,
+            tail: [0; 2],
         }
+    }
+
+    /// Characters sent to the unit so far, as a middleman counts them.
+    pub fn sent_so_far(&self) -> u64 {
+        self.sent
+    }
+
+    /// Characters received from it.
+    pub fn received_so_far(&self) -> u64 {
+        self.received
+    }
+
+    /// Data records that were let go while the unit's application ran.
+    pub fn strays(&self) -> u64 {
+        self.strays
+    }
+
+    /// Gives the session a command while a job runs.
+    pub fn command_again(&mut self, command: Command) {
+        self.session.command(self.now, command).expect("the session takes the command");
+        self.drain();
+    }
+
+    /// The cable is pulled out.
+    pub fn lose_link(&mut self) {
+        self.session.link_lost(self.now);
+        self.drain();
     }
 
     /// Puts somebody on the way to the unit.
@@ -200,6 +243,9 @@ impl Bench {
         while let Some(transmit) = self.session.poll_transmit() {
             for &byte in &transmit.bytes {
                 self.wire.push(byte);
+                self.tail = [self.tail[1], byte];
+                let is_record = self.tail == *b"S3" && self.unit.unit().running() == Running::Application;
+                self.strays += u64::from(is_record);
                 let through = match &mut self.middleman {
                     Some(middleman) => middleman(self.sent, byte),
                     None => vec![byte],

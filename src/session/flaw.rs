@@ -1,0 +1,25 @@
+//! Defects that a proof puts into the upload on purpose.
+//!
+//! A checker that has never found anything may be blind. So the swarm (`tests/it/swarm.rs`) also runs the machine with one
+//! of the defects that real senders have, and has to notice each. Nothing but that test ever names one.
+
+/// One defect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flaw {
+    /// Takes the loader's "loaded" for success, instead of the new banner.
+    BelievesTheLoader,
+    /// Lets the end record go while a record before it is parked or on its way.
+    EndsAtOnce,
+    /// Sends the line ends most files have, CR LF, whatever the loader takes.
+    SendsCrLf,
+    /// Goes on with the next record behind an error text, a prompt, or a banner.
+    SendsBehindErrors,
+    /// Waits for no XON where the loader must be writing.
+    IgnoresHolds,
+}
+
+impl Flaw {
+    /// All of them.
+    pub const ALL: [Flaw; 5] =
+        [Flaw::BelievesTheLoader, Flaw::EndsAtOnce, Flaw::SendsCrLf, Flaw::SendsBehindErrors, Flaw::IgnoresHolds];
+}
