@@ -424,7 +424,7 @@ impl Session {
         let asks_password = pending.as_ref().is_some_and(|text| {
             text.text.len() <= LONGEST_PROMPT
                 && text.span.end > self.prompt.seen
-                && self.vocabulary.prompt(&text.text) == Some(Prompt::Password)
+                && self.vocabulary.asks_password(&text.text)
         });
         self.password_asked |= asks_password;
         self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);

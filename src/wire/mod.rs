@@ -88,6 +88,16 @@ impl Vocabulary<'_> {
         Message::Text
     }
 
+    /// Whether a text without a line end asks for the password. Asked with every byte that comes, so cheap where it does
+    /// not.
+    pub fn asks_password(&self, text: &str) -> bool {
+        let speaks_of_it = text
+            .as_bytes()
+            .windows(3)
+            .any(|letters| letters.eq_ignore_ascii_case(b"pas") || letters.eq_ignore_ascii_case(b"pwd"));
+        speaks_of_it && self.prompt(text) == Some(Prompt::Password)
+    }
+
     /// What a text without a line end asks for, once the unit has fallen silent behind it.
     pub fn prompt(&self, text: &str) -> Option<Prompt> {
         prompt::recognise(text, &words::Words::of(text))

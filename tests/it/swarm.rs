@@ -233,10 +233,10 @@ fn middleman(faults: Vec<Fault>, seed: u64) -> impl FnMut(u64, u8) -> Vec<u8> {
 /// Runs one seed. What is wrong with it, if something is.
 fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
     let story = Story::of(seed);
-    let image = image(story.product, story.after, story.words);
+    let image = made(story.product, story.after, story.words);
     let wanted = flash_with(&image);
     let end = image.identity().expect("an identity").program_words as usize * 2;
-    let flash = flash_with(&image(story.product, story.before, 600));
+    let flash = flash_with(&made(story.product, story.before, 600));
     let mut bench = Bench::story(story.product, story.loader, story.dialect, flash, story.latency);
     // A console that was here before has noted the product, as the journal does.
     let mut order = order(image);
@@ -301,11 +301,11 @@ fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
 }
 
 /// An image, made once.
-fn image(product: &Product, version: &str, words: u32) -> CheckedImage {
+fn made(product: &Product, version: &str, words: u32) -> CheckedImage {
     static MADE: Mutex<BTreeMap<(String, String, u32), CheckedImage>> = Mutex::new(BTreeMap::new());
     let key = (product.name.clone(), version.to_owned(), words);
-    let mut made = MADE.lock().expect("no panic");
-    made.entry(key).or_insert_with(|| image_of(&product.name, version, words)).clone()
+    let mut all = MADE.lock().expect("no panic");
+    all.entry(key).or_insert_with(|| image_of(&product.name, version, words)).clone()
 }
 
 /// Brings the unit into the state in which the console finds it.
