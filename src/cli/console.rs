@@ -19,7 +19,7 @@ use crate::tui::{self, Failure, ImageFacts};
 /// If there is no terminal to draw on, or a signal ends it.
 pub fn run(global: &Global) -> Result<(), CliError> {
     // A name that makes no sense is said before the screen is taken.
-    let link = global.port.as_ref().map(|_| link::spec(global)).transpose()?;
+    let link = global.port().map(|_| link::spec(global)).transpose()?;
     let world = World {
         link: link.map(|link| link.to_string()),
         baud: global.baud,

@@ -19,7 +19,7 @@ use crate::host::replay::RecordingError;
 /// # Errors
 /// If the name makes no sense, or none was given and there is not exactly one candidate.
 pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
-    match &global.port {
+    match global.port() {
         Some(text) => {
             let spec: LinkSpec = text.parse().map_err(spec_error)?;
             match &spec {
@@ -148,7 +148,7 @@ pub fn recording_error(error: RecordingError) -> CliError {
 
 /// Whether the command line names a recording.
 pub fn is_recording(global: &Global) -> bool {
-    global.port.as_ref().is_some_and(|text| matches!(text.parse(), Ok(LinkSpec::Replay(_))))
+    global.port().is_some_and(|text| matches!(text.parse(), Ok(LinkSpec::Replay(_))))
 }
 
 /// The error of a command that would have to send something to a recording.

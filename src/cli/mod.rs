@@ -44,9 +44,9 @@ struct Cli {
 #[derive(Debug, Clone, Args)]
 pub struct Global {
     /// Where the unit is: a serial port (/dev/ttyUSB0, COM3, or its USB adapter's serial number) an emulated unit
-    /// (emu:axtc4co), or a recording (replay:FILE).
-    #[arg(long, value_name = "LINK", env = "AXCON_PORT", global = true)]
-    pub port: Option<String>,
+    /// (emu:axtc4co), or a recording (replay:FILE). `load` takes several.
+    #[arg(long = "port", value_name = "LINK", env = "AXCON_PORT", global = true)]
+    pub ports: Vec<String>,
     /// Line rate in baud; the units have 115200.
     #[arg(long, value_name = "RATE", default_value_t = 115_200, global = true, value_parser = clap::value_parser!(u32).range(50..=12_000_000))]
     pub baud: u32,
@@ -62,6 +62,13 @@ pub struct Global {
     /// Record nothing.
     #[arg(long, global = true)]
     pub no_record: bool,
+}
+
+impl Global {
+    /// The one link that was named, if one was.
+    pub fn port(&self) -> Option<&str> {
+        self.ports.first().map(String::as_str)
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -106,6 +113,10 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
 
 fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
     let global = &cli.global;
+    if global.ports.len() > 1 && !matches!(cli.command, Some(Command::Load(_))) {
+        let message = format!("several links were named ({}), and this works on one", global.ports.join(", "));
+        return Err(CliError::message(error::Kind::Usage, message).hint("'axcon load' takes several"));
+    }
     match cli.command {
         None => console::run(global),
         Some(Command::Ports(args)) => ports::run(args, global, output),

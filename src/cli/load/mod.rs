@@ -1,5 +1,8 @@
 //! `axcon load`: check, plan, upload, and believe only the new banner.
 
+mod meter;
+mod several;
+
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 
@@ -13,10 +16,9 @@ use super::{Global, link, password};
 use crate::device::{LoaderKind, Product};
 use crate::host::journal::{Journal, Note};
 use crate::image::{CheckedImage, DefectId, Report};
-use crate::session::{
-    Command, Event, Facts, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitNow, UnitState, Verdict,
-};
-use crate::time::Duration;
+use crate::secret::Secret;
+use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, Phase, UnitNow, UnitState, Verdict};
+use meter::Meter;
 
 /// Arguments of `axcon load`.
 ///
@@ -82,9 +84,46 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         return Err(CliError::message(Kind::Usage, "the password is missing")
             .hint("give it with --password-file FILE or in AXCON_PASSWORD"));
     }
-    if args.dry_run && global.port.is_none() {
+    if args.dry_run && global.ports.is_empty() {
         return plan(&report, &image, &name, None, output);
     }
+    let mut prepared = Prepared { args, name, report, image, password };
+    match global.ports.as_slice() {
+        [] | [_] => {
+            let meter = Meter::new(global.port().unwrap_or_default(), output.json);
+            upload(&prepared, global, meter, output)
+        }
+        several if prepared.args.dry_run => {
+            for port in several {
+                let global = Global { ports: vec![port.clone()], ..global.clone() };
+                let meter = Meter::new(port, output.json);
+                upload(&prepared, &global, meter, output)?;
+            }
+            Ok(())
+        }
+        several => {
+            if !global.yes && !agreed(&format!("Upload to {} units", several.len()), output)? {
+                return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
+            }
+            let password = prepared.password.take().map_or_else(password::ask, Ok)?;
+            prepared.password = Some(password);
+            several::run(several, &prepared, global, output)
+        }
+    }
+}
+
+/// What is known before a unit is looked at.
+struct Prepared {
+    args: Args,
+    name: String,
+    report: Report,
+    image: CheckedImage,
+    password: Option<Secret>,
+}
+
+/// Uploads to one unit.
+fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut Output) -> Result<(), CliError> {
+    let Prepared { args, name, report, image, password } = prepared;
     if link::is_recording(global) {
         return Err(link::read_only("take new software"));
     }
@@ -92,25 +131,27 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     talk.ask(Command::Identify)?;
     let journal = Desk::of(&talk);
     let facts = talk.session().facts().clone();
-    plan(&report, &image, &name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
+    plan(report, image, name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
     if args.dry_run {
         talk.close(output);
-        return check_product(&image, &facts);
+        return check_product(image, &facts);
     }
-    if !global.yes && !agreed(output)? {
+    if !global.yes && !agreed("Upload", output)? {
         talk.close(output);
         return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
     }
-    let password = password.map_or_else(password::ask, Ok)?;
+    let password = password.clone().map_or_else(password::ask, Ok)?;
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
     let noted = journal.note.as_ref().map(|note| note.product.clone());
     let product = args.product.map(|product| product.name.clone()).or(noted);
-    journal.begin(&facts, product.as_deref(), &name, &talk, output);
-    let mut meter = Meter::new(output.json);
-    let order = LoadOrder { product, loader: args.loader, packed: args.pack, ..LoadOrder::new(image, password) };
-    let ended = talk.run(Command::Load(Box::new(order)), |_, event| match event {
-        Event::Progress(progress) => meter.show(progress, output),
-        _ => Ok(()),
+    journal.begin(&facts, product.as_deref(), name, &talk, output);
+    let order =
+        LoadOrder { product, loader: args.loader, packed: args.pack, ..LoadOrder::new(image.clone(), password) };
+    let ended = talk.run(Command::Load(Box::new(order)), |_, event| {
+        if let Event::Progress(progress) = event {
+            meter.show(progress, output);
+        }
+        Ok(())
     })?;
     meter.end(output);
     let (outcome, lost) = match ended {
@@ -121,7 +162,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         return Err(CliError::message(Kind::Failed, "the upload ended without a report"));
     };
     journal.end(&result, output);
-    let result = conclude(&result, lost, &report, output);
+    let result = conclude(&result, lost, report, talk.port(), output);
     talk.close(output);
     result
 }
@@ -181,6 +222,7 @@ fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliErr
         let identity = report.facts.identity.as_ref();
         output.object(&LoadObject {
             schema: "axcon.load/1",
+            port: None,
             exit_code: Kind::ImageRefused.exit_code(),
             verdict: "refused",
             unit: "unknown",
@@ -247,8 +289,8 @@ fn plan(
     Ok(())
 }
 
-fn agreed(output: &mut Output) -> Result<bool, CliError> {
-    let _ = write!(output.err, "Upload? Type yes: ").and_then(|()| output.err.flush());
+fn agreed(deed: &str, output: &mut Output) -> Result<bool, CliError> {
+    let _ = write!(output.err, "{deed}? Type yes: ").and_then(|()| output.err.flush());
     let mut answer = String::new();
     std::io::stdin().read_line(&mut answer).map_err(|error| CliError::new(Kind::Failed, error))?;
     Ok(matches!(answer.trim().to_lowercase().as_str(), "yes" | "y"))
@@ -257,6 +299,7 @@ fn agreed(output: &mut Output) -> Result<bool, CliError> {
 #[derive(Serialize)]
 struct LoadObject<'a> {
     schema: &'static str,
+    port: Option<&'a str>,
     exit_code: u8,
     verdict: &'static str,
     unit: &'static str,
@@ -274,27 +317,21 @@ struct LoadObject<'a> {
     defects: Vec<DefectObject<'a>>,
 }
 
-#[derive(Serialize)]
-struct ProgressObject {
-    schema: &'static str,
-    phase: &'static str,
-    record: usize,
-    records: usize,
-    address: u32,
-    bytes: usize,
-    bytes_total: usize,
-    rate: f64,
-    eta_s: Option<f64>,
-    held_s: Option<f64>,
-}
-
 /// Says how it went, and what to do next.
-fn conclude(report: &LoadReport, lost: Option<CliError>, image: &Report, output: &mut Output) -> Result<(), CliError> {
+fn conclude(
+    report: &LoadReport,
+    lost: Option<CliError>,
+    image: &Report,
+    port: &str,
+    output: &mut Output,
+) -> Result<(), CliError> {
     let kind = exit_kind(report, lost.is_some());
     let next = next_step(report);
     if output.json {
-        output.object(&LoadObject {
+        // What became of the unit decides, whoever still reads.
+        let written = output.object(&LoadObject {
             schema: "axcon.load/1",
+            port: Some(port),
             exit_code: kind.map_or(0, Kind::exit_code),
             verdict: verdict_name(report.verdict),
             unit: unit_name(report.unit),
@@ -310,8 +347,8 @@ fn conclude(report: &LoadReport, lost: Option<CliError>, image: &Report, output:
             heard: &report.heard,
             next,
             defects: image_cli::defect_objects(image),
-        })?;
-        return kind.map_or(Ok(()), |kind| Err(CliError::reported(kind)));
+        });
+        return kind.map_or(written, |kind| Err(CliError::reported(kind)));
     }
     let Some(kind) = kind else {
         let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));
@@ -409,70 +446,5 @@ fn phase_name(phase: Phase) -> &'static str {
         Phase::Transfer => "transfer",
         Phase::Finish => "finish",
         Phase::Verify => "verify",
-    }
-}
-
-/// Shows progress: JSON lines, a bar on a terminal, or a line for each phase.
-struct Meter {
-    json: bool,
-    bar: bool,
-    phase: Option<Phase>,
-}
-
-/// Characters of the bar.
-const BAR: usize = 30;
-
-impl Meter {
-    fn new(json: bool) -> Self {
-        Meter { json, bar: !json && std::io::stderr().is_terminal(), phase: None }
-    }
-
-    fn show(&mut self, progress: &Progress, output: &mut Output) -> Result<(), CliError> {
-        let seconds = progress.elapsed.as_secs_f64();
-        let rate = if seconds > 0.0 { progress.bytes as f64 / seconds } else { 0.0 };
-        let rest = (progress.bytes_total - progress.bytes.min(progress.bytes_total)) as f64;
-        let eta = (rate > 0.0).then(|| rest / rate);
-        if self.json {
-            return output.object(&ProgressObject {
-                schema: "axcon.progress/1",
-                phase: phase_name(progress.phase),
-                record: progress.records,
-                records: progress.records_total,
-                address: progress.address,
-                bytes: progress.bytes,
-                bytes_total: progress.bytes_total,
-                rate: rate.round(),
-                eta_s: eta.map(|eta| (eta * 10.0).round() / 10.0),
-                held_s: progress.held.map(|held| held.as_secs_f64()),
-            });
-        }
-        if self.bar {
-            let share =
-                if progress.bytes_total == 0 { 0.0 } else { progress.bytes as f64 / progress.bytes_total as f64 };
-            let filled = (share * BAR as f64) as usize;
-            let eta = eta.map_or_else(String::new, |eta| format!(", {eta:.0} s left"));
-            let held = progress.held.filter(|held| *held >= Duration::from_secs(1));
-            let held = held.map_or_else(String::new, |held| format!(", held by XOFF for {:.0} s", held.as_secs_f64()));
-            let line = format!(
-                "\r{:<12} [{}{}] {:>3.0} %  {}/{} records{eta}{held}\x1b[K",
-                phase_name(progress.phase),
-                "#".repeat(filled),
-                " ".repeat(BAR - filled),
-                share * 100.0,
-                progress.records,
-                progress.records_total
-            );
-            let _ = output.err.write_all(line.as_bytes()).and_then(|()| output.err.flush());
-        } else if self.phase != Some(progress.phase) {
-            output.remark(&format!("{} ...", phase_name(progress.phase)));
-        }
-        self.phase = Some(progress.phase);
-        Ok(())
-    }
-
-    fn end(&self, output: &mut Output) {
-        if self.bar && self.phase.is_some() {
-            output.remark("");
-        }
     }
 }
