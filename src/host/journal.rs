@@ -63,6 +63,7 @@ impl Journal {
     /// # Errors
     /// If the journal cannot be written.
     pub fn begin(&self, port: &str, note: Note) -> io::Result<()> {
+        let _alone = self.lock()?;
         let mut notes = self.read();
         notes.uploads.insert(port.to_owned(), note);
         while notes.uploads.len() > MOST_NOTES {
@@ -77,8 +78,22 @@ impl Journal {
     /// # Errors
     /// If the journal cannot be written.
     pub fn end(&self, port: &str) -> io::Result<()> {
+        let _alone = self.lock()?;
         let mut notes = self.read();
         if notes.uploads.remove(port).is_some() { self.write(notes) } else { Ok(()) }
+    }
+
+    /// Waits until no other upload, of this program or another, is at the journal; given back with the file.
+    fn lock(&self) -> io::Result<fs::File> {
+        let folder = self.file.parent().unwrap_or(Path::new("."));
+        fs::create_dir_all(folder)?;
+        let lock = fs::File::options().create(true).append(true).open(self.file.with_extension("lock"))?;
+        match lock.lock() {
+            // Where locks do not work, two uploads at the same moment may lose a note, which costs a question later.
+            Err(error) if error.kind() == io::ErrorKind::Unsupported => {}
+            locked => locked?,
+        }
+        Ok(lock)
     }
 
     /// A journal that cannot be read holds nothing: the user is asked for the product then, and no harm is done.
@@ -92,7 +107,6 @@ impl Journal {
     fn write(&self, mut notes: Notes) -> io::Result<()> {
         SCHEMA.clone_into(&mut notes.schema);
         let folder = self.file.parent().unwrap_or(Path::new("."));
-        fs::create_dir_all(folder)?;
         let fresh = folder.join(format!("uploads.json.{}.tmp", std::process::id()));
         let mut file = fs::File::create(&fresh)?;
         let written = serde_json::to_writer_pretty(&mut file, &notes)
@@ -125,6 +139,27 @@ mod tests {
         assert_eq!(journal.note("u0"), Some(note(1)));
         journal.end("u0").expect("written");
         assert_eq!((journal.note("u0"), journal.note("u1")), (None, Some(note(2))));
+    }
+
+    #[test]
+    fn uploads_at_the_same_moment_lose_no_note() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("uploads.json");
+        std::thread::scope(|scope| {
+            for number in 0..8 {
+                let file = file.clone();
+                scope.spawn(move || {
+                    let journal = Journal::at(file);
+                    for round in 0..10 {
+                        journal.begin(&format!("u{number}-{round}"), note(1)).expect("written");
+                    }
+                });
+            }
+        });
+        let journal = Journal::at(file);
+        for number in 0..8 {
+            assert!((0..10).all(|round| journal.note(&format!("u{number}-{round}")).is_some()), "{number}");
+        }
     }
 
     #[test]

@@ -41,6 +41,9 @@ const ASK_VERSION: Duration = Duration::from_millis(1000);
 const UNASKED_KEY: Duration = Duration::from_millis(3000);
 /// The same behind its header.
 const UNASKED_KEY_BEHIND_HEADER: Duration = Duration::from_millis(1000);
+/// Lines of words nobody knows that a loader may print between two acknowledgements: it may have something to say of its
+/// erasing. A menu that takes records for keys says one or two behind each.
+const MOST_STRANGE: u32 = 3;
 /// How long a loader may take behind the longest erasing until it says something.
 const BEHIND_THE_ERASE: Duration = Duration::from_secs(4);
 /// How long a loader with a ring may be silent behind the end record, before it is taken to wait for the rest of it.
@@ -62,6 +65,8 @@ pub(super) struct Upload {
     deadline: Option<Instant>,
     /// What is to be sent if nothing is heard until then.
     unheard: Option<(Instant, Unheard)>,
+    /// Lines of words nobody knows since the loader has acknowledged anything.
+    strange: u32,
     /// The loader has been brought out of a record once.
     filled: bool,
     /// How long a silent unit is asked again and again.
@@ -123,6 +128,7 @@ impl Upload {
             stage: Stage::Check(Identify::default()),
             deadline: None,
             unheard: None,
+            strange: 0,
             filled: false,
             patience: None,
             mark: 0,
@@ -287,9 +293,14 @@ impl Upload {
     /// Something was heard while records are on their way: anything but the loader's progress ends the transfer.
     fn transferring(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) {
         let failed = match message {
-            Message::Loader(LoaderText::Progress | LoaderText::Header) | Message::Text | Message::Refusal => None,
+            Message::Loader(LoaderText::Progress | LoaderText::Header) => None,
             _ if self.is_echo_of_header(text) => None,
             _ if self.order.flaw == Some(Flaw::SendsBehindErrors) => None,
+            Message::Text | Message::Refusal => {
+                self.strange += u32::from(has_a_word(&text.text));
+                let what = "what answers does not talk as a loader does".to_owned();
+                (self.strange > MOST_STRANGE).then_some((what, UnitNow::Unknown))
+            }
             Message::Loader(LoaderText::Error(error)) => {
                 Some((format!("the loader reports error {error}"), UnitNow::Loader))
             }
@@ -649,6 +660,12 @@ impl Upload {
     }
 }
 
+/// Whether a text says something: damage and digits do not.
+fn has_a_word(text: &str) -> bool {
+    text.split(|c: char| !c.is_ascii_alphabetic())
+        .any(|word| word.len() >= 4 && !word.bytes().all(|c| c.is_ascii_hexdigit()))
+}
+
 impl Work for Upload {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
@@ -664,6 +681,9 @@ impl Work for Upload {
             Signal::Hold(held) => {
                 if let (Stage::Transfer, Some(transfer)) = (&self.stage, &mut self.transfer) {
                     transfer.hold(desk.now, held);
+                    if !held {
+                        self.strange = 0;
+                    }
                 }
                 self.report_progress(desk);
                 None

@@ -491,3 +491,52 @@ fn a_dry_run_says_that_the_image_is_for_another_unit() {
     assert_eq!(ran.code, Some(5), "{}", ran.err);
     assert!(ran.err.contains("the image is for AXRTD8CO, the unit is an AXTC4CO"), "{}", ran.err);
 }
+
+#[test]
+fn several_units_are_uploaded_to_at_once_and_one_that_fails_disturbs_none() {
+    let world = World::new();
+    let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "1500", "--out", "new.S"];
+    assert_eq!(world.run(&args, b"").code, Some(0));
+    fs::write(world.path("password"), "AXIO-2010").expect("written");
+    let emulators: Vec<_> = ["u1", "u2"]
+        .into_iter()
+        .map(|link| {
+            let emulator = world.start(&["emulate", "axtc4co", "--link", link]);
+            emulator.wait_out("\n");
+            emulator
+        })
+        .collect();
+    let load = ["load", "new.S", "--yes", "--password-file", "password", "--port", "u1", "--port", "missing"];
+    let ran = world.run(&[&load[..], &["--port", "u2"]].concat(), b"");
+    assert_eq!(ran.code, Some(3), "{}", ran.err);
+    assert!(ran.out.contains("u1: done: the unit runs AXTC4CO V1.2.0"), "{}", ran.out);
+    assert!(ran.out.contains("u2: done: the unit runs AXTC4CO V1.2.0"), "{}", ran.out);
+    assert!(ran.err.contains("missing: axcon: cannot open missing") && ran.err.contains("2 of 3 units"), "{}", ran.err);
+    let again = ["load", "new.S", "--yes", "--password-file", "password", "--pack", "--json"];
+    let ran = world.run(&[&again[..], &["--port", "u1", "--port", "u2"]].concat(), b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let last = ran.out.lines().last().expect("a line");
+    let summary: serde_json::Value = serde_json::from_str(last).expect("an object");
+    assert_eq!((&summary["schema"], &summary["exit_code"]), (&"axcon.loads/1".into(), &0.into()));
+    assert!(ran.out.lines().all(|line| line.starts_with("{\"schema\":\"axcon.")), "{}", ran.out);
+    let ran = world.run(&["identify", "--port", "u1", "--port", "u2"], b"");
+    assert_eq!(ran.code, Some(2), "what works on one unit says so: {}", ran.err);
+    drop(emulators);
+}
+
+#[test]
+fn an_upload_whose_reader_has_gone_is_finished_all_the_same() {
+    let world = World::new();
+    let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "1500", "--out", "new.S"];
+    assert_eq!(world.run(&args, b"").code, Some(0));
+    fs::write(world.path("password"), "AXIO-2010").expect("written");
+    let emulator = world.start(&["emulate", "axtc4co", "--link", "u1"]);
+    emulator.wait_out("\n");
+    // `head` reads one line of progress and goes.
+    let program = env!("CARGO_BIN_EXE_axcon");
+    let line = format!("'{program}' load new.S --json --yes --password-file password --port u1 | head -1");
+    let mut shell = world.command_of(std::path::Path::new("/bin/sh"), &["-c", &line]);
+    assert!(shell.status().expect("a shell").success());
+    let ran = world.run(&["identify", "--json", "--port", "u1"], b"");
+    assert!(ran.out.contains("\"version\":\"1.2.0\""), "{}", ran.out);
+}

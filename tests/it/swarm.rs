@@ -278,7 +278,10 @@ fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
         return Err(format!("the password is in the record behind {near}"));
     }
     if bench.strays() - strays > STRAYS {
-        return Err(format!("{} records went to what is no loader: {report:?}", bench.strays() - strays));
+        let heard = bench.transcript();
+        let end = heard.char_indices().rev().nth(6_000).map_or(0, |(at, _)| at);
+        let strays = bench.strays() - strays;
+        return Err(format!("{strays} records went to what is no loader: {report:?}\n{}", &heard[end..]));
     }
 
     // The faults stop; another console comes, and knows what the journal says.

@@ -11,7 +11,7 @@ use crate::wire::{Text, dictionary};
 const MOST_ENTRIES: usize = 20_000;
 
 /// What has been read so far.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(in crate::session) struct Collector {
     /// The product whose objects these are, once it is known.
     pub(in crate::session) product: Option<&'static Product>,
@@ -76,6 +76,11 @@ impl Collector {
                 false
             }
         }
+    }
+
+    /// Whether an entry would be read from a line.
+    pub(in crate::session) fn reads(&self, text: &Text) -> bool {
+        self.clone().line(text)
     }
 
     /// The view has been left: a line without an index belongs to nothing read before.

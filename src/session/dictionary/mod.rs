@@ -36,6 +36,8 @@ pub(super) struct ReadDictionary {
     fresh: bool,
     /// The last answer had any text.
     answered: bool,
+    /// Where an entry without a line end ended when it was first looked at.
+    unended: Option<u64>,
     idle: u32,
     steps: u32,
     menu: u32,
@@ -59,6 +61,7 @@ impl ReadDictionary {
             stage: Stage::Opening,
             fresh: false,
             answered: false,
+            unended: None,
             idle: 0,
             steps: 0,
             menu: 0,
@@ -106,8 +109,14 @@ impl ReadDictionary {
     }
 
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        // The last line of an answer may have no end.
-        if let (Some(text), Stage::Opening | Stage::Walking) = (desk.pending, &self.stage) {
+        // The last line of an answer may have no end. Half of one looks like another entry, so it has to stand still.
+        if let (Some(text), Stage::Opening | Stage::Walking) = (desk.pending, &self.stage)
+            && self.collector.reads(text)
+        {
+            if self.unended.replace(text.span.end) != Some(text.span.end) {
+                self.deadline = Some(desk.now + QUIET);
+                return None;
+            }
             self.take(text);
         }
         let menu_is_back = self.menu.count_ones() >= MENU_ENTRIES;
