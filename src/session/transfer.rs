@@ -81,6 +81,8 @@ pub(super) struct Transfer {
     pacing: Pacing,
     /// Characters on their way to a ring at most. None: one record at a time.
     window: Option<usize>,
+    /// Flow control has shown that something was taken: that nothing came where it was awaited shows nothing.
+    acknowledged: bool,
     /// No hold came behind the header where none was expected.
     header_passed: bool,
     /// Everything is being sent once more.
@@ -118,6 +120,7 @@ impl Transfer {
             left_at: VecDeque::new(),
             pacing,
             window: Some(WINDOW),
+            acknowledged: false,
             header_passed: false,
             again: false,
             stopped_since: None,
@@ -184,6 +187,7 @@ impl Transfer {
                 // XON alone will do: it comes when the page is written, and the XOFF may have been lost on the line.
                 self.crossing = None;
                 self.alive = false;
+                self.acknowledged = true;
                 self.take_all_sent();
             }
             Pacing::Records => {
@@ -196,6 +200,7 @@ impl Transfer {
                 // Only both together count: what is damaged on the line must not count twice.
                 if was_stopped && !held {
                     self.alive = false;
+                    self.acknowledged = true;
                     self.take_one();
                     // Behind a long hold the ring may have had more in it. It is empty now.
                     while self.left_at.front().is_some_and(|&left_at| left_at + HOLD_EXPECTED <= now) {
@@ -224,7 +229,7 @@ impl Transfer {
 
     /// Whether the loader has shown by its flow control that it takes the records.
     pub(super) fn is_taken(&self) -> bool {
-        self.taken > 0 || self.stopped_since.is_some()
+        self.acknowledged || self.stopped_since.is_some()
     }
 
     /// Whether the loader must be erasing all of its flash.
