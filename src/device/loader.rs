@@ -15,18 +15,22 @@ use crate::time::Duration;
 pub enum LoaderKind {
     /// SDK, 2000-2004: one page buffer, one parked record, XOFF when the data crosses into another page.
     G1,
+    /// 56F83xx generation: known by its texts and error numbers. How it stops its sender is not known; it is believed to
+    /// do so like [`G1`](LoaderKind::G1), with which it shares prompt, dots and errors (a guess).
+    G2,
     /// Circular buffer, 2005 and later: XOFF behind every record.
     G3,
 }
 
 impl LoaderKind {
     /// All kinds, for the command line.
-    pub const ALL: [LoaderKind; 2] = [LoaderKind::G1, LoaderKind::G3];
+    pub const ALL: [LoaderKind; 3] = [LoaderKind::G1, LoaderKind::G2, LoaderKind::G3];
 
     /// The name the command line and the product files use.
     pub const fn name(self) -> &'static str {
         match self {
             LoaderKind::G1 => "g1",
+            LoaderKind::G2 => "g2",
             LoaderKind::G3 => "g3",
         }
     }
@@ -34,7 +38,7 @@ impl LoaderKind {
     /// How it stops and releases its sender.
     pub const fn pacing(self) -> Pacing {
         match self {
-            LoaderKind::G1 => Pacing::Pages,
+            LoaderKind::G1 | LoaderKind::G2 => Pacing::Pages,
             LoaderKind::G3 => Pacing::Records,
         }
     }

@@ -220,6 +220,24 @@ fn a_unit_with_another_loader_than_its_product_file_says_is_uploaded_to_all_the_
 }
 
 #[test]
+fn a_loader_of_the_56f83xx_generation_is_uploaded_to_at_any_latency() {
+    for (product, before, after) in [(axtc4co(), "1.1.0", "1.2.0"), (axrtd8co(), "2.1.1", "2.2.0")] {
+        for latency in [0, 1, 4, 16, 20] {
+            let image = small_image(&product.name, after);
+            let flash = flash_with(&small_image(&product.name, before));
+            let mut bench = Bench::of(product, LoaderKind::G2, flash, Duration::from_millis(latency));
+            bench.run_for(Duration::from_secs(6));
+            let report = bench.load(order(image.clone()));
+            let all = bench.transcript();
+            assert_eq!(report.verdict, Verdict::Done, "{} {latency} ms: {report:?}", product.name);
+            assert!(all.contains("Application started from address 0x00A0"), "{} {latency} ms", product.name);
+            let end = image.identity().expect("an identity").program_words as usize * 2;
+            assert!(bench.unit.unit().flash()[..end] == flash_with(&image)[..end], "{} {latency} ms", product.name);
+        }
+    }
+}
+
+#[test]
 fn a_key_prompt_in_words_nobody_knows_gets_its_key_as_well() {
     let mut bench = rtd8(Duration::ZERO);
     // Of "Hit any key to continue" nothing is left but the number of its letters.
@@ -372,6 +390,7 @@ fn what_a_ring_of_550_characters_costs_at_any_latency() {
 /// A product to upload to, the version in the unit and the one to upload.
 struct Target {
     product: &'static Product,
+    loader: LoaderKind,
     before: &'static str,
     after: &'static str,
     /// How long an upload takes, about, in ms.
@@ -380,12 +399,18 @@ struct Target {
     says: u64,
 }
 
-/// Which product a seed draws.
+/// Which product a seed draws, with its own loader or, in every third seed, that of the 56F83xx generation.
 fn target(seed: u64) -> Target {
+    let g2 = Rng::new(seed).fork("loader").chance(33);
     if Rng::new(seed).fork("product").chance(50) {
-        Target { product: axtc4co(), before: "1.1.0", after: "1.2.0", takes_ms: 3_000, says: 700 }
+        let loader = if g2 { LoaderKind::G2 } else { LoaderKind::G1 };
+        Target { product: axtc4co(), loader, before: "1.1.0", after: "1.2.0", takes_ms: 3_000, says: 700 }
+    } else if g2 {
+        let loader = LoaderKind::G2;
+        Target { product: axrtd8co(), loader, before: "2.1.1", after: "2.2.0", takes_ms: 3_500, says: 1_000 }
     } else {
-        Target { product: axrtd8co(), before: "2.1.1", after: "2.2.0", takes_ms: 14_000, says: 1_800 }
+        let loader = LoaderKind::G3;
+        Target { product: axrtd8co(), loader, before: "2.1.1", after: "2.2.0", takes_ms: 14_000, says: 1_800 }
     }
 }
 
@@ -394,7 +419,7 @@ fn disturbed(seed: u64, target: &Target) -> Bench {
     let mut rng = Rng::new(seed).fork("upload faults");
     let flash = flash_with(&small_image(&target.product.name, target.before));
     let latency = Duration::from_millis(rng.below(21));
-    let mut bench = Bench::of(target.product, target.product.loader.kind, flash, latency);
+    let mut bench = Bench::of(target.product, target.loader, flash, latency);
     bench.run_for(Duration::from_secs(4));
     let fault = |rng: &mut Rng, span: u64| {
         let (at, kind, bit) = (rng.below(span), rng.below(3), rng.below(8));
