@@ -15,7 +15,8 @@ use crate::time::Duration;
 pub enum LoaderKind {
     /// SDK, 2000-2004: one page buffer, one parked record, XOFF when the data crosses into another page.
     G1,
-    /// For the 56F83xx. Its texts are known; that it keeps pages and stops its sender as G1 does is a guess.
+    /// 56F83xx generation: known by its texts and error numbers. How it stops its sender is not known; it is believed to
+    /// do so like [`G1`](LoaderKind::G1), with which it shares prompt, dots and errors (a guess).
     G2,
     /// Circular buffer, 2005 and later: XOFF behind every record.
     G3,

@@ -38,7 +38,7 @@ use bootloader::Bootloader;
 use dialect::Dialect;
 use firmware::Firmware;
 use knob::{Knob, KnobError};
-use memory::{Flash, ParameterStore, Parameters, StartDelay};
+use memory::{Defect, Flash, ParameterStore, Parameters, StartDelay};
 use sensors::Sensors;
 use uart::Uart;
 
@@ -254,9 +254,24 @@ impl Unit {
         self.sensors.turn(knob)
     }
 
-    /// Makes one word of program flash refuse what is programmed, or none: a worn-out cell.
-    pub fn wear_out_word(&mut self, word: Option<u32>) {
-        self.flash.wear_out(word);
+    /// Spoils a word of program flash.
+    pub fn spoil_word(&mut self, word: u32, defect: Defect) {
+        self.flash.spoil(word, defect);
+    }
+
+    /// Makes all words of program flash good again.
+    pub fn repair_flash(&mut self) {
+        self.flash.repair();
+    }
+
+    /// A character has come that the receiver could not read: its stop bit was not where it should be. A running
+    /// application does not notice.
+    pub fn handle_framing_error(&mut self, now: Instant) {
+        self.run_until(now);
+        self.with_program(now, |program, board| match program {
+            Program::Loader(loader) => loader.receive_garbage(board),
+            Program::Starting { .. } | Program::Application(_) => {}
+        });
     }
 
     /// State of the CANopen node; `None` unless the application runs.

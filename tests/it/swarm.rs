@@ -16,6 +16,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::Running;
+use axcon::emulator::memory::Defect;
 use axcon::image::CheckedImage;
 use axcon::rng::Rng;
 use axcon::session::flaw::Flaw;
@@ -50,7 +51,7 @@ struct Story {
     from_unit: Vec<Fault>,
     interruption: Interruption,
     /// A word of the flash that cannot be written.
-    worn: Option<u32>,
+    spoiled: Option<(u32, Defect)>,
 }
 
 /// The state in which the console finds the unit.
@@ -119,8 +120,8 @@ impl std::fmt::Display for Story {
         write!(f, "{} {loader:?}, dialect {dialect}, {latency:?}, {words} words", self.product.name)?;
         write!(
             f,
-            ", packed {packed}, found {found:?}, {interruption:?}, to unit {to_unit:?}, from it {from_unit:?}, worn {:?}",
-            self.worn
+            ", packed {packed}, found {found:?}, {interruption:?}, to unit {to_unit:?}, from it {from_unit:?}, spoiled {:?}",
+            self.spoiled
         )
     }
 }
@@ -155,7 +156,10 @@ impl Story {
             to_unit: story(&mut rng, sent, 3),
             from_unit: story(&mut rng, said, 3),
             interruption: Interruption::of(&mut rng, takes),
-            worn: rng.chance(6).then(|| rng.below(u64::from(words)) as u32),
+            spoiled: rng.chance(6).then(|| {
+                let defects = [Defect::WornOut, Defect::Protected, Defect::Stuck];
+                (rng.below(u64::from(words)) as u32, defects[rng.below(3) as usize])
+            }),
         }
     }
 }
@@ -251,7 +255,9 @@ fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
     bench.wire.clear();
     bench.disturb(middleman(shifted(&story.to_unit, bench.sent_so_far()), seed));
     bench.disturb_answers(middleman(shifted(&story.from_unit, bench.received_so_far()), seed ^ 1));
-    bench.unit.unit_mut().wear_out_word(story.worn);
+    if let Some((word, defect)) = story.spoiled {
+        bench.unit.unit_mut().spoil_word(word, defect);
+    }
     let begun = bench.now;
     let strays = bench.strays();
     let report = first_upload(&mut bench, &order, story.interruption);
@@ -293,7 +299,7 @@ fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
 
     // The faults stop; another console comes, and knows what the journal says.
     bench.leave_in_peace();
-    bench.unit.unit_mut().wear_out_word(None);
+    bench.unit.unit_mut().repair_flash();
     bench.unit.to_unit_mut().clear();
     bench.run_for(Duration::from_secs(3));
     bench.reconnect();

@@ -228,6 +228,24 @@ fn every_loader_in_every_unit_is_uploaded_to_at_any_latency_packed_or_not() {
 }
 
 #[test]
+fn a_loader_of_the_56f83xx_generation_is_uploaded_to_at_any_latency() {
+    for (product, before, after) in [(axtc4co(), "1.1.0", "1.2.0"), (axrtd8co(), "2.1.1", "2.2.0")] {
+        for latency in [0, 1, 4, 16, 20] {
+            let image = small_image(&product.name, after);
+            let flash = flash_with(&small_image(&product.name, before));
+            let mut bench = Bench::of(product, LoaderKind::G2, flash, Duration::from_millis(latency));
+            bench.run_for(Duration::from_secs(6));
+            let report = bench.load(order(image.clone()));
+            let all = bench.transcript();
+            assert_eq!(report.verdict, Verdict::Done, "{} {latency} ms: {report:?}", product.name);
+            assert!(all.contains("Application started from address 0x00A0"), "{} {latency} ms", product.name);
+            let end = image.identity().expect("an identity").program_words as usize * 2;
+            assert!(bench.unit.unit().flash()[..end] == flash_with(&image)[..end], "{} {latency} ms", product.name);
+        }
+    }
+}
+
+#[test]
 fn a_key_prompt_in_words_nobody_knows_gets_its_key_as_well() {
     let mut bench = rtd8(Duration::ZERO);
     // Of "Hit any key to continue" nothing is left but the number of its letters.

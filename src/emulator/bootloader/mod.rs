@@ -1,14 +1,15 @@
 //! The loaders a unit may have in its boot flash: they take an S-record file and write it to program flash.
 //!
-//! Three generations, two of them with the same habits ([`g1`]), the third with its own ([`g3`]), behind one door. A loader lives in flash of its own: no
+//! Three generations behind one door: two that keep a page and write it when the next one begins ([`paged`], g1 and g2),
+//! and one with a ring of characters ([`g3`]). A loader lives in flash of its own: no
 //! file can damage it. It knows nothing of what it loads: success means that the end record has come. Which program
 //! runs after the reset is decided by the unit (`emulator/mod.rs`).
 //!
 //! What the manual quotes of a product's loader comes from the product's file and wins over what the public loaders
 //! print. No dialect touches these texts.
 
-mod g1;
 mod g3;
+mod paged;
 
 use super::Board;
 use super::memory::Flash;
@@ -18,8 +19,8 @@ use crate::time::Instant;
 /// The loader while it runs.
 #[derive(Debug)]
 pub enum Bootloader {
-    /// The SDK's, or the one for the 56F83xx, which differs in its texts only as far as anybody knows.
-    G1(g1::Loader),
+    /// The SDK's, and its successor.
+    Paged(paged::Loader),
     /// The one with a circular buffer.
     G3(g3::Loader),
 }
@@ -29,8 +30,8 @@ impl Bootloader {
     /// start instead.
     pub fn start(kind: LoaderKind, board: &mut Board<'_>, may_leave: bool) -> Self {
         match kind {
-            LoaderKind::G1 => Bootloader::G1(g1::Loader::start(board, &g1::SDK)),
-            LoaderKind::G2 => Bootloader::G1(g1::Loader::start(board, &g1::FOR_56F83XX)),
+            LoaderKind::G1 => Bootloader::Paged(paged::Loader::start(&paged::G1, board)),
+            LoaderKind::G2 => Bootloader::Paged(paged::Loader::start(&paged::G2, board)),
             LoaderKind::G3 => Bootloader::G3(g3::Loader::start(board, may_leave)),
         }
     }
@@ -38,15 +39,23 @@ impl Bootloader {
     /// A character has come.
     pub fn receive(&mut self, board: &mut Board<'_>, character: u8) {
         match self {
-            Bootloader::G1(loader) => loader.receive(board, character),
+            Bootloader::Paged(loader) => loader.receive(board, character),
             Bootloader::G3(loader) => loader.receive(board, character),
+        }
+    }
+
+    /// A character has come that the receiver could not read.
+    pub fn receive_garbage(&mut self, board: &mut Board<'_>) {
+        match self {
+            Bootloader::Paged(loader) => loader.receive_garbage(board),
+            Bootloader::G3(loader) => loader.receive_garbage(board),
         }
     }
 
     /// When something is due.
     pub fn deadline(&self, flash: &Flash) -> Option<Instant> {
         match self {
-            Bootloader::G1(loader) => loader.deadline(flash),
+            Bootloader::Paged(loader) => loader.deadline(flash),
             Bootloader::G3(loader) => loader.deadline(flash),
         }
     }
@@ -54,7 +63,7 @@ impl Bootloader {
     /// Does what is due.
     pub fn step(&mut self, board: &mut Board<'_>) {
         match self {
-            Bootloader::G1(loader) => loader.step(board),
+            Bootloader::Paged(loader) => loader.step(board),
             Bootloader::G3(loader) => loader.step(board),
         }
     }
@@ -62,7 +71,7 @@ impl Bootloader {
     /// Whether the sender is stopped.
     pub fn holds_sender(&self) -> bool {
         match self {
-            Bootloader::G1(loader) => loader.holds_sender(),
+            Bootloader::Paged(loader) => loader.holds_sender(),
             Bootloader::G3(loader) => loader.holds_sender(),
         }
     }

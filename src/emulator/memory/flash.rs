@@ -9,10 +9,13 @@ use super::super::{Area, Store};
 use crate::device::{ERASE_TIME, PROGRAM_TIME};
 use crate::image::FlashMap;
 use crate::rng::Rng;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// Content of an erased word.
 const ERASED: u16 = 0xFFFF;
+
+/// How long a loader waits for a flash that does not come to an end: five times what erasing takes. A guess.
+const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Program flash with the operation that runs on it.
 #[derive(Debug)]
@@ -20,8 +23,8 @@ pub struct Flash {
     map: FlashMap,
     bytes: Vec<u8>,
     operation: Option<Operation>,
-    /// A word that does not take what is programmed, for tests of the loader's error 6.
-    bad_word: Option<u32>,
+    /// Words with what is wrong with them.
+    defects: Vec<(u32, Defect)>,
     chance: Rng,
 }
 
@@ -32,6 +35,21 @@ pub enum Written {
     Good,
     /// At least one word does not.
     Mismatch,
+    /// The flash has refused: something there is protected. Nothing has changed.
+    Refused,
+    /// The flash did not come to an end, and the loader has stopped to wait for it. Nothing has changed.
+    Stuck,
+}
+
+/// What can be wrong with a word of flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Defect {
+    /// It takes nothing that is programmed; erasing works.
+    WornOut,
+    /// It is protected: an operation on it or its page is refused.
+    Protected,
+    /// An operation on it or its page does not end.
+    Stuck,
 }
 
 /// Words on their way from their old content to the new one.
@@ -44,6 +62,11 @@ struct Operation {
 
 #[derive(Debug)]
 enum Stage {
+    /// Nothing will change, and at this moment it is known.
+    Failing {
+        until: Instant,
+        written: Written,
+    },
     Erasing {
         until: Instant,
     },
@@ -61,7 +84,7 @@ impl Flash {
     /// If the content is not as long as the flash.
     pub fn new(map: FlashMap, bytes: Vec<u8>, seed: u64) -> Self {
         assert_eq!(bytes.len(), map.program_words as usize * 2, "flash content of the wrong length");
-        Flash { map, bytes, operation: None, bad_word: None, chance: Rng::new(seed).fork("flash") }
+        Flash { map, bytes, operation: None, defects: Vec::new(), chance: Rng::new(seed).fork("flash") }
     }
 
     /// The content, bytes in S-record order (words low byte first).
@@ -89,9 +112,14 @@ impl Flash {
         (first..first + self.map.page_words).map(|address| self.word(address)).collect()
     }
 
-    /// Makes one word refuse what is programmed, or none: a worn-out cell.
-    pub fn wear_out(&mut self, word: Option<u32>) {
-        self.bad_word = word;
+    /// Spoils a word. An address behind the last word is nowhere, and so is the defect.
+    pub fn spoil(&mut self, word: u32, defect: Defect) {
+        self.defects.push((word, defect));
+    }
+
+    /// Makes all words good again.
+    pub fn repair(&mut self) {
+        self.defects.clear();
     }
 
     /// Begins to write a page: erases it if some bit has to become 1, then programs the words that differ.
@@ -108,7 +136,7 @@ impl Flash {
         } else {
             Stage::Programming { since: now, words: differing(&old, &wanted) }
         };
-        self.operation = Some(Operation { first_word: page * self.map.page_words, wanted, stage });
+        self.begin(now, Operation { first_word: page * self.map.page_words, wanted, stage });
     }
 
     /// Begins to erase words, whether they need it or not.
@@ -119,7 +147,7 @@ impl Flash {
         assert!(self.operation.is_none(), "one flash operation at a time");
         assert!(first_word + words <= self.map.program_words, "no such words to erase");
         let wanted = vec![ERASED; words as usize];
-        self.operation = Some(Operation { first_word, wanted, stage: Stage::Erasing { until: now + ERASE_TIME } });
+        self.begin(now, Operation { first_word, wanted, stage: Stage::Erasing { until: now + ERASE_TIME } });
     }
 
     /// Begins to program words as they are, each in its turn, without erasing anything.
@@ -130,13 +158,25 @@ impl Flash {
         assert!(self.operation.is_none(), "one flash operation at a time");
         assert!(first_word as usize + wanted.len() <= self.map.program_words as usize, "no such words to program");
         let words = (0..wanted.len()).collect();
-        self.operation = Some(Operation { first_word, wanted, stage: Stage::Programming { since: now, words } });
+        self.begin(now, Operation { first_word, wanted, stage: Stage::Programming { since: now, words } });
+    }
+
+    /// Begins, unless the flash has something against it.
+    fn begin(&mut self, now: Instant, mut operation: Operation) {
+        let words = operation.first_word..operation.first_word + operation.wanted.len() as u32;
+        let has = |wanted| self.defects.iter().any(|(word, defect)| *defect == wanted && words.contains(word));
+        if has(Defect::Protected) {
+            operation.stage = Stage::Failing { until: now, written: Written::Refused };
+        } else if has(Defect::Stuck) {
+            operation.stage = Stage::Failing { until: now + PATIENCE, written: Written::Stuck };
+        }
+        self.operation = Some(operation);
     }
 
     /// When something is due.
     pub fn deadline(&self) -> Option<Instant> {
         self.operation.as_ref().map(|operation| match &operation.stage {
-            Stage::Erasing { until } => *until,
+            Stage::Failing { until, .. } | Stage::Erasing { until } => *until,
             Stage::Programming { since, words } => *since + PROGRAM_TIME * words.len() as u32,
         })
     }
@@ -149,6 +189,7 @@ impl Flash {
         let mut operation = self.operation.take()?;
         let first_word = operation.first_word;
         match operation.stage {
+            Stage::Failing { written, .. } => Some(written),
             Stage::Erasing { until } => {
                 self.put(first_word, &vec![ERASED; operation.wanted.len()], stores);
                 let words = differing(&vec![ERASED; operation.wanted.len()], &operation.wanted);
@@ -172,6 +213,7 @@ impl Flash {
         }
         let Some(operation) = self.operation.take() else { return };
         match operation.stage {
+            Stage::Failing { .. } => {}
             Stage::Erasing { .. } => {
                 // Erasing drives bits to 1: each cell has or has not arrived there.
                 let gone = self.chance.chance(50);
@@ -200,7 +242,7 @@ impl Flash {
                 .map(|&number| {
                     let address = first_word + number as u32;
                     let old = self.word(address);
-                    if self.bad_word == Some(address) { old } else { old & wanted[number] }
+                    if self.defects.contains(&(address, Defect::WornOut)) { old } else { old & wanted[number] }
                 })
                 .collect();
             self.put(begin, &content, stores);
@@ -271,10 +313,35 @@ mod tests {
     #[test]
     fn a_worn_out_word_is_a_mismatch() {
         let (mut flash, mut stores) = flash(0x00);
-        flash.wear_out(Some(3));
+        flash.spoil(3, Defect::WornOut);
         flash.write_page(Instant::ZERO, 0, vec![0xA55A; 8]);
         assert_eq!(finish(&mut flash, &mut stores).1, Written::Mismatch);
         assert_eq!(flash.page(0), [0xA55A, 0xA55A, 0xA55A, 0xFFFF, 0xA55A, 0xA55A, 0xA55A, 0xA55A]);
+    }
+
+    #[test]
+    fn a_protected_word_is_refused_at_once_and_a_stuck_one_in_the_end_and_nothing_changes() {
+        for (defect, expected, takes_ms) in
+            [(Defect::Protected, Written::Refused, 0), (Defect::Stuck, Written::Stuck, 100)]
+        {
+            let (mut flash, mut stores) = flash(0x5A);
+            flash.spoil(9, defect);
+            flash.spoil(1_000_000, defect);
+            for page_or_words in 0..3 {
+                match page_or_words {
+                    0 => flash.write_page(Instant::ZERO, 1, vec![0; 8]),
+                    1 => flash.erase(Instant::ZERO, 8, 8),
+                    _ => flash.program_words(Instant::ZERO, 9, vec![0]),
+                }
+                assert_eq!(finish(&mut flash, &mut stores), (Instant::from_millis(takes_ms), expected));
+                assert_eq!((flash.page(1), stores.len()), (vec![0x5A5A; 8], 0));
+            }
+            flash.write_page(Instant::ZERO, 0, vec![0; 8]);
+            assert_eq!(finish(&mut flash, &mut stores).1, Written::Good, "the other page is good");
+            flash.repair();
+            flash.write_page(Instant::ZERO, 1, vec![0; 8]);
+            assert_eq!(finish(&mut flash, &mut stores).1, Written::Good);
+        }
     }
 
     #[test]

@@ -6,5 +6,5 @@
 mod flash;
 mod parameters;
 
-pub use flash::{Flash, Written};
+pub use flash::{Defect, Flash, Written};
 pub use parameters::{IMAGE_BYTES, ParameterStore, Parameters, ParametersError, StartDelay, StreamSetting};

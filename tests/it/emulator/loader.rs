@@ -1,6 +1,7 @@
 //! The G1 loader: uploads that work, each of its errors, what it does silently, and what a power cut leaves.
 
-use axcon::emulator::memory::StartDelay;
+use axcon::device::LoaderKind;
+use axcon::emulator::memory::{Defect, StartDelay};
 use axcon::emulator::{Area, Running, Setup};
 use axcon::rng::Rng;
 use axcon::time::{Duration, Instant, character_time};
@@ -8,16 +9,16 @@ use axcon::version::Version;
 
 use super::{BAUD, Bench, flash_with, old_program, product, program, setup};
 
-const S0: &str = "S0110000000050524F4752414D264441544196\r";
-const S7: &str = "S70500000000FA\r";
-const PROMPT: &str = "Waiting for application S-Record.\r\n";
+pub(super) const S0: &str = "S0110000000050524F4752414D264441544196\r";
+pub(super) const S7: &str = "S70500000000FA\r";
+pub(super) const PROMPT: &str = "Waiting for application S-Record.\r\n";
 /// Data bytes of one record, as CodeWarrior writes them.
 const RECORD_BYTES: usize = 32;
 /// Longer than anything the loader does between two characters of its own.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// An S3 record with a CR behind it.
-fn s3(address: u32, data: &[u8]) -> String {
+pub(super) fn s3(address: u32, data: &[u8]) -> String {
     let mut bytes = vec![(data.len() + 5) as u8];
     bytes.extend(address.to_be_bytes());
     bytes.extend(data);
@@ -28,20 +29,20 @@ fn s3(address: u32, data: &[u8]) -> String {
 }
 
 /// S3 records for a whole program, words from address 0 on.
-fn data_records(program: &[u8], bytes: usize) -> Vec<String> {
+pub(super) fn data_records(program: &[u8], bytes: usize) -> Vec<String> {
     let numbered = program.chunks(bytes).enumerate();
     numbered.map(|(number, data)| s3((number * bytes / 2) as u32, data)).collect()
 }
 
 /// A complete file.
-fn file(program: &[u8]) -> Vec<String> {
+pub(super) fn file(program: &[u8]) -> Vec<String> {
     let mut records = vec![S0.to_owned()];
     records.extend(data_records(program, RECORD_BYTES));
     records.push(S7.to_owned());
     records
 }
 
-fn new_program() -> Vec<u8> {
+pub(super) fn new_program() -> Vec<u8> {
     program("AXTC4CO", Version::new(1, 3, 0), 1500)
 }
 
@@ -52,14 +53,14 @@ fn in_loader() -> Bench {
     bench
 }
 
-fn enter_loader(bench: &mut Bench) {
+pub(super) fn enter_loader(bench: &mut Bench) {
     let text = bench.keys(b"lAXIO-2010\r");
     assert!(text.ends_with(PROMPT), "{text}");
 }
 
 /// A sender that obeys: after XOFF nothing but the character on its way, before S7 it waits until the loader is idle.
 /// Ends with the file, with a unit that stays silent for [`PATIENCE`] while it holds, or at `until`.
-fn send_obeying(bench: &mut Bench, records: &[String], until: Instant) {
+pub(super) fn send_obeying(bench: &mut Bench, records: &[String], until: Instant) {
     let character = character_time(BAUD);
     for record in records {
         if record.starts_with("S7") {
@@ -80,14 +81,14 @@ fn send_obeying(bench: &mut Bench, records: &[String], until: Instant) {
 }
 
 /// Sends and gives what the unit has said until half a second later.
-fn upload(bench: &mut Bench, records: &[String]) -> String {
+pub(super) fn upload(bench: &mut Bench, records: &[String]) -> String {
     send_obeying(bench, records, Instant::NEVER);
     bench.run_ms(500);
     bench.take()
 }
 
 /// Sends without any regard for what the unit says.
-fn talk_over(bench: &mut Bench, text: &str) -> String {
+pub(super) fn talk_over(bench: &mut Bench, text: &str) -> String {
     bench.send(text.as_bytes());
     let time = Duration::from_micros(87) * text.len() as u32;
     bench.run(time);
@@ -95,7 +96,7 @@ fn talk_over(bench: &mut Bench, text: &str) -> String {
     bench.take()
 }
 
-fn without_flow_control(text: &str) -> String {
+pub(super) fn without_flow_control(text: &str) -> String {
     text.replace(['\x11', '\x13'], "")
 }
 
@@ -281,14 +282,37 @@ fn a_record_begun_after_xoff_is_taken_up_again_after_xon() {
 #[test]
 fn a_worn_out_word_is_error_6() {
     let mut bench = in_loader();
-    bench.unit().wear_out_word(Some(0x123));
+    bench.unit().spoil_word(0x123, Defect::WornOut);
     let said = upload(&mut bench, &file(&new_program())[..40]);
     let said = without_flow_control(&said);
     assert!(said.starts_with(".\r\nError # 0006\r\nRestarting.\r\n"), "page 0 is good, page 1 is not: {said}");
-    bench.unit().wear_out_word(None);
+    bench.unit().repair_flash();
     // The sender of above went on talking; a new attempt begins with S0 all the same.
     let said = upload(&mut bench, &file(&new_program()));
     assert!(said.contains("V1.3.0"), "{said}");
+}
+
+#[test]
+fn a_flash_that_is_protected_is_error_6_and_one_that_never_ends_error_7() {
+    for (defect, number) in [(Defect::Protected, 6), (Defect::Stuck, 7)] {
+        let mut bench = in_loader();
+        bench.unit().spoil_word(0x123, defect);
+        let said = without_flow_control(&upload(&mut bench, &file(&new_program())[..40]));
+        assert!(said.starts_with(&format!(".\r\nError # 000{number}\r\nRestarting.\r\n")), "{defect:?}: {said}");
+        bench.unit().repair_flash();
+        let said = upload(&mut bench, &file(&new_program()));
+        assert!(said.contains("V1.3.0"), "{said}");
+    }
+}
+
+#[test]
+fn a_character_that_cannot_be_read_is_error_1_at_once_and_nothing_while_an_error_is_told() {
+    let mut bench = in_loader();
+    let now = bench.now;
+    bench.unit().handle_framing_error(now);
+    bench.unit().handle_framing_error(now);
+    bench.run_ms(500);
+    assert_eq!(bench.take(), format!("Error # 0001\r\nRestarting.\r\n{PROMPT}"));
 }
 
 #[test]
@@ -424,10 +448,10 @@ fn settings_survive_an_upload() {
 }
 
 /// A unit whose power goes in the middle of an upload, and which a second upload has to save.
-fn cut_and_save(seed: u64, send: impl FnOnce(&mut Bench, &[String])) {
+pub(super) fn cut_and_save(loader: LoaderKind, seed: u64, send: impl FnOnce(&mut Bench, &[String])) {
     let program = program("AXTC4CO", Version::new(1, 3, 0), 700);
     let old = old_program();
-    let mut bench = Bench::new(Setup { seed, ..setup(flash_with(&old)) });
+    let mut bench = Bench::new(Setup { seed, loader, ..setup(flash_with(&old)) });
     bench.run_ms(400);
     enter_loader(&mut bench);
     send(&mut bench, &file(&program));
@@ -447,7 +471,7 @@ fn cut_and_save(seed: u64, send: impl FnOnce(&mut Bench, &[String])) {
     }
     assert!(files == (flash.clone(), parameters.clone()), "seed {seed}");
 
-    let mut bench = Bench::new(Setup { seed, flash, parameters, ..setup(Vec::new()) });
+    let mut bench = Bench::new(Setup { seed, loader, flash, parameters, ..setup(Vec::new()) });
     bench.run_ms(500);
     let text = bench.take();
     match bench.unit().running() {
@@ -471,7 +495,7 @@ fn cut_and_save(seed: u64, send: impl FnOnce(&mut Bench, &[String])) {
 #[test]
 fn a_second_upload_saves_a_unit_cut_off_behind_any_seventh_record() {
     for records in (0..46).step_by(7) {
-        cut_and_save(1, |bench, file| send_obeying(bench, &file[..records], Instant::NEVER));
+        cut_and_save(LoaderKind::G1, 1, |bench, file| send_obeying(bench, &file[..records], Instant::NEVER));
     }
 }
 
@@ -479,7 +503,7 @@ fn a_second_upload_saves_a_unit_cut_off_behind_any_seventh_record() {
 fn a_second_upload_saves_a_unit_cut_off_at_any_moment() {
     for seed in 0..200 {
         let at = Duration::from_micros(Rng::new(seed).below(450_000));
-        cut_and_save(seed, |bench, file| {
+        cut_and_save(LoaderKind::G1, seed, |bench, file| {
             let until = bench.now + at;
             send_obeying(bench, file, until);
             let rest = until.since(bench.now);

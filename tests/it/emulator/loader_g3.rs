@@ -2,7 +2,7 @@
 //! that do not know it.
 
 use axcon::device::{LoaderKind, Product, RING};
-use axcon::emulator::memory::StartDelay;
+use axcon::emulator::memory::{Defect, StartDelay};
 use axcon::emulator::{Area, Running, Setup};
 use axcon::rng::Rng;
 use axcon::time::{Duration, Instant, character_time};
@@ -17,6 +17,8 @@ const PROMPT: &str = "Waiting for application S-Record\r\n";
 const LOADED: &str = "S-File has been loaded successfully\r\n";
 /// 512 sectors of 512 words.
 const ERASE: Duration = Duration::from_millis(10_240);
+/// Words erased together.
+const SECTOR: u32 = 512;
 /// Longer than the loader holds anybody.
 const PATIENCE: Duration = Duration::from_secs(15);
 
@@ -344,10 +346,50 @@ fn the_headers_text_is_echoed_as_it_is() {
 #[test]
 fn a_worn_out_word_is_error_0010() {
     let mut bench = in_loader();
-    bench.unit().wear_out_word(Some(0x123));
+    bench.unit().spoil_word(0x123, Defect::WornOut);
     let said = without_flow_control(&upload(&mut bench, &file(&new_program())[..30]));
     assert!(said.contains(&complaint("0010")), "{said}");
-    bench.unit().wear_out_word(None);
+    bench.unit().repair_flash();
+    let said = upload(&mut bench, &file(&new_program()));
+    assert!(said.contains("V2.2.0"), "{said}");
+}
+
+#[test]
+fn a_flash_that_never_ends_is_error_0004_and_a_protected_one_0008_from_the_erasing_on() {
+    for (defect, bits) in [(Defect::Stuck, "0004"), (Defect::Protected, "0008")] {
+        let mut bench = in_loader();
+        bench.unit().spoil_word(SECTOR + 5, defect);
+        let said = without_flow_control(&talk_over(&mut bench, S0));
+        assert_eq!(said, format!("PROGRAM&DATA\r\n{}", complaint(bits)), "{defect:?}");
+        let flash = bench.unit().flash();
+        assert!(flash[..1024].iter().all(|&byte| byte == 0xFF), "the first sector is erased");
+        assert_eq!(flash[1024..], flash_with(&old_program())[1024..], "and no other");
+        assert_eq!(bench.unit().settings().start_delay, StartDelay::WaitsForEver);
+        bench.unit().repair_flash();
+        let said = upload(&mut bench, &file(&new_program()));
+        assert!(said.contains("V2.2.0"), "{said}");
+    }
+    let mut bench = erased();
+    bench.unit().spoil_word(0x40, Defect::Protected);
+    let said = without_flow_control(&talk_over(&mut bench, &s3(0x40, &[1, 2])));
+    assert!(said.starts_with(&complaint("0008")), "while programming as well: {said}");
+}
+
+#[test]
+fn a_character_that_cannot_be_read_is_error_0040_when_the_loader_reads_on() {
+    let mut bench = in_loader();
+    let now = bench.now;
+    bench.unit().handle_framing_error(now);
+    bench.run_ms(500);
+    assert_eq!(bench.take(), complaint("0040"));
+    bench.send(S0.as_bytes());
+    bench.run_ms(50);
+    let now = bench.now;
+    bench.unit().handle_framing_error(now);
+    bench.run_ms(5_000);
+    assert!(!bench.take().contains("Error"), "it erases");
+    bench.run_ms(6_000);
+    assert!(without_flow_control(&bench.take()).ends_with(&complaint("0040")));
     let said = upload(&mut bench, &file(&new_program()));
     assert!(said.contains("V2.2.0"), "{said}");
 }

@@ -3,6 +3,7 @@
 mod console;
 mod dictionary;
 mod loader;
+mod loader_g2;
 mod loader_g3;
 mod rtd;
 

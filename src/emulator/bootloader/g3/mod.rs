@@ -39,6 +39,8 @@ pub struct Loader {
     activity: Activity,
     /// An S0 has come, its S7 not yet.
     loading: bool,
+    /// The receiver could not read a character; the reader has not seen it yet.
+    unreadable: bool,
     /// XOFF has been sent, XON not yet.
     holds_sender: bool,
     /// Marks or a header's text have been printed on the last line.
@@ -70,6 +72,7 @@ impl Loader {
             reader: Reader::default(),
             activity: Activity::Reading,
             loading: false,
+            unreadable: false,
             holds_sender: false,
             line_begun: false,
         };
@@ -104,6 +107,19 @@ impl Loader {
         }
     }
 
+    /// A character has come that the receiver could not read. The interrupt notes it; the reader stumbles over it when
+    /// it reads on (a guess: the loader's status word has a bit for it).
+    pub fn receive_garbage(&mut self, board: &mut Board<'_>) {
+        match self.activity {
+            Activity::AwaitingKey { .. } | Activity::Leaving | Activity::Complaining { .. } => {}
+            Activity::Erasing { .. } | Activity::Programming => self.unreadable = true,
+            Activity::Reading => {
+                self.unreadable = true;
+                self.read(board);
+            }
+        }
+    }
+
     /// When something is due.
     pub fn deadline(&self, flash: &Flash) -> Option<Instant> {
         match self.activity {
@@ -127,22 +143,23 @@ impl Loader {
             }
             Activity::Erasing { first_word } => {
                 if let Some(written) = board.flash.step(board.now, board.stores) {
-                    match written {
-                        Written::Good => self.erase(board, first_word + SECTOR_WORDS),
-                        Written::Mismatch => self.fail(board, Fault::Program),
+                    match fault(written) {
+                        None => self.erase(board, first_word + SECTOR_WORDS),
+                        Some(fault) => self.fail(board, fault),
                     }
                 }
             }
-            Activity::Programming => match board.flash.step(board.now, board.stores) {
+            Activity::Programming => match board.flash.step(board.now, board.stores).map(fault) {
                 None => {}
-                Some(Written::Good) => {
+                Some(None) => {
                     self.activity = Activity::Reading;
                     self.read(board);
                 }
-                Some(Written::Mismatch) => self.fail(board, Fault::Program),
+                Some(Some(fault)) => self.fail(board, fault),
             },
             Activity::Complaining { .. } => {
                 self.ring.clear();
+                self.unreadable = false;
                 self.activity = Activity::Reading;
                 self.read(board);
             }
@@ -158,6 +175,10 @@ impl Loader {
     /// Reads the ring until it is empty or something has to be waited for.
     fn read(&mut self, board: &mut Board<'_>) {
         while self.activity == Activity::Reading {
+            if std::mem::take(&mut self.unreadable) {
+                self.fail(board, Fault::Receive);
+                return;
+            }
             let Some(character) = self.ring.pop() else {
                 self.let_go_on(board);
                 return;
@@ -259,5 +280,15 @@ impl Loader {
 
     fn say(&mut self, board: &mut Board<'_>, text: &str) {
         board.uart.send(board.now, text.as_bytes());
+    }
+}
+
+/// What an operation of the flash that ended like this is called.
+fn fault(written: Written) -> Option<Fault> {
+    match written {
+        Written::Good => None,
+        Written::Mismatch => Some(Fault::Program),
+        Written::Refused => Some(Fault::Protection),
+        Written::Stuck => Some(Fault::Access),
     }
 }

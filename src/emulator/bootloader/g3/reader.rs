@@ -16,8 +16,14 @@ pub enum Fault {
     Checksum,
     /// No record, one of a type it does not take, or one out of order.
     Type,
+    /// The flash does not come to an end.
+    Access,
+    /// The flash refuses: something is protected.
+    Protection,
     /// A word does not read back as programmed.
     Program,
+    /// The receiver could not read a character.
+    Receive,
     /// The entry point is not in the application's flash.
     StartAddress,
     /// Data outside of the application's flash.
@@ -30,8 +36,11 @@ impl Fault {
         match self {
             Fault::Checksum => 0x0001,
             Fault::Type => 0x0002,
+            Fault::Access => 0x0004,
+            Fault::Protection => 0x0008,
             Fault::Program => 0x0010,
             Fault::StartAddress => 0x0020,
+            Fault::Receive => 0x0040,
             Fault::AddressRange => 0x0080,
         }
     }

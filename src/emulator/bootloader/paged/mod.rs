@@ -1,41 +1,26 @@
-//! The G1 loader, and the G2 loader in other words: takes an S-record file and writes it to program flash, page by page.
+//! The loaders that take an S-record file into a page buffer and write it to program flash page by page: generations
+//! g1 and g2, which are one machine with two [profiles](Profile).
 //!
 //! A public fact about the Motorola SDK's loaders for 16-bit parts, likely but not proven for these units. Its
 //! texts are its own, the manual's prompt and the manual's dots (AXTC4CO manual, section 4.1.5).
 //!
 //! Decisions where no fact was at hand, all guesses: both cases of hex digits; an S0 in the middle of a load begins
 //! a new one; what comes while an error text leaves is lost without another error; after an error the sender is let
-//! go on (XON) if it was stopped; S7 waits for silence like a full page does.
+//! go on (XON) if it was stopped; S7 waits for silence like a full page does; error 7 is a flash that does not come to
+//! an end. What is a guess of one generation is said at its profile.
 
+mod profile;
 mod record;
+
+use std::collections::VecDeque;
 
 use super::super::memory::{Flash, StartDelay, Written};
 use super::super::uart::{XOFF, XON};
 use super::super::{Board, Reset};
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
+use profile::Ending;
+pub use profile::{G1, G2, Profile};
 use record::{DataRecord, Decoder, Fault, Record};
-
-/// Silence on the line after which the loader stops to listen and begins to write (about 0.6 ms, public fact).
-pub const SILENCE: Duration = Duration::from_micros(600);
-
-/// What a generation says. Everything else of the second one is unknown, and believed to be as in the first.
-#[derive(Debug)]
-pub struct Texts {
-    /// Copyright and name, printed at its start.
-    header: Option<&'static str>,
-    /// The line that tells how much was loaded.
-    loaded: bool,
-    /// The words before the start address; `None` where none is printed.
-    started_from: Option<&'static str>,
-}
-
-/// The SDK's loader; the middle of its header is not known to the letter.
-pub static SDK: Texts =
-    Texts { header: Some("(c) Motorola Inc. S-Record loader. Version 1.3"), loaded: true, started_from: None };
-
-/// The loader for the 56F83xx.
-pub static FOR_56F83XX: Texts =
-    Texts { header: None, loaded: false, started_from: Some("Application started from address 0x") };
 
 /// Address flag of data memory in CodeWarrior's files.
 const DATA_FLAG: u32 = 0x0200_0000;
@@ -45,7 +30,7 @@ const DATA_HIGH_HALF: u32 = 0x0020;
 /// The loader while it runs.
 #[derive(Debug)]
 pub struct Loader {
-    texts: &'static Texts,
+    profile: &'static Profile,
     decoder: Decoder,
     activity: Activity,
     load: Option<Load>,
@@ -76,10 +61,10 @@ enum Activity {
 /// What follows when a page is written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Then {
-    /// Goes on with the record that did not fit the page.
-    TakeUp(DataRecord),
-    /// S7 has come.
-    Finish,
+    /// Goes on with what is parked: the rest of the record that did not fit the page, and the records behind it.
+    TakeUp(VecDeque<DataRecord>),
+    /// S7 has come, with this entry point.
+    Finish(u32),
 }
 
 /// A load between S0 and S7.
@@ -88,8 +73,6 @@ struct Load {
     page: Option<PageBuffer>,
     program_words: u32,
     data_words: u32,
-    /// The address of the end record.
-    entry: u32,
 }
 
 #[derive(Debug)]
@@ -107,10 +90,10 @@ enum Place {
 
 impl Loader {
     /// Starts the loader: it says who it is and what it wants.
-    pub fn start(board: &mut Board<'_>, texts: &'static Texts) -> Self {
+    pub fn start(profile: &'static Profile, board: &mut Board<'_>) -> Self {
         let mut loader = Loader {
-            texts,
-            decoder: Decoder::default(),
+            profile,
+            decoder: Decoder::new(profile.ignores),
             activity: Activity::Listening,
             load: None,
             heard_at: board.now,
@@ -118,9 +101,7 @@ impl Loader {
             holds_sender: false,
             line_begun: false,
         };
-        if let Some(header) = texts.header {
-            loader.say(board, &format!("{header}\r\n"));
-        }
+        loader.say(board, profile.header);
         loader.deaf_until = board.uart.finished_at();
         loader.prompt(board);
         loader
@@ -132,7 +113,7 @@ impl Loader {
             Activity::Writing { overrun, .. } => *overrun = true,
             Activity::Leaving => {}
             // Nothing is decoded behind S7, but the line is not silent.
-            Activity::AwaitingSilence(Then::Finish) => self.heard_at = board.now,
+            Activity::AwaitingSilence(Then::Finish(_)) => self.heard_at = board.now,
             Activity::Listening | Activity::AwaitingSilence(Then::TakeUp(_)) => {
                 if board.now < self.deaf_until {
                     return;
@@ -147,10 +128,20 @@ impl Loader {
         }
     }
 
+    /// A character has come that the receiver could not read.
+    pub fn receive_garbage(&mut self, board: &mut Board<'_>) {
+        match &mut self.activity {
+            Activity::Writing { overrun, .. } => *overrun = true,
+            Activity::Leaving => {}
+            Activity::Listening | Activity::AwaitingSilence(_) if board.now < self.deaf_until => {}
+            Activity::Listening | Activity::AwaitingSilence(_) => self.fail(board, Fault::Receive),
+        }
+    }
+
     /// When something is due.
     pub fn deadline(&self, flash: &Flash) -> Option<Instant> {
         match self.activity {
-            Activity::AwaitingSilence(_) => Some(self.heard_at + SILENCE),
+            Activity::AwaitingSilence(_) => Some(self.heard_at + self.profile.silence),
             Activity::Writing { .. } => flash.deadline(),
             Activity::Listening | Activity::Leaving => None,
         }
@@ -165,7 +156,8 @@ impl Loader {
             Activity::AwaitingSilence(then) => self.begin_to_write(board, then),
             Activity::Writing { then, overrun } => match board.flash.step(board.now, board.stores) {
                 None => self.activity = Activity::Writing { then, overrun },
-                Some(Written::Mismatch) => self.fail(board, Fault::Flash),
+                Some(Written::Mismatch | Written::Refused) => self.fail(board, Fault::Flash),
+                Some(Written::Stuck) => self.fail(board, Fault::Internal),
                 Some(Written::Good) if overrun => self.fail(board, Fault::Receive),
                 Some(Written::Good) => self.written(board, then),
             },
@@ -181,15 +173,17 @@ impl Loader {
     fn take(&mut self, board: &mut Board<'_>, record: Record) {
         match record {
             Record::Header => self.begin(board),
-            Record::Data(_) if self.activity != Activity::Listening => self.fail(board, Fault::Overrun),
-            Record::Data(data) => self.collect(board, data),
-            // A record that is parked is lost here, and success is reported all the same.
-            Record::End { entry } => {
-                if let Some(load) = &mut self.load {
-                    load.entry = entry;
+            Record::Data(data) => match &mut self.activity {
+                Activity::AwaitingSilence(Then::TakeUp(parked)) if parked.len() < self.profile.parks => {
+                    parked.push_back(data);
                 }
-                self.activity = Activity::AwaitingSilence(Then::Finish);
-            }
+                Activity::Listening => self.collect(board, VecDeque::from([data])),
+                Activity::AwaitingSilence(_) | Activity::Writing { .. } | Activity::Leaving => {
+                    self.fail(board, Fault::Overrun);
+                }
+            },
+            // A record that is parked is lost here, and success is reported all the same.
+            Record::End(entry) => self.activity = Activity::AwaitingSilence(Then::Finish(entry)),
         }
     }
 
@@ -201,10 +195,25 @@ impl Loader {
         board.parameters.change(board.stores, |values| values.start_delay = StartDelay::WaitsForEver);
     }
 
-    /// Puts the words of a record into the page buffer; where another page begins, the rest is parked and the sender
-    /// stopped.
-    fn collect(&mut self, board: &mut Board<'_>, data: DataRecord) {
-        let Some(load) = &mut self.load else { return };
+    /// Puts the words of records into the page buffer; where another page begins, the rest is parked and the sender
+    /// stopped. It may go on when all of them are in.
+    fn collect(&mut self, board: &mut Board<'_>, mut records: VecDeque<DataRecord>) {
+        while let Some(data) = records.pop_front() {
+            if let Some(rest) = self.fill_page(board, data) {
+                records.push_front(rest);
+                self.activity = Activity::AwaitingSilence(Then::TakeUp(records));
+                if !std::mem::replace(&mut self.holds_sender, true) {
+                    board.uart.send(board.now, &[XOFF]);
+                }
+                return;
+            }
+        }
+        self.let_go_on(board);
+    }
+
+    /// Puts the words of a record into the page buffer. Gives those from where another page begins.
+    fn fill_page(&mut self, board: &Board<'_>, data: DataRecord) -> Option<DataRecord> {
+        let load = self.load.as_mut()?;
         let map = board.flash.map();
         for (number, &word) in data.words.iter().enumerate() {
             let address = data.address.wrapping_add(number as u32);
@@ -215,17 +224,14 @@ impl Loader {
                     let page = word_address / map.page_words;
                     let buffer = load.page.get_or_insert_with(|| PageBuffer { page, words: board.flash.page(page) });
                     if buffer.page != page {
-                        let rest = DataRecord { address, words: data.words[number..].to_vec() };
-                        self.activity = Activity::AwaitingSilence(Then::TakeUp(rest));
-                        self.holds_sender = true;
-                        board.uart.send(board.now, &[XOFF]);
-                        return;
+                        return Some(DataRecord { address, words: data.words[number..].to_vec() });
                     }
                     buffer.words[(word_address % map.page_words) as usize] = word;
                     load.program_words += 1;
                 }
             }
         }
+        None
     }
 
     fn begin_to_write(&mut self, board: &mut Board<'_>, then: Then) {
@@ -245,27 +251,29 @@ impl Loader {
     }
 
     fn go_on(&mut self, board: &mut Board<'_>, then: Then) {
-        self.let_go_on(board);
         match then {
-            Then::TakeUp(rest) => self.collect(board, rest),
-            Then::Finish => self.finish(board),
+            Then::TakeUp(parked) => self.collect(board, parked),
+            Then::Finish(entry) => {
+                self.let_go_on(board);
+                self.finish(board, entry);
+            }
         }
     }
 
-    fn finish(&mut self, board: &mut Board<'_>) {
+    fn finish(&mut self, board: &mut Board<'_>, entry: u32) {
         let load = self.load.take().unwrap_or_default();
         board.parameters.change(board.stores, |values| {
             values.start_delay = StartDelay::AtOnce;
             values.first_start = true;
         });
         self.end_line(board);
-        if self.texts.loaded {
-            let (program, data) = (load.program_words, load.data_words);
-            self.say(board, &format!("Loaded 0x{program:04X} Program and 0x{data:04X} Data words.\r\n"));
-        }
-        match self.texts.started_from {
-            Some(words) => self.say(board, &format!("{words}{:04X}\r\n", load.entry)),
-            None => self.say(board, "Application started.\r\n"),
+        match self.profile.ending {
+            Ending::Counts => {
+                let (program, data) = (load.program_words, load.data_words);
+                self.say(board, &format!("Loaded 0x{program:04X} Program and 0x{data:04X} Data words.\r\n"));
+                self.say(board, "Application started.\r\n");
+            }
+            Ending::Address => self.say(board, &format!("Application started from address 0x{entry:04X}\r\n")),
         }
         self.activity = Activity::Leaving;
         *board.reset = Some(Reset::Start);
@@ -273,7 +281,7 @@ impl Loader {
 
     /// Says what is wrong and starts over: what is in the page buffer or parked is lost, S0 is wanted again.
     fn fail(&mut self, board: &mut Board<'_>, fault: Fault) {
-        self.decoder = Decoder::default();
+        self.decoder = Decoder::new(self.profile.ignores);
         self.activity = Activity::Listening;
         self.load = None;
         self.end_line(board);

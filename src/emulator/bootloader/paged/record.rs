@@ -1,7 +1,9 @@
-//! S-records as the G1 loader takes them: one character at a time, judged as early as it can.
+//! S-records as the loaders with a page buffer take them: one character at a time, judged as early as they can.
 //!
-//! Control characters are ignored wherever they stand. Both cases of hex digits are taken. What is wrong is one of
+//! Some control characters are ignored wherever they stand, which ones says the profile. Both cases of hex digits are taken. What is wrong is one of
 //! the loader's own error numbers; the console's reader (`image`) is a different thing and tells more.
+
+use super::super::super::uart::{XOFF, XON};
 
 /// What goes wrong, by the loader's numbers (public facts about the Motorola loaders).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +20,8 @@ pub enum Fault {
     Overrun,
     /// Flash does not read back as written.
     Flash,
+    /// Something happened that the loader holds impossible.
+    Internal,
 }
 
 impl Fault {
@@ -30,6 +34,7 @@ impl Fault {
             Fault::Checksum => 4,
             Fault::Overrun => 5,
             Fault::Flash => 6,
+            Fault::Internal => 7,
         }
     }
 }
@@ -41,11 +46,8 @@ pub enum Record {
     Header,
     /// S3.
     Data(DataRecord),
-    /// S7. The entry point is printed at most: the application starts by a reset.
-    End {
-        /// The address it names.
-        entry: u32,
-    },
+    /// S7, with its entry point. The application starts by a reset all the same.
+    End(u32),
 }
 
 /// Data of an S3 record.
@@ -57,16 +59,25 @@ pub struct DataRecord {
     pub words: Vec<u16>,
 }
 
+/// Which control characters are as if they had not come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ignores {
+    /// All of them.
+    Controls,
+    /// The line ends CR and LF, and the flow control XON and XOFF; any other is [`Fault::Character`].
+    LineEnds,
+}
+
 /// Takes characters and gives records.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Decoder {
+    ignores: Ignores,
     place: Place,
 }
 
 /// Where in a record the next character stands.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 enum Place {
-    #[default]
     Start,
     Type,
     Body {
@@ -89,13 +100,27 @@ const SHORTEST_HEADER: u8 = 1;
 const SHORTEST_WITH_ADDRESS: u8 = 5;
 const ADDRESS_BYTES: usize = 4;
 
+impl Ignores {
+    fn covers(self, character: u8) -> bool {
+        match self {
+            Ignores::Controls => character.is_ascii_control(),
+            Ignores::LineEnds => [b'\r', b'\n', XON, XOFF].contains(&character),
+        }
+    }
+}
+
 impl Decoder {
+    /// Waits for a record.
+    pub fn new(ignores: Ignores) -> Self {
+        Decoder { ignores, place: Place::Start }
+    }
+
     /// Takes one character. `header_seen` says whether an S0 has come: data and end are refused before it.
     ///
     /// # Errors
     /// What the loader has against the character. The caller starts over with a new decoder.
     pub fn take(&mut self, character: u8, header_seen: bool) -> Result<Option<Record>, Fault> {
-        if character.is_ascii_control() {
+        if self.ignores.covers(character) {
             return Ok(None);
         }
         match &mut self.place {
@@ -152,11 +177,11 @@ fn complete(kind: Kind, bytes: &[u8]) -> Result<Record, Fault> {
     let address = address.iter().fold(0, |address, byte| address << 8 | u32::from(*byte));
     Ok(match kind {
         Kind::Header => Record::Header,
-        Kind::End => Record::End { entry: address },
-        Kind::Data => Record::Data(DataRecord {
-            address,
-            words: data.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect(),
-        }),
+        Kind::End => Record::End(address),
+        Kind::Data => {
+            let words = data.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+            Record::Data(DataRecord { address, words })
+        }
     })
 }
 
@@ -169,7 +194,11 @@ mod tests {
     use super::*;
 
     fn decode(text: &str) -> Result<Vec<Record>, Fault> {
-        let mut decoder = Decoder::default();
+        decode_as(Ignores::Controls, text)
+    }
+
+    fn decode_as(ignores: Ignores, text: &str) -> Result<Vec<Record>, Fault> {
+        let mut decoder = Decoder::new(ignores);
         let mut records = Vec::new();
         for character in text.bytes() {
             let record = decoder.take(character, !records.is_empty())?;
@@ -186,7 +215,20 @@ mod tests {
             "S0030000FC\r\nS309000000803412cdabb8\r\nS70500000000fa\r\n",
             "S0110000000050524F4752414D264441544196\nS3\t09\x7f000000803412CDABB8\x00S70500000000FA",
         ] {
-            assert_eq!(decode(text), Ok(vec![Record::Header, data.clone(), Record::End { entry: 0 }]), "{text:?}");
+            assert_eq!(decode(text), Ok(vec![Record::Header, data.clone(), Record::End(0)]), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_strict_reader_ignores_line_ends_and_flow_control_and_nothing_else() {
+        let end = Ok(vec![Record::Header, Record::End(0x1_2345)]);
+        for text in
+            ["S0030000FC\rS7050001234591\r", "S0030000FC\r\nS7050001234591\n", "S003\x130000FC\x11S70500012\n34591"]
+        {
+            assert_eq!(decode_as(Ignores::LineEnds, text), end, "{text:?}");
+        }
+        for text in ["\t", "S00\x073", "S0030000FC\x1a", "\0", "\x7f"] {
+            assert_eq!(decode_as(Ignores::LineEnds, text), Err(Fault::Character), "{text:?}");
         }
     }
 
