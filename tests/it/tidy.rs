@@ -15,10 +15,11 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("wire", &["canopen", "record", "version"]),
     ("image", &["rng", "version"]),
     ("canopen", &[]),
+    ("telnet", &[]),
     ("device", &["canopen", "image", "time", "version", "wire"]),
     ("session", &["canopen", "device", "endpoint", "image", "record", "secret", "time", "version", "wire"]),
     ("emulator", &["canopen", "device", "endpoint", "image", "rng", "time", "version", "wire"]),
-    ("host", &["canopen", "device", "emulator", "endpoint", "image", "record", "rng", "time", "version"]),
+    ("host", &["canopen", "device", "emulator", "endpoint", "image", "record", "rng", "telnet", "time", "version"]),
     ("tui", &["canopen", "device", "endpoint", "image", "record", "secret", "session", "time", "version", "wire"]),
     (
         "cli",
