@@ -24,8 +24,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
-            "canopen", "device", "emulator", "endpoint", "host", "image", "record", "secret", "session", "time", "tui",
-            "version", "wire",
+            "canopen", "device", "emulator", "endpoint", "host", "image", "record", "secret", "session", "telnet",
+            "time", "tui", "version", "wire",
         ],
     ),
 ];
