@@ -73,11 +73,11 @@ fn bridge(path: &Path, mut client: TcpStream) {
         let mut buffer = [0; 4096];
         while !over.load(Ordering::Relaxed) {
             match reader.read(&mut buffer) {
-                Ok(0) => break,
+                Ok(0) => panic!("the port has ended"),
                 Ok(count) if socket.write_all(&buffer[..count]).is_err() => break,
                 Ok(_) => {}
                 Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
-                Err(_) => break,
+                Err(error) => panic!("the port: {error}"),
             }
         }
         let _ = socket.shutdown(Shutdown::Both);
@@ -85,17 +85,20 @@ fn bridge(path: &Path, mut client: TcpStream) {
     let mut buffer = [0; 4096];
     loop {
         match client.read(&mut buffer) {
-            Ok(0) | Err(_) => break,
+            Ok(0) => break,
             Ok(count) => {
                 let mut left = &buffer[..count];
                 while !left.is_empty() {
                     match port.write(left) {
                         Ok(count) => left = &left[count..],
-                        Err(error) if error.kind() == ErrorKind::TimedOut => {}
-                        Err(_) => break,
+                        Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
+                        Err(error) => panic!("the port: {error}"),
                     }
                 }
             }
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            // Whoever kills a client resets the connection.
+            Err(_) => break,
         }
     }
     left.store(true, Ordering::Relaxed);
