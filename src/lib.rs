@@ -24,6 +24,8 @@ pub mod wire;
 
 pub mod image;
 
+pub mod telnet;
+
 pub mod device;
 
 pub mod session;

@@ -9,10 +9,12 @@ use super::error::{CliError, Kind};
 use crate::host::Input;
 use crate::host::clock::Clock;
 use crate::host::link::{Cause, Connection, LinkError, LinkSpec, LinkSpecError, Options};
+use crate::host::network::NetworkError;
 use crate::host::ports::{self, Port};
 use crate::host::pump::PumpError;
 use crate::host::recorder::{self, Plan};
 use crate::host::replay::RecordingError;
+use crate::telnet::Refusal;
 
 /// The link that the user named, or the only USB serial port there is.
 ///
@@ -28,7 +30,11 @@ pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
                     let named = by_serial_number(&ports::list().unwrap_or_default(), text)?;
                     Ok(named.or_else(|| by_id(text)).unwrap_or(spec))
                 }
-                LinkSpec::Serial(_) | LinkSpec::Emulated(_) | LinkSpec::Replay(_) => Ok(spec),
+                LinkSpec::Serial(_)
+                | LinkSpec::Emulated(_)
+                | LinkSpec::Replay(_)
+                | LinkSpec::Tcp(_)
+                | LinkSpec::Rfc2217(_) => Ok(spec),
             }
         }
         None => only_port(ports::list().map_err(|error| CliError::new(Kind::PortNone, error))?),
@@ -37,13 +43,7 @@ pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
 
 /// What a name that is no link means to the user.
 pub fn spec_error(error: LinkSpecError) -> CliError {
-    let refused = CliError::new(Kind::Usage, anyhow::Error::new(error.clone()).context("--port"));
-    match error {
-        LinkSpecError::Unsupported { scheme: "tcp://" } => {
-            refused.hint("'socat pty,link=/tmp/unit,raw tcp:HOST:PORT' makes a port of it: --port /tmp/unit")
-        }
-        LinkSpecError::Unsupported { .. } | LinkSpecError::UnknownProduct { .. } | LinkSpecError::Empty => refused,
-    }
+    CliError::new(Kind::Usage, anyhow::Error::new(error).context("--port"))
 }
 
 /// Opens a link as the command line says.
@@ -55,10 +55,12 @@ pub fn open(spec: &LinkSpec, global: &Global, clock: Clock, inputs: SyncSender<I
 }
 
 /// What the journal of uploads calls the port: the adapter's serial number where it has one, since its name may be
-/// another one next time, or else the path as the user gives it. `None` for units that end with this process.
+/// another one next time, or else the path as the user gives it; a network link is
+/// called what it is written. `None` for units that end with this process.
 pub fn journal_key(spec: &LinkSpec) -> Option<String> {
     match spec {
         LinkSpec::Emulated(_) | LinkSpec::Replay(_) => None,
+        LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_) => Some(spec.to_string()),
         LinkSpec::Serial(path) => {
             let resolved = std::fs::canonicalize(path).unwrap_or_else(|_| path.clone());
             let listed = ports::list().unwrap_or_default();
@@ -88,10 +90,22 @@ pub fn link_error(error: LinkError) -> CliError {
         Cause::Denied { .. } => Kind::PortDenied,
         Cause::Busy { .. } => Kind::PortBusy,
         Cause::NotSerial { .. } | Cause::Gone | Cause::Stuck { .. } | Cause::Io(_) => Kind::PortGone,
+        Cause::Network(error) => network_kind(error),
         Cause::Baud { .. } => Kind::Usage,
     };
     let mut hints = Vec::new();
+    let is_network = matches!(error.port.parse(), Ok(LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_)));
     match &error.cause {
+        Cause::Gone if is_network => {
+            hints.push(
+                "the other side closed the connection: is ser2net still running, and its serial port there?".to_owned(),
+            );
+            hints.push("most servers let one client in at a time: is another one connected?".to_owned());
+        }
+        Cause::Stuck { .. } if is_network => {
+            hints.push("the server does not read: restart it, or its serial port".to_owned())
+        }
+        Cause::Network(network) => hints.extend(network_hints(network, &error.port)),
         Cause::Missing => {
             hints.push("'axcon ports' lists what there is; is the adapter plugged in?".to_owned());
         }
@@ -114,6 +128,46 @@ pub fn link_error(error: LinkError) -> CliError {
     let mut refused = CliError::new(kind, error);
     refused.hints = hints;
     refused
+}
+
+fn network_kind(error: &NetworkError) -> Kind {
+    match error {
+        NetworkError::UnknownHost { .. }
+        | NetworkError::Refused
+        | NetworkError::NoAnswer { .. }
+        | NetworkError::Unreachable(_) => Kind::PortMissing,
+        NetworkError::Closed { .. } | NetworkError::Port(_) | NetworkError::Unset { .. } | NetworkError::Lost(_) => {
+            Kind::PortGone
+        }
+    }
+}
+
+/// What helps with a network link.
+fn network_hints(error: &NetworkError, port: &str) -> Vec<String> {
+    let (_, address) = port.split_once("://").unwrap_or(("", port));
+    match error {
+        NetworkError::UnknownHost { .. } => vec!["is the name right? an address will do as well".to_owned()],
+        NetworkError::Refused => vec![
+            "is ser2net (or another server) running there, and is the port number right?".to_owned(),
+            "a server that listens on 127.0.0.1 only lets nobody in from outside".to_owned(),
+        ],
+        NetworkError::NoAnswer { .. } | NetworkError::Unreachable(_) => {
+            vec!["is the host on, in this network, and the port open in its firewall?".to_owned()]
+        }
+        NetworkError::Closed { .. } => {
+            vec!["most servers let one client in at a time: is another one connected?".to_owned()]
+        }
+        NetworkError::Port(Refusal::NoComPort | Refusal::NoBinary | Refusal::Nonsense) | NetworkError::Unset { .. } => {
+            vec![
+                format!("if it is a raw socket whose server sets the line rate: --port tcp://{address}"),
+                "ser2net speaks RFC 2217 with 'telnet(rfc2217),tcp,PORT' as its accepter".to_owned(),
+            ]
+        }
+        NetworkError::Port(Refusal::Baud { .. } | Refusal::Setting { .. }) => {
+            vec!["does the server fix its port's settings, or has it another client?".to_owned()]
+        }
+        NetworkError::Lost(_) => vec!["is the host still on, and the network up?".to_owned()],
+    }
 }
 
 /// What the end of a headless session means to the user, where the command knows nothing better.

@@ -43,8 +43,9 @@ struct Cli {
 /// What every command understands.
 #[derive(Debug, Clone, Args)]
 pub struct Global {
-    /// Where the unit is: a serial port (/dev/ttyUSB0, COM3, or its USB adapter's serial number) an emulated unit
-    /// (emu:axtc4co), or a recording (replay:FILE). `load` takes several.
+    /// Where the unit is: a serial port (/dev/ttyUSB0, COM3, or its USB adapter's serial number), a port served over a
+    /// network (rfc2217://HOST:PORT, tcp://HOST:PORT), an emulated unit (emu:axtc4co), or a recording (replay:FILE).
+    /// `load` takes several.
     #[arg(long = "port", value_name = "LINK", env = "AXCON_PORT", global = true)]
     pub ports: Vec<String>,
     /// Line rate in baud; the units have 115200.

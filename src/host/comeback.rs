@@ -30,7 +30,7 @@ impl Comeback {
                 let adapter = connection.adapter().cloned();
                 (adapter.is_some() || path.is_symlink()).then(|| Comeback { path: path.clone(), adapter, options })
             }
-            LinkSpec::Emulated(_) | LinkSpec::Replay(_) => None,
+            LinkSpec::Emulated(_) | LinkSpec::Replay(_) | LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_) => None,
         }
     }
 

@@ -10,8 +10,12 @@ use std::path::PathBuf;
 use std::sync::mpsc::{SyncSender, TrySendError};
 
 use super::Input;
+use super::address::{Address, AddressError};
 use super::clock::Clock;
+use super::lines::Lines;
+use super::network::NetworkError;
 use super::ports::{self, Holder};
+use super::socket::{self, Protocol};
 use crate::device::Product;
 use crate::record::Adapter;
 use crate::time::Duration;
@@ -30,6 +34,10 @@ pub enum LinkSpec {
     Emulated(&'static Product),
     /// A recording: what was said, read only.
     Replay(PathBuf),
+    /// A raw socket, behind which somebody has a serial port.
+    Tcp(Address),
+    /// A remote serial port (RFC 2217).
+    Rfc2217(Address),
 }
 
 /// Why a link makes no sense.
@@ -46,11 +54,13 @@ pub enum LinkSpecError {
         /// What there is, as links.
         known: Vec<String>,
     },
-    /// A kind of link that this version does not open.
-    #[error("{scheme} links are not supported yet")]
-    Unsupported {
-        /// Which kind, as it is written.
+    /// A network link without a proper address.
+    #[error("{error}: such a link is {scheme}HOST:PORT")]
+    Address {
+        /// Which kind of link, as it is written.
         scheme: &'static str,
+        /// What is wrong.
+        error: AddressError,
     },
 }
 
@@ -58,9 +68,10 @@ impl std::str::FromStr for LinkSpec {
     type Err = LinkSpecError;
 
     fn from_str(text: &str) -> Result<Self, LinkSpecError> {
-        for scheme in ["tcp://", "rfc2217://"] {
+        for (scheme, make) in [(TCP, LinkSpec::Tcp as fn(Address) -> LinkSpec), (RFC2217, LinkSpec::Rfc2217)] {
             if starts_with(text, scheme) {
-                return Err(LinkSpecError::Unsupported { scheme });
+                let address = text[scheme.len()..].parse();
+                return address.map(make).map_err(|error| LinkSpecError::Address { scheme, error });
             }
         }
         if starts_with(text, REPLAY) && text.len() > REPLAY.len() {
@@ -87,6 +98,8 @@ impl fmt::Display for LinkSpec {
             LinkSpec::Serial(path) => path.display().fmt(f),
             LinkSpec::Emulated(product) => write!(f, "{EMULATED}{}", product.name.to_lowercase()),
             LinkSpec::Replay(path) => write!(f, "{REPLAY}{}", path.display()),
+            LinkSpec::Tcp(address) => write!(f, "{TCP}{address}"),
+            LinkSpec::Rfc2217(address) => write!(f, "{RFC2217}{address}"),
         }
     }
 }
@@ -168,6 +181,9 @@ pub enum Cause {
         /// For how long.
         after: Duration,
     },
+    /// What only a network link can run into.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
     /// Anything else the system says.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -184,7 +200,7 @@ pub struct Options {
 #[derive(Debug)]
 pub struct Connection {
     // Closed in this order: first our side, then the unit that hangs on the other.
-    lines: serial::Lines,
+    lines: Lines,
     #[cfg(unix)]
     unit: Option<super::unit::HostedUnit>,
     outgoing: Option<SyncSender<Vec<u8>>>,
@@ -218,6 +234,8 @@ pub const CLOSE_PATIENCE: Duration = Duration::from_millis(300);
 
 const EMULATED: &str = "emu:";
 const REPLAY: &str = "replay:";
+const TCP: &str = "tcp://";
+const RFC2217: &str = "rfc2217://";
 
 impl Connection {
     /// Opens a link and starts reading. What comes is put on `inputs`, stamped by `clock`; while that is full, nothing
@@ -235,6 +253,18 @@ impl Connection {
                 Ok(connection)
             }
             LinkSpec::Emulated(product) => Connection::emulated(spec, product, options, clock, inputs),
+            LinkSpec::Tcp(address) => {
+                let (lines, outgoing) =
+                    socket::open(&spec.to_string(), (Protocol::Raw, address), options, clock, inputs)?;
+                let mut connection = Connection::new(spec, options, lines, outgoing, Some("tcp".into()));
+                connection.settings = "line rate set by the server".into();
+                Ok(connection)
+            }
+            LinkSpec::Rfc2217(address) => {
+                let protocol = (Protocol::ComPort, address);
+                let (lines, outgoing) = socket::open(&spec.to_string(), protocol, options, clock, inputs)?;
+                Ok(Connection::new(spec, options, lines, outgoing, Some("rfc2217".into())))
+            }
             // There is no line: who can do with a recording opens it as one.
             LinkSpec::Replay(_) => Err(LinkError {
                 port: spec.to_string(),
@@ -288,12 +318,12 @@ impl Connection {
     fn new(
         spec: &LinkSpec,
         options: Options,
-        lines: serial::Lines,
+        lines: impl Into<Lines>,
         outgoing: SyncSender<Vec<u8>>,
         driver: Option<String>,
     ) -> Self {
         Connection {
-            lines,
+            lines: lines.into(),
             #[cfg(unix)]
             unit: None,
             outgoing: Some(outgoing),
@@ -378,9 +408,11 @@ mod tests {
         assert!(error.starts_with("there is no emulated 'toaster'; there is emu:axtc4co"), "{error}");
         assert_eq!(read("Replay:a.cast"), Ok(LinkSpec::Replay("a.cast".into())));
         assert_eq!(read("replay:"), Err(LinkSpecError::Empty));
-        for (text, scheme) in [("tcp://host:1", "tcp://"), ("RFC2217://host:1", "rfc2217://")] {
-            assert_eq!(read(text), Err(LinkSpecError::Unsupported { scheme }), "{text}");
+        for (text, shown) in [("TCP://bench:2000", "tcp://bench:2000"), ("rfc2217://[::1]:1", "rfc2217://[::1]:1")] {
+            assert_eq!(read(text).map(|link| link.to_string()), Ok(shown.to_owned()));
         }
+        let error = read("tcp://bench").expect_err("no port").to_string();
+        assert_eq!(error, "'bench' has no port number behind it: such a link is tcp://HOST:PORT");
     }
 
     #[test]

@@ -4,10 +4,12 @@
 //! ([`Input`]); the owner's loop is the only place where something is done about it. What differs between systems is
 //! named in this directory and nowhere else.
 
+pub mod address;
 pub mod clock;
 pub mod comeback;
 pub mod journal;
 pub mod link;
+pub mod network;
 pub mod ports;
 pub mod pump;
 pub mod recorder;
@@ -17,8 +19,10 @@ pub mod terminal;
 
 #[cfg(any(windows, test))]
 mod duplex;
+mod lines;
 #[cfg(unix)]
 mod serial;
+mod socket;
 #[cfg(unix)]
 mod wait;
 

@@ -15,6 +15,8 @@ mod images;
 #[cfg(unix)]
 mod live;
 #[cfg(unix)]
+mod network;
+#[cfg(unix)]
 mod ptys;
 #[cfg(unix)]
 mod recordings;

@@ -166,9 +166,9 @@ fn what_is_no_port_is_refused_with_its_kind_and_exit_code() {
 }
 
 #[test]
-fn links_that_are_not_there_yet_say_so() {
+fn links_that_name_nothing_say_so() {
     let world = World::new();
-    for port in ["tcp://host:2000", "rfc2217://host:2000", "replay:", "emu:toaster", ""] {
+    for port in ["replay:", "emu:toaster", ""] {
         let ran = world.run(&["terminal", "--port", port], b"");
         assert_eq!(ran.code, Some(2), "{port}: {}", ran.err);
         assert!(ran.err.starts_with("axcon: --port: "), "{}", ran.err);

@@ -15,16 +15,17 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("wire", &["canopen", "record", "version"]),
     ("image", &["rng", "version"]),
     ("canopen", &[]),
+    ("telnet", &[]),
     ("device", &["canopen", "image", "time", "version", "wire"]),
     ("session", &["canopen", "device", "endpoint", "image", "record", "secret", "time", "version", "wire"]),
     ("emulator", &["canopen", "device", "endpoint", "image", "rng", "time", "version", "wire"]),
-    ("host", &["canopen", "device", "emulator", "endpoint", "image", "record", "rng", "time", "version"]),
+    ("host", &["canopen", "device", "emulator", "endpoint", "image", "record", "rng", "telnet", "time", "version"]),
     ("tui", &["canopen", "device", "endpoint", "image", "record", "secret", "session", "time", "version", "wire"]),
     (
         "cli",
         &[
-            "canopen", "device", "emulator", "endpoint", "host", "image", "record", "secret", "session", "time", "tui",
-            "version", "wire",
+            "canopen", "device", "emulator", "endpoint", "host", "image", "record", "secret", "session", "telnet",
+            "time", "tui", "version", "wire",
         ],
     ),
 ];

@@ -6,4 +6,6 @@ pub mod puppet;
 #[cfg(unix)]
 pub mod screen;
 #[cfg(unix)]
+pub mod server;
+#[cfg(unix)]
 pub mod shell;

@@ -1,0 +1,50 @@
+//! The threads behind an open connection, whatever it goes through.
+
+use std::io;
+
+use super::socket;
+use crate::time::Duration;
+
+#[cfg(windows)]
+use super::duplex as serial;
+#[cfg(unix)]
+use super::serial;
+
+/// What a connection reads and writes through.
+#[derive(Debug)]
+pub enum Lines {
+    /// A serial port of this machine.
+    Serial(serial::Lines),
+    /// A socket.
+    Socket(socket::Lines),
+}
+
+impl Lines {
+    /// Ends the threads: what is queued may leave for this long, then everything stops.
+    pub fn close(&mut self, patience: Duration) {
+        match self {
+            Lines::Serial(lines) => lines.close(patience),
+            Lines::Socket(lines) => lines.close(patience),
+        }
+    }
+
+    /// Sends a break, where the link can do that.
+    pub fn send_break(&self) -> io::Result<()> {
+        match self {
+            Lines::Serial(lines) => lines.send_break(),
+            Lines::Socket(lines) => lines.send_break(),
+        }
+    }
+}
+
+impl From<serial::Lines> for Lines {
+    fn from(lines: serial::Lines) -> Self {
+        Lines::Serial(lines)
+    }
+}
+
+impl From<socket::Lines> for Lines {
+    fn from(lines: socket::Lines) -> Self {
+        Lines::Socket(lines)
+    }
+}
