@@ -6,9 +6,19 @@ use crate::image::{FlashMap, Image};
 
 /// Data bytes of a packed record: as many as fit one, less two (facts: 250, so that address, count and sum do).
 pub(super) const LONGEST: usize = 250;
-/// Data bytes of a packed record of which a ring of 550 characters holds two: what an adapter keeps unanswered is then
-/// filled by the second.
-pub(super) const TWO_IN_A_RING: usize = 110;
+/// Characters of a data record besides its data: type, count, address, sum, line end.
+const AROUND: usize = 15;
+/// The shortest packed record: what compilers write.
+const SHORTEST: usize = 32;
+
+/// Data bytes of a packed record for a loader that acknowledges each, `late` characters of the line after it has come,
+/// and of which no more than `window` characters may be on their way. As long as can be without the line ever standing
+/// still: so many records fill the window that the first is acknowledged before the last has left.
+pub(super) fn longest_acknowledged(window: usize, late: usize) -> usize {
+    let records = window.div_ceil(window.saturating_sub(late).max(1)).max(2);
+    let data = (window / records).saturating_sub(AROUND) / 2;
+    (data / 2 * 2).clamp(SHORTEST, LONGEST)
+}
 
 /// One record ready to leave.
 #[derive(Clone, Debug)]
@@ -134,16 +144,31 @@ mod tests {
             (0..20).map(|number| (number * 16, 32)).chain([(0x400, 32), (0x410, 7)]).collect();
         let image = image(&blocks);
         let plain = words(&build(&image, &FLASH, Size::AsInFile, LINE_END));
-        for bytes in [TWO_IN_A_RING, LONGEST] {
+        for bytes in [SHORTEST, 54, LONGEST] {
             let packed = build(&image, &FLASH, Size::Packed(bytes), LINE_END);
             assert_eq!(words(&packed), plain, "{bytes}");
-            assert!(packed.iter().all(|record| record.text.len() <= 15 + 2 * bytes));
+            assert!(packed.iter().all(|record| record.text.len() <= AROUND + 2 * bytes));
         }
         assert_eq!(
             build(&image, &FLASH, Size::Packed(LONGEST), LINE_END).len(),
             2 + 3 + 1,
             "header, end, 640 and 39 bytes"
         );
+    }
+
+    #[test]
+    fn the_later_an_acknowledgement_the_shorter_the_records_and_the_line_never_stands_still() {
+        for (late, data) in [(2, 116), (92, 116), (184, 116), (370, 54), (460, 32), (5_000, 32)] {
+            assert_eq!(longest_acknowledged(500, late), data, "{late}");
+        }
+        for late in 0..=420 {
+            let record = AROUND + 2 * longest_acknowledged(500, late);
+            let on_their_way = 500 / record * record;
+            assert!(
+                on_their_way >= record + late || record == AROUND + 2 * SHORTEST || on_their_way + 8 >= record + late,
+                "{late}"
+            );
+        }
     }
 
     #[test]

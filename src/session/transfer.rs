@@ -48,9 +48,6 @@ const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
 /// were pressed before. More than the 372 that a line carries in the 32 ms an adapter makes of the way there and back.
 const WINDOW: usize = RING - 50;
 
-/// A hold that comes so soon behind its record costs less than a shorter record would.
-const PROMPT_HOLD: Duration = Duration::from_millis(2);
-
 /// Why a transfer cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stall {
@@ -98,6 +95,8 @@ pub(super) struct Transfer {
     alive: bool,
     begun: Option<Instant>,
     deadline: Option<Instant>,
+    /// How long a character takes on the line.
+    character_time: Duration,
 }
 
 impl Transfer {
@@ -129,6 +128,7 @@ impl Transfer {
             alive: false,
             begun: None,
             deadline: None,
+            character_time: Duration::ZERO,
         }
     }
 
@@ -139,6 +139,7 @@ impl Transfer {
     pub(super) fn advance(&mut self, now: Instant, transmitter: &mut Transmitter) -> Result<bool, Stall> {
         if self.begun.is_none() {
             self.begun = Some(now);
+            self.character_time = transmitter.time_for(1);
             // Where a record is written more slowly than it comes, two would be taken in one hold.
             let writing = PROGRAM_TIME * DATA_WORDS;
             self.window = (transmitter.time_for(DATA_CHARACTERS) > writing * 2).then_some(WINDOW);
@@ -211,15 +212,14 @@ impl Transfer {
         }
     }
 
-    /// The hold behind the header shows how late an adapter is, before any data has left: where its way there and back
-    /// would be waited for behind each long record, two shorter ones keep the line busy.
+    /// The hold behind the header shows how late an acknowledgement is, before any data has left.
     fn choose_size(&mut self, now: Instant) {
-        let late = self.left_at.front().is_some_and(|&left_at| now.since(left_at) > PROMPT_HOLD);
-        if late && self.size == Size::Packed(records::LONGEST) {
-            self.size = Size::Packed(records::TWO_IN_A_RING);
-            self.records = records::build(&self.image, &self.flash, self.size, records::LINE_END);
-            self.bytes_total = self.records.iter().map(|record| record.text.len()).sum();
-        }
+        let Some(&left_at) = self.left_at.front().filter(|_| self.size != Size::AsInFile) else { return };
+        let late = now.since(left_at).as_nanos() / self.character_time.as_nanos().max(1);
+        let late = usize::try_from(late).unwrap_or(usize::MAX);
+        self.size = Size::Packed(records::longest_acknowledged(WINDOW, late));
+        self.records = records::build(&self.image, &self.flash, self.size, records::LINE_END);
+        self.bytes_total = self.records.iter().map(|record| record.text.len()).sum();
     }
 
     /// The loader has printed something.

@@ -35,7 +35,7 @@ fn a_newcomer_sees_the_scanner_talk_and_leaves_in_order() {
     screen.keys("\x1dq");
     let end = screen.wait_end();
     assert_eq!(end, Some(0));
-    assert!(screen.is_as_the_shell_left_it());
+    assert!(screen.is_given_back());
     let recordings = world.files("state/axcon/recordings");
     assert_eq!(recordings.len(), 1, "the session is recorded, unasked");
     let recording = fs::read_to_string(&recordings[0]).expect("a recording");
@@ -86,7 +86,7 @@ fn every_way_out_gives_the_terminal_back() {
         screen.wait("application runs");
         screen.signal(signal);
         assert_eq!(screen.wait_end(), Some(130), "{signal:?}");
-        assert!(screen.is_as_the_shell_left_it(), "{signal:?}");
+        assert!(screen.is_given_back(), "{signal:?}");
     }
 }
 

@@ -458,7 +458,7 @@ fn keys_go_out_and_ctrl_bracket_gives_the_terminal_back() {
     screen.wait("hello^[OP^C");
     screen.keys("\x1d");
     assert_eq!(screen.wait_end(), Some(0));
-    assert!(screen.is_as_the_shell_left_it());
+    assert!(screen.is_given_back());
 }
 
 #[test]
@@ -471,7 +471,7 @@ fn whoever_ends_the_terminal_gives_the_terminal_back() {
         wait_until("raw mode", || !screen.is_as_the_shell_left_it());
         screen.signal(signal);
         assert_eq!(screen.wait_end(), Some(130), "{signal:?}");
-        assert!(screen.is_as_the_shell_left_it(), "{signal:?}");
+        assert!(screen.is_given_back(), "{signal:?}");
     }
 }
 
@@ -485,7 +485,7 @@ fn a_port_that_goes_away_gives_the_terminal_back_and_says_why() {
     drop(unit);
     assert_eq!(screen.wait_end(), Some(3));
     screen.wait("the port has gone");
-    assert!(screen.is_as_the_shell_left_it());
+    assert!(screen.is_given_back());
 }
 
 // The life of an emulator.

@@ -91,6 +91,15 @@ impl Screen {
         modes.contains(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG) && !alternate
     }
 
+    /// Whether the terminal is given back in time: what the program said last may still be on its way to the picture.
+    pub fn is_given_back(&self) -> bool {
+        let end = Instant::now() + PATIENCE;
+        while !self.is_as_the_shell_left_it() && Instant::now() < end {
+            thread::sleep(Duration::from_millis(2));
+        }
+        self.is_as_the_shell_left_it()
+    }
+
     pub fn signal(&self, signal: rustix::process::Signal) {
         let pid = i32::try_from(self.child.id()).ok().and_then(rustix::process::Pid::from_raw).expect("a process");
         rustix::process::kill_process(pid, signal).expect("the signal goes out");
