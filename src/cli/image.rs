@@ -246,8 +246,7 @@ fn facts_text(report: &Report, file: &str) -> String {
     row("File", &format!("{file}, {} bytes", grouped(facts.size)));
     let ends = facts.line_end.map_or(String::new(), |end| format!(", line ends {}", end.name()));
     match facts.format {
-        Some(image::Format::SRecord) => row("Format", &format!("S-record, {} records{ends}", grouped(facts.records))),
-        Some(image::Format::IntelHex) => row("Format", "Intel HEX, which is not read"),
+        Some(format) => row("Format", &format!("{}, {} records{ends}", format.title(), grouped(facts.records))),
         None => row("Format", "none that is known"),
     }
     if let Some(header) = &facts.header {

@@ -101,6 +101,14 @@ pub enum DefectId {
     Gap,
     /// The entry point is not in the program.
     EntryOutside,
+    /// Data that runs past the last offset of its base (Intel HEX).
+    SegmentWrap,
+    /// An offset in a record that has no use for one (Intel HEX).
+    OffsetIgnored,
+    /// No entry point is given (Intel HEX).
+    MissingEntry,
+    /// A second entry point (Intel HEX).
+    DuplicateEntry,
     /// Nothing says which product and version this is.
     NoIdentity,
     /// The identity block makes no sense.
@@ -117,7 +125,7 @@ pub enum DefectId {
 
 impl DefectId {
     /// All defects, in the order of the documentation.
-    pub const ALL: [DefectId; 43] = [
+    pub const ALL: [DefectId; 47] = [
         DefectId::EmptyFile,
         DefectId::NotSRecord,
         DefectId::TooLarge,
@@ -155,6 +163,10 @@ impl DefectId {
         DefectId::DataMemory,
         DefectId::Gap,
         DefectId::EntryOutside,
+        DefectId::SegmentWrap,
+        DefectId::OffsetIgnored,
+        DefectId::MissingEntry,
+        DefectId::DuplicateEntry,
         DefectId::NoIdentity,
         DefectId::IdentityMalformed,
         DefectId::IdentityCrc,
@@ -203,6 +215,10 @@ impl DefectId {
             DefectId::DataMemory => "data-memory",
             DefectId::Gap => "gap",
             DefectId::EntryOutside => "entry-outside",
+            DefectId::SegmentWrap => "segment-wrap",
+            DefectId::OffsetIgnored => "offset-ignored",
+            DefectId::MissingEntry => "missing-entry",
+            DefectId::DuplicateEntry => "duplicate-entry",
             DefectId::NoIdentity => "no-identity",
             DefectId::IdentityMalformed => "identity-malformed",
             DefectId::IdentityCrc => "identity-crc",
@@ -226,6 +242,8 @@ impl DefectId {
             | DefectId::CountRecord
             | DefectId::Descending
             | DefectId::Gap
+            | DefectId::OffsetIgnored
+            | DefectId::MissingEntry
             | DefectId::NoIdentity
             | DefectId::FileName => Severity::Warning,
             DefectId::EmptyFile
@@ -254,6 +272,8 @@ impl DefectId {
             | DefectId::OutOfRange
             | DefectId::DataMemory
             | DefectId::EntryOutside
+            | DefectId::SegmentWrap
+            | DefectId::DuplicateEntry
             | DefectId::IdentityMalformed
             | DefectId::IdentityCrc
             | DefectId::UnknownProduct

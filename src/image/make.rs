@@ -52,12 +52,21 @@ pub enum MakeError {
 /// The smallest image: vectors, identity block, and enough behind them to put a flaw into.
 pub const FEWEST_WORDS: u32 = 320;
 
-/// The defects [`make`] can put into a file. The others need a file of more than 512 KByte, or depend on what is
-/// expected.
+/// The defects [`make`] can put into a file. The others need a file of more than 512 KByte, depend on what is
+/// expected, or are those of Intel HEX.
 pub fn flaws() -> impl Iterator<Item = DefectId> {
-    DefectId::ALL
-        .into_iter()
-        .filter(|id| !matches!(id, DefectId::TooLarge | DefectId::WrongProduct | DefectId::FileName))
+    DefectId::ALL.into_iter().filter(|id| {
+        !matches!(
+            id,
+            DefectId::TooLarge
+                | DefectId::SegmentWrap
+                | DefectId::OffsetIgnored
+                | DefectId::MissingEntry
+                | DefectId::DuplicateEntry
+                | DefectId::WrongProduct
+                | DefectId::FileName
+        )
+    })
 }
 
 /// The usual size of a product's sample image: three quarters of its flash, but no more than 80 K words.
@@ -275,6 +284,10 @@ impl Draft {
             | DefectId::IdentityCrc
             | DefectId::UnknownProduct
             | DefectId::TooLarge
+            | DefectId::SegmentWrap
+            | DefectId::OffsetIgnored
+            | DefectId::MissingEntry
+            | DefectId::DuplicateEntry
             | DefectId::WrongProduct
             | DefectId::FileName => {}
         }

@@ -1,16 +1,23 @@
-//! Program images: S-record files, what they hold, and whether they may be sent.
+//! Program images: S-record and Intel HEX files, what they hold, and whether they may be sent.
 //!
 //! [`check()`] reads a file of any size once and gives a [`Report`] with every defect in it; only a report without an
-//! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] knows one line, [`make`]
-//! builds sample files. This module does not know the products: whoever asks passes them as [`Target`]s.
+//! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] and [`ihex`] know
+//! one line, [`make`] builds sample files. This module does not know the products: whoever asks passes them as [`Target`]s.
 
 mod check;
+mod content;
 mod defect;
+mod digits;
 pub mod identity;
+pub mod ihex;
+mod ihex_file;
 mod lines;
 pub mod make;
+mod nature;
 mod report;
+mod scan;
 pub mod srecord;
+mod srecord_file;
 mod whole;
 
 use serde::Deserialize;

@@ -1,10 +1,10 @@
 //! What a check found, and the image if it may be sent.
 
-use super::check::Content;
+use super::content::Content;
 use super::defect::{Defect, DefectId};
 use super::identity::Identity;
 use super::lines::LineEnd;
-use super::{AddressUnit, Block, Image};
+use super::{AddressUnit, Block, Image, ihex, srecord_file};
 
 /// Everything known about an image file.
 #[derive(Debug)]
@@ -94,7 +94,7 @@ pub struct Facts {
 pub enum Format {
     /// Motorola S-records.
     SRecord,
-    /// Intel HEX: recognised, not read.
+    /// Intel HEX.
     IntelHex,
 }
 
@@ -104,6 +104,46 @@ impl Format {
         match self {
             Format::SRecord => "srec",
             Format::IntelHex => "ihex",
+        }
+    }
+
+    /// The name in text.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Format::SRecord => "S-record",
+            Format::IntelHex => "Intel HEX",
+        }
+    }
+
+    /// Characters of the longest record.
+    pub(super) const fn longest_record(self) -> usize {
+        match self {
+            Format::SRecord => 514,
+            Format::IntelHex => 521,
+        }
+    }
+
+    /// What ends a file.
+    pub(super) const fn terminator(self) -> &'static str {
+        match self {
+            Format::SRecord => "a terminator (S7)",
+            Format::IntelHex => "an end record (01)",
+        }
+    }
+
+    /// Column of a data record's address.
+    pub(super) const fn address_column(self) -> usize {
+        match self {
+            Format::SRecord => srecord_file::ADDRESS_COLUMN,
+            Format::IntelHex => ihex::OFFSET_COLUMN,
+        }
+    }
+
+    /// Column of a record's length.
+    pub(super) const fn length_column(self) -> usize {
+        match self {
+            Format::SRecord => srecord_file::LENGTH_COLUMN,
+            Format::IntelHex => ihex::LENGTH_COLUMN,
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Rules about an image as a whole: where its data lies, whether it fits the unit, and what it says it is.
 
-use super::check::{Content, MOST_BYTES, Piece, Steps};
+use super::content::{Content, MOST_BYTES, Piece, Steps};
 use super::defect::{DefectId, Findings, Severity};
 use super::identity::{self, Identity, IdentityError};
-use super::report::{AddressRange, Facts};
+use super::report::{AddressRange, Facts, Format};
 use super::{AddressUnit, Target};
 
 /// What the caller knows and wants.
@@ -18,8 +18,9 @@ pub(super) struct Whole<'a> {
     pub steps: &'a Steps,
     /// Whether all data was read and kept; if not, what is missing is already an error.
     pub complete: bool,
-    /// Line of the terminator.
-    pub terminator: Option<u64>,
+    /// Line and column of the entry point.
+    pub entry_at: Option<(u64, usize)>,
+    pub format: Format,
 }
 
 impl Whole<'_> {
@@ -45,19 +46,20 @@ impl Whole<'_> {
 
         let by_address = by_address(content);
         facts.ranges = ranges(content, &by_address);
-        odd_lengths(content, findings);
-        wraps(content, findings);
-        overlaps(content, &by_address, findings);
-        data_memory(content, findings);
+        let column = self.format.address_column();
+        odd_lengths(content, self.format.length_column(), findings);
+        wraps(content, column, findings);
+        overlaps(content, &by_address, column, findings);
+        data_memory(content, column, findings);
         let Some(flash) = target.flash else { return };
         if let Some((unit, line)) = seen.filter(|(unit, _)| *unit != flash.address_unit) {
-            findings.note(DefectId::AddressUnit, line, 5, || wrong_unit(unit, &target));
+            findings.note(DefectId::AddressUnit, line, column, || wrong_unit(unit, &target));
             // Every address means something else than it says; more complaints about addresses would only mislead.
             return;
         }
-        out_of_range(content, &target, flash.end(), findings);
+        out_of_range(content, &target, flash.end(), column, findings);
         if self.complete {
-            gaps(content, &by_address, flash.end(), findings);
+            gaps(content, &by_address, flash.end(), column, findings);
         }
         self.entry(content, facts, findings);
     }
@@ -109,9 +111,10 @@ impl Whole<'_> {
     }
 
     fn entry(&self, content: &Content, facts: &Facts, findings: &mut Findings) {
-        let (Some(line), Some(entry), true) = (self.terminator, facts.entry, self.complete) else { return };
+        let (Some((line, column)), true) = (self.entry_at, self.complete) else { return };
+        let entry = facts.entry.unwrap_or_default();
         if line_of(content, entry).is_none() {
-            findings.note(DefectId::EntryOutside, line, 5, || {
+            findings.note(DefectId::EntryOutside, line, column, || {
                 format!("no record writes the entry point 0x{entry:08X}: the program could not start")
             });
         }
@@ -203,26 +206,26 @@ fn ranges(content: &Content, by_address: &[Piece]) -> Vec<AddressRange> {
     ranges
 }
 
-fn odd_lengths(content: &Content, findings: &mut Findings) {
+fn odd_lengths(content: &Content, column: usize, findings: &mut Findings) {
     if content.unit == AddressUnit::Byte {
         return;
     }
     for piece in content.pieces.iter().filter(|piece| piece.length() % 2 == 1) {
-        findings.note(DefectId::OddLength, piece.line, 3, || {
+        findings.note(DefectId::OddLength, piece.line, column, || {
             format!("{} data bytes: the last word has no high byte", piece.length())
         });
     }
 }
 
-fn wraps(content: &Content, findings: &mut Findings) {
+fn wraps(content: &Content, column: usize, findings: &mut Findings) {
     for piece in content.pieces.iter().filter(|piece| span(content, piece).end > ADDRESSES) {
-        findings.note(DefectId::AddressWrap, piece.line, 5, || {
+        findings.note(DefectId::AddressWrap, piece.line, column, || {
             format!("{} bytes from 0x{:08X} on run past the last address", piece.length(), piece.address)
         });
     }
 }
 
-fn overlaps(content: &Content, by_address: &[Piece], findings: &mut Findings) {
+fn overlaps(content: &Content, by_address: &[Piece], column: usize, findings: &mut Findings) {
     let mut furthest: Option<&Piece> = None;
     for piece in by_address {
         let this = span(content, piece);
@@ -230,7 +233,7 @@ fn overlaps(content: &Content, by_address: &[Piece], findings: &mut Findings) {
             let end = span(content, before).end;
             if this.start < end {
                 let (line, other) = (piece.line.max(before.line), piece.line.min(before.line));
-                findings.note(DefectId::Overlap, line, 5, || {
+                findings.note(DefectId::Overlap, line, column, || {
                     format!("{}: written by line {other} already", shown(this.start, this.end.min(end)))
                 });
             }
@@ -247,10 +250,10 @@ fn is_data_memory(piece: &Piece) -> bool {
     piece.address >> 24 == DATA_MEMORY >> 24
 }
 
-fn data_memory(content: &Content, findings: &mut Findings) {
+fn data_memory(content: &Content, column: usize, findings: &mut Findings) {
     let flagged = content.pieces.iter().copied().filter(is_data_memory);
     runs(content, flagged, |line, run| {
-        findings.note(DefectId::DataMemory, line, 5, || {
+        findings.note(DefectId::DataMemory, line, column, || {
             format!(
                 "{}: marked as data memory; loaders that do not know the mark write into the program",
                 shown(run.start, run.end)
@@ -259,14 +262,14 @@ fn data_memory(content: &Content, findings: &mut Findings) {
     });
 }
 
-fn out_of_range(content: &Content, target: &Judged, flash_end: u64, findings: &mut Findings) {
+fn out_of_range(content: &Content, target: &Judged, flash_end: u64, column: usize, findings: &mut Findings) {
     let outside = content.pieces.iter().copied().filter(|piece| {
         let span = span(content, piece);
         span.end > flash_end && span.end <= ADDRESSES && !is_data_memory(piece)
     });
     let whose = target.product.as_ref().map_or("any unit's".to_owned(), |product| format!("the {product}'s"));
     runs(content, outside, |line, run| {
-        findings.note(DefectId::OutOfRange, line, 5, || {
+        findings.note(DefectId::OutOfRange, line, column, || {
             let start = run.start.max(flash_end);
             format!(
                 "{}: outside {whose} program flash (to {}); a loader skips that or folds it to {}, silently",
@@ -297,7 +300,7 @@ fn runs(content: &Content, pieces: impl Iterator<Item = Piece>, mut each: impl F
     }
 }
 
-fn gaps(content: &Content, by_address: &[Piece], flash_end: u64, findings: &mut Findings) {
+fn gaps(content: &Content, by_address: &[Piece], flash_end: u64, column: usize, findings: &mut Findings) {
     let mut next = 0;
     for piece in by_address {
         let span = span(content, piece);
@@ -305,7 +308,7 @@ fn gaps(content: &Content, by_address: &[Piece], flash_end: u64, findings: &mut 
             break;
         }
         if span.start > next {
-            findings.note(DefectId::Gap, piece.line, 5, || {
+            findings.note(DefectId::Gap, piece.line, column, || {
                 format!("no record writes {}; what an older program left there may stay", shown(next, span.start))
             });
         }
@@ -331,7 +334,7 @@ fn address(address: u64) -> String {
     if address < 0x1_0000 { format!("0x{address:04X}") } else { format!("0x{address:08X}") }
 }
 
-/// Number of addresses an S3 record can name.
+/// Number of addresses a record can name.
 const ADDRESSES: u64 = 1 << 32;
 /// CodeWarrior's mark for data memory in an address.
 const DATA_MEMORY: u32 = 0x0200_0000;
