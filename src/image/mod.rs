@@ -6,7 +6,9 @@
 
 mod check;
 mod content;
+mod convert;
 mod defect;
+mod diff;
 mod digits;
 pub mod identity;
 pub mod ihex;
@@ -25,7 +27,9 @@ use serde::Deserialize;
 use crate::version::Version;
 
 pub use check::check;
+pub use convert::{ConvertError, Shape, convert};
 pub use defect::{Defect, DefectId, Severity, UnknownDefect};
+pub use diff::{Change, Difference, Differing, count_words, diff};
 pub use identity::{Identity, IdentityError};
 pub use lines::LineEnd;
 pub use report::{AddressRange, CheckedImage, Facts, Format, Report};
@@ -127,9 +131,12 @@ pub struct Image {
 pub struct Block {
     /// Address of the first byte, in the image's unit.
     pub address: u32,
-    /// The bytes, at least one; whole words where addresses count words.
+    /// The bytes, 1 to [`MOST_BLOCK_BYTES`]; whole words where addresses count words.
     pub data: Vec<u8>,
 }
+
+/// The most bytes an S3 record can hold. Records of other kinds may have a few more; they become two blocks.
+pub const MOST_BLOCK_BYTES: usize = srecord::Kind::Data32.most_data();
 
 #[cfg(test)]
 mod tests {

@@ -8,6 +8,8 @@ mod dialects;
 #[cfg(unix)]
 mod eds;
 mod emulator;
+mod image_corpus;
+mod image_files;
 mod images;
 #[cfg(unix)]
 mod live;
