@@ -6,7 +6,7 @@
 
 use serde::Deserialize;
 
-use crate::image::FlashMap;
+use crate::image::{FlashMap, Outside};
 use crate::time::Duration;
 
 /// Which generation of loader.
@@ -28,6 +28,14 @@ impl LoaderKind {
         match self {
             LoaderKind::G1 => "g1",
             LoaderKind::G3 => "g3",
+        }
+    }
+
+    /// What it does with data outside of the program flash.
+    pub const fn outside(self) -> Outside {
+        match self {
+            LoaderKind::G1 => Outside::Folds,
+            LoaderKind::G3 => Outside::Refuses,
         }
     }
 

@@ -66,7 +66,7 @@ mod tests {
     use super::super::lines;
     use super::super::make::{self, FEWEST_WORDS, Recipe, make};
     use super::super::srecord::{Kind, Record};
-    use super::super::{AddressUnit, CheckedImage, FlashMap, Format, Severity};
+    use super::super::{AddressRange, AddressUnit, CheckedImage, FlashMap, Format, Outside, Severity};
     use super::*;
     use crate::version::Version;
 
@@ -75,6 +75,8 @@ mod tests {
             product: "AXTEST".into(),
             flash: FlashMap { address_unit: AddressUnit::Word, program_words: 0x10000, page_words: 256 },
             file_name: "AXTEST_V{version}.elf.S".into(),
+            boot: Some(AddressRange { start: 0x2_0000, end: 0x2_1000 }),
+            outside: Outside::Folds,
         }
     }
 
@@ -204,6 +206,39 @@ mod tests {
             let others = report.defects.iter().filter(|other| other.id != flaw && other.severity == Severity::Error);
             assert_eq!(others.count(), 0, "{flaw}: {:?}", report.defects);
             assert_eq!(report.image().is_some(), flaw.severity() == Severity::Warning, "{flaw}");
+        }
+    }
+
+    #[test]
+    fn what_the_loader_would_do_with_data_elsewhere_is_said_before_it_is_sent() {
+        let said = |outside, address: u32| {
+            let mut file = HEAD.as_bytes().to_vec();
+            for address in [0, address] {
+                Record { kind: Kind::Data32, address, data: &[0x11, 0x22] }.write(&mut file);
+                file.push(b'\n');
+            }
+            file.extend(b"S70500000000FA\n");
+            let target = Target { outside, ..target() };
+            let report = check(&file[..], Some("AXTEST_V1.0.0.elf.S"), &[target], None, &[]);
+            let report = report.unwrap_or_else(|error| panic!("{error}"));
+            let found = report.defects.iter().find(|defect| defect.line == 3);
+            found.map(|defect| (defect.id.name(), defect.message.clone())).unwrap_or_default()
+        };
+        let table = [
+            (Outside::Folds, 0x1_0005, "out-of-range", "the loader folds that to 0x0005 over the program, silently"),
+            (Outside::Folds, 0x50_0000, "out-of-range", "the loader skips that, silently"),
+            (Outside::Folds, 0x20_0000, "data-memory", "0x00200000: marked as data memory"),
+            (Outside::Folds, 0x200_0000, "data-memory", "0x02000000: marked as data memory"),
+            (Outside::Folds, 0x2_0FFF, "boot-flash", "the loader folds that to 0x0FFF over the program, silently"),
+            (Outside::Folds, 0x2_1000, "out-of-range", "the loader folds that to 0x1000 over the program, silently"),
+            (Outside::Refuses, 0x1_0005, "out-of-range", "the loader stops there, with the old program erased"),
+            (Outside::Refuses, 0x2_0000, "boot-flash", "the loader stops there, with the old program erased"),
+            (Outside::Refuses, 0x20_0000, "out-of-range", "the loader stops there, with the old program erased"),
+            (Outside::Unknown, 0x1_0005, "out-of-range", "a loader skips that or folds it to 0x0005, silently"),
+        ];
+        for (outside, address, id, what) in table {
+            let (found, message) = said(outside, address);
+            assert!(found == id && message.contains(what), "{outside:?} {address:#x}: {found}: {message}");
         }
     }
 

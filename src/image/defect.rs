@@ -95,6 +95,8 @@ pub enum DefectId {
     AddressUnit,
     /// Addresses outside the program flash.
     OutOfRange,
+    /// Addresses in the boot flash, where the loader lives.
+    BootFlash,
     /// Addresses flagged as data memory.
     DataMemory,
     /// Words inside the program that no record writes.
@@ -125,7 +127,7 @@ pub enum DefectId {
 
 impl DefectId {
     /// All defects, in the order of the documentation.
-    pub const ALL: [DefectId; 47] = [
+    pub const ALL: [DefectId; 48] = [
         DefectId::EmptyFile,
         DefectId::NotSRecord,
         DefectId::TooLarge,
@@ -160,6 +162,7 @@ impl DefectId {
         DefectId::Overlap,
         DefectId::AddressUnit,
         DefectId::OutOfRange,
+        DefectId::BootFlash,
         DefectId::DataMemory,
         DefectId::Gap,
         DefectId::EntryOutside,
@@ -212,6 +215,7 @@ impl DefectId {
             DefectId::Overlap => "overlap",
             DefectId::AddressUnit => "address-unit",
             DefectId::OutOfRange => "out-of-range",
+            DefectId::BootFlash => "boot-flash",
             DefectId::DataMemory => "data-memory",
             DefectId::Gap => "gap",
             DefectId::EntryOutside => "entry-outside",
@@ -270,6 +274,7 @@ impl DefectId {
             | DefectId::Overlap
             | DefectId::AddressUnit
             | DefectId::OutOfRange
+            | DefectId::BootFlash
             | DefectId::DataMemory
             | DefectId::EntryOutside
             | DefectId::SegmentWrap

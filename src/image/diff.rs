@@ -74,7 +74,8 @@ pub fn diff(first: &Image, second: &Image) -> Difference {
                 if a.value != b.value {
                     note(a.address, Change::Changed);
                 }
-                (left.next(), right.next());
+                left.next();
+                right.next();
             }
             (Some(a), other) if other.is_none_or(|b| a.address < b.address) => {
                 note(a.address, Change::OnlyFirst);

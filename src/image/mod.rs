@@ -95,6 +95,22 @@ pub struct Target {
     pub flash: FlashMap,
     /// How its upload files are named, `{version}` standing for the version.
     pub file_name: String,
+    /// Its boot flash, in the flash map's unit: the loader lives there and cannot replace itself.
+    pub boot: Option<AddressRange>,
+    /// What its loader does with data that belongs elsewhere.
+    pub outside: Outside,
+}
+
+/// What a loader does with data outside of the program flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Outside {
+    /// Addresses of a larger part of the family (below 00200000h) are folded onto the program flash, those whose upper
+    /// half is 0020h go to data memory, others are skipped: all that without a word, and success is reported.
+    Folds,
+    /// It stops with an error, when the old program is erased already.
+    Refuses,
+    /// Nobody knows which loader it is.
+    Unknown,
 }
 
 impl Target {
@@ -148,6 +164,8 @@ mod tests {
             product: "AXTC4CO".into(),
             flash: FlashMap { address_unit: AddressUnit::Word, program_words: 0x10000, page_words: 256 },
             file_name: "AXTC4CO_V{version}.elf.S".into(),
+            boot: None,
+            outside: Outside::Unknown,
         };
         for name in ["AXTC4CO_V1.2.0.elf.S", "axtc4co_v1.2.0.elf.s", "AXTC4CO_V1.2.0 (1).elf.S", "AXTC4CO_V1.2.0.S"] {
             assert_eq!(target.version_in_name(name), Some(Version::new(1, 2, 0)), "{name}");

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::report::contents;
-use super::{allowable, checked, grouped, read, report_text, save, shown};
+use super::{allowable, checked, grouped, read, report_text, save, shown, targets};
 use crate::cli::Global;
 use crate::cli::error::{CliError, Kind};
 use crate::cli::output::Output;
@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(
     let bytes = image::convert(image, &shape).map_err(|error| inexpressible(error, &name))?;
     // Addresses that general tools want are not a loader's, and that is no mistake here.
     allow.push(DefectId::AddressUnit);
-    let written = checked(&bytes[..], &args.out, None, &allow)?;
+    let written = checked(&bytes[..], &args.out, &targets(), None, &allow)?;
     if !written.is_ok() {
         return refuse(&written, &shown(&args.out), "would have errors, so it is not written", output);
     }

@@ -17,7 +17,7 @@ use clap::Subcommand;
 use super::Global;
 use super::error::{CliError, Kind};
 use super::output::Output;
-use crate::device::Product;
+use crate::device::{LoaderKind, Product};
 use crate::image::make::{self, Recipe};
 use crate::image::{self, DefectId, Report, Target};
 use crate::version::Version;
@@ -55,6 +55,9 @@ struct CheckArgs {
     /// The product it should be for.
     #[arg(long, value_name = "NAME", value_parser = product)]
     product: Option<&'static Product>,
+    /// The loader it is judged for; by default the one the product is believed to have.
+    #[arg(long, value_name = "PROFILE", value_parser = loader)]
+    loader: Option<LoaderKind>,
     /// Let this error pass. What is allowed is still listed.
     #[arg(long, value_name = "DEFECT", value_parser = allowable)]
     allow: Vec<DefectId>,
@@ -101,7 +104,11 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 
 fn check(args: &CheckArgs, output: &mut Output) -> Result<(), CliError> {
     let expected = args.product.map(|product| product.name.as_str());
-    let report = read(&args.file, expected, &args.allow)?;
+    let mut targets = targets();
+    if let Some(loader) = args.loader {
+        targets.iter_mut().for_each(|target| target.outside = loader.outside());
+    }
+    let report = read_for(&args.file, &targets, expected, &args.allow)?;
     let name = shown(&args.file);
     if output.json {
         output.object(&ImageObject::new(&report, &name))?;
@@ -146,8 +153,12 @@ fn make(args: &MakeArgs, global: &Global, output: &mut Output) -> Result<(), Cli
 /// # Errors
 /// Only if the file cannot be read: the kind is [`Kind::ImageRefused`] then. A bad file is a report.
 pub fn read(path: &Path, expected: Option<&str>, allow: &[DefectId]) -> Result<Report, CliError> {
+    read_for(path, &targets(), expected, allow)
+}
+
+fn read_for(path: &Path, targets: &[Target], expected: Option<&str>, allow: &[DefectId]) -> Result<Report, CliError> {
     if path == Path::new("-") {
-        return checked(io::stdin().lock(), path, expected, allow);
+        return checked(io::stdin().lock(), path, targets, expected, allow);
     }
     match std::fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => {
@@ -158,12 +169,18 @@ pub fn read(path: &Path, expected: Option<&str>, allow: &[DefectId]) -> Result<R
         Err(error) => return Err(unreadable(path, error)),
     }
     let file = File::open(path).map_err(|error| unreadable(path, error))?;
-    checked(file, path, expected, allow)
+    checked(file, path, targets, expected, allow)
 }
 
-fn checked(reader: impl Read, path: &Path, expected: Option<&str>, allow: &[DefectId]) -> Result<Report, CliError> {
+fn checked(
+    reader: impl Read,
+    path: &Path,
+    targets: &[Target],
+    expected: Option<&str>,
+    allow: &[DefectId],
+) -> Result<Report, CliError> {
     let name = path.file_name().map(|name| name.to_string_lossy());
-    image::check(reader, name.as_deref(), &targets(), expected, allow).map_err(|error| unreadable(path, error))
+    image::check(reader, name.as_deref(), targets, expected, allow).map_err(|error| unreadable(path, error))
 }
 
 fn unreadable(path: &Path, error: io::Error) -> CliError {
@@ -184,6 +201,13 @@ pub(super) fn product(name: &str) -> Result<&'static Product, String> {
     Product::named(name).ok_or_else(|| {
         let known: Vec<&str> = Product::all().iter().map(|product| product.name.as_str()).collect();
         format!("no such product; known: {}", known.join(", "))
+    })
+}
+
+fn loader(name: &str) -> Result<LoaderKind, String> {
+    LoaderKind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
+        let known: Vec<&str> = LoaderKind::ALL.into_iter().map(LoaderKind::name).collect();
+        format!("no such loader; known: {}", known.join(", "))
     })
 }
 
