@@ -6,7 +6,7 @@
 
 use serde::Deserialize;
 
-use crate::image::FlashMap;
+use crate::image::{FlashMap, Outside};
 use crate::time::Duration;
 
 /// Which generation of loader.
@@ -32,6 +32,14 @@ impl LoaderKind {
             LoaderKind::G1 => "g1",
             LoaderKind::G2 => "g2",
             LoaderKind::G3 => "g3",
+        }
+    }
+
+    /// What it does with data outside of the program flash.
+    pub const fn outside(self) -> Outside {
+        match self {
+            LoaderKind::G1 | LoaderKind::G2 => Outside::Folds,
+            LoaderKind::G3 => Outside::Refuses,
         }
     }
 

@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 
 use serde::Deserialize;
 
-use crate::image::{FlashMap, Target};
+use crate::image::{AddressRange, FlashMap, Target};
 use crate::version::Version;
 use crate::wire::stream;
 
@@ -42,6 +42,8 @@ pub struct Product {
     pub measurement: Measurement,
     /// Program flash.
     pub flash: FlashMap,
+    /// The flash of its bootloader.
+    pub boot_flash: BootFlash,
     /// The bootloader.
     pub loader: Loader,
     /// The object dictionary.
@@ -136,6 +138,16 @@ pub enum EarlyStart {
     Ignored,
 }
 
+/// The flash in which the bootloader lives; nothing can be loaded there. Addresses are those of the program flash.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BootFlash {
+    /// Its first address.
+    pub start: u32,
+    /// Its size in addresses.
+    pub words: u32,
+}
+
 /// The bootloader.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -176,7 +188,14 @@ impl Product {
 
     /// What the check of an image needs to know of this product.
     pub fn target(&self) -> Target {
-        Target { product: self.name.clone(), flash: self.flash, file_name: self.loader.file_name.clone() }
+        let BootFlash { start, words } = self.boot_flash;
+        Target {
+            product: self.name.clone(),
+            flash: self.flash,
+            file_name: self.loader.file_name.clone(),
+            boot: Some(AddressRange { start: start.into(), end: u64::from(start) + u64::from(words) }),
+            outside: self.loader.kind.outside(),
+        }
     }
 
     /// What the upload file of a version is called.

@@ -9,7 +9,7 @@ use toml::{Spanned, Value as Toml};
 
 use super::complaint::{Complaint, Complaints};
 use super::dictionary::{Access, Bound, Dictionary, Entry, FactoryValue, Limits, Meaning, Object, ObjectKind};
-use super::{Cable, Can, Console, Loader, Measurement, Product};
+use super::{BootFlash, Cable, Can, Console, Loader, Measurement, Product};
 use crate::canopen::{DataType, ObjectAddress, Value};
 use crate::image::FlashMap;
 use crate::image::identity::LONGEST_NAME;
@@ -28,6 +28,7 @@ struct RawProduct {
     stream: Spanned<stream::Layout>,
     measurement: Spanned<Measurement>,
     flash: Spanned<FlashMap>,
+    boot_flash: Spanned<BootFlash>,
     loader: Spanned<Loader>,
     #[serde(default)]
     object: Vec<Spanned<RawObject>>,
@@ -120,6 +121,7 @@ impl Reader<'_> {
         self.check_stream(&raw.stream);
         self.check_measurement(&raw.measurement);
         self.check_flash(&raw.flash);
+        self.check_boot_flash(&raw.boot_flash, raw.flash.get_ref());
         let loader = raw.loader.get_ref();
         if !loader.file_name.contains("{version}") {
             let message = format!("'{}' has no {{version}} in it", loader.file_name);
@@ -148,6 +150,7 @@ impl Reader<'_> {
             stream: raw.stream.into_inner(),
             measurement: raw.measurement.into_inner(),
             flash: raw.flash.into_inner(),
+            boot_flash: raw.boot_flash.into_inner(),
             loader: raw.loader.into_inner(),
             dictionary,
         }
@@ -211,6 +214,14 @@ impl Reader<'_> {
         if page_words == 0 || program_words == 0 || !program_words.is_multiple_of(page_words) {
             let message = format!("{program_words} words are no whole number of pages of {page_words}");
             self.complain(flash.span().start, "flash.program_words", message);
+        }
+    }
+
+    fn check_boot_flash(&mut self, boot: &Spanned<BootFlash>, flash: &FlashMap) {
+        let BootFlash { start, words } = *boot.get_ref();
+        if words == 0 || u64::from(start) < flash.end() || start.checked_add(words).is_none() {
+            let message = format!("{words} words at {start:#x} do not lie behind the program flash");
+            self.complain(boot.span().start, "boot_flash", message);
         }
     }
 
@@ -550,6 +561,7 @@ mod tests {
             ("kbps = 125 ", "kbps = 115 ", "can.kbps: 115 is none of 10, 20, 50, 125, 250, 500, 800, 1000"),
             ("name = \"AXTC4CO\"", "name = \"AX TC4\"", "name: 'AX TC4' is not 1 to 12 letters and digits"),
             ("page_words = 256", "page_words = 255", "65536 words are no whole number of pages of 255"),
+            ("start = 0x20000", "start = 0x2000", "boot_flash: 4096 words at 0x2000 do not lie behind"),
             ("_V{version}", "_V", "loader.file_name: 'AXTC4CO_V.elf.S' has no {version} in it"),
             ("open = \"OpenCct\"", "open = \"OpenCircuit\"", "stream.field_value: 'OpenCircuit' is not a word"),
             ("[1, 60000]", "[100, 10]", "measurement.stream_period_ms: from 100 to 10 is no range"),

@@ -95,12 +95,22 @@ pub enum DefectId {
     AddressUnit,
     /// Addresses outside the program flash.
     OutOfRange,
+    /// Addresses in the boot flash, where the loader lives.
+    BootFlash,
     /// Addresses flagged as data memory.
     DataMemory,
     /// Words inside the program that no record writes.
     Gap,
     /// The entry point is not in the program.
     EntryOutside,
+    /// Data that runs past the last offset of its base (Intel HEX).
+    SegmentWrap,
+    /// An offset in a record that has no use for one (Intel HEX).
+    OffsetIgnored,
+    /// No entry point is given (Intel HEX).
+    MissingEntry,
+    /// A second entry point (Intel HEX).
+    DuplicateEntry,
     /// Nothing says which product and version this is.
     NoIdentity,
     /// The identity block makes no sense.
@@ -117,7 +127,7 @@ pub enum DefectId {
 
 impl DefectId {
     /// All defects, in the order of the documentation.
-    pub const ALL: [DefectId; 43] = [
+    pub const ALL: [DefectId; 48] = [
         DefectId::EmptyFile,
         DefectId::NotSRecord,
         DefectId::TooLarge,
@@ -152,9 +162,14 @@ impl DefectId {
         DefectId::Overlap,
         DefectId::AddressUnit,
         DefectId::OutOfRange,
+        DefectId::BootFlash,
         DefectId::DataMemory,
         DefectId::Gap,
         DefectId::EntryOutside,
+        DefectId::SegmentWrap,
+        DefectId::OffsetIgnored,
+        DefectId::MissingEntry,
+        DefectId::DuplicateEntry,
         DefectId::NoIdentity,
         DefectId::IdentityMalformed,
         DefectId::IdentityCrc,
@@ -200,9 +215,14 @@ impl DefectId {
             DefectId::Overlap => "overlap",
             DefectId::AddressUnit => "address-unit",
             DefectId::OutOfRange => "out-of-range",
+            DefectId::BootFlash => "boot-flash",
             DefectId::DataMemory => "data-memory",
             DefectId::Gap => "gap",
             DefectId::EntryOutside => "entry-outside",
+            DefectId::SegmentWrap => "segment-wrap",
+            DefectId::OffsetIgnored => "offset-ignored",
+            DefectId::MissingEntry => "missing-entry",
+            DefectId::DuplicateEntry => "duplicate-entry",
             DefectId::NoIdentity => "no-identity",
             DefectId::IdentityMalformed => "identity-malformed",
             DefectId::IdentityCrc => "identity-crc",
@@ -226,6 +246,8 @@ impl DefectId {
             | DefectId::CountRecord
             | DefectId::Descending
             | DefectId::Gap
+            | DefectId::OffsetIgnored
+            | DefectId::MissingEntry
             | DefectId::NoIdentity
             | DefectId::FileName => Severity::Warning,
             DefectId::EmptyFile
@@ -252,8 +274,11 @@ impl DefectId {
             | DefectId::Overlap
             | DefectId::AddressUnit
             | DefectId::OutOfRange
+            | DefectId::BootFlash
             | DefectId::DataMemory
             | DefectId::EntryOutside
+            | DefectId::SegmentWrap
+            | DefectId::DuplicateEntry
             | DefectId::IdentityMalformed
             | DefectId::IdentityCrc
             | DefectId::UnknownProduct

@@ -29,6 +29,16 @@ impl LineEnd {
         }
     }
 
+    /// What is in the file.
+    pub const fn text(self) -> &'static [u8] {
+        match self {
+            LineEnd::Cr => b"\r",
+            LineEnd::Lf => b"\n",
+            LineEnd::CrLf => b"\r\n",
+            LineEnd::None => b"",
+        }
+    }
+
     const fn characters(self) -> usize {
         match self {
             LineEnd::Cr | LineEnd::Lf => 1,

@@ -52,12 +52,21 @@ pub enum MakeError {
 /// The smallest image: vectors, identity block, and enough behind them to put a flaw into.
 pub const FEWEST_WORDS: u32 = 320;
 
-/// The defects [`make`] can put into a file. The others need a file of more than 512 KByte, or depend on what is
-/// expected.
+/// The defects [`make`] can put into a file. The others need a file of more than 512 KByte, depend on what is
+/// expected, or are those of Intel HEX.
 pub fn flaws() -> impl Iterator<Item = DefectId> {
-    DefectId::ALL
-        .into_iter()
-        .filter(|id| !matches!(id, DefectId::TooLarge | DefectId::WrongProduct | DefectId::FileName))
+    DefectId::ALL.into_iter().filter(|id| {
+        !matches!(
+            id,
+            DefectId::TooLarge
+                | DefectId::SegmentWrap
+                | DefectId::OffsetIgnored
+                | DefectId::MissingEntry
+                | DefectId::DuplicateEntry
+                | DefectId::WrongProduct
+                | DefectId::FileName
+        )
+    })
 }
 
 /// The usual size of a product's sample image: three quarters of its flash, but no more than 80 K words.
@@ -83,6 +92,9 @@ pub fn make(recipe: &Recipe<'_>) -> Result<Vec<u8>, MakeError> {
     }
     if let Some(flaw) = recipe.flaw.filter(|flaw| !flaws().any(|possible| possible == *flaw)) {
         return Err(MakeError::NoSuchFlaw(flaw));
+    }
+    if recipe.flaw == Some(DefectId::BootFlash) && target.boot.is_none() {
+        return Err(MakeError::NoSuchFlaw(DefectId::BootFlash));
     }
     let mut draft = Draft::new(recipe, &program(recipe));
     if let Some(flaw) = recipe.flaw {
@@ -257,8 +269,14 @@ impl Draft {
                 self.lines.insert(damaged, record);
             }
             DefectId::OutOfRange => {
-                let end = recipe.target.flash.end() as u32;
-                self.insert(last, data32(end, &[0x12, 0x34]));
+                // Some boot flash follows right behind; that would be another defect.
+                let end = recipe.target.flash.end();
+                let boot = recipe.target.boot.filter(|boot| (boot.start..boot.end).contains(&end));
+                self.insert(last, data32(boot.map_or(end, |boot| boot.end) as u32, &[0x12, 0x34]));
+            }
+            DefectId::BootFlash => {
+                let start = recipe.target.boot.map_or(0, |boot| boot.start as u32);
+                self.insert(last, data32(start, &[0x12, 0x34]));
             }
             DefectId::DataMemory => self.insert(last, data32(0x0200_0000, &[0x12, 0x34])),
             DefectId::Gap => {
@@ -275,6 +293,10 @@ impl Draft {
             | DefectId::IdentityCrc
             | DefectId::UnknownProduct
             | DefectId::TooLarge
+            | DefectId::SegmentWrap
+            | DefectId::OffsetIgnored
+            | DefectId::MissingEntry
+            | DefectId::DuplicateEntry
             | DefectId::WrongProduct
             | DefectId::FileName => {}
         }
@@ -310,7 +332,7 @@ const PAGE: &[u8] = b"<!DOCTYPE html>\r\n<html><head><title>404 Not Found</title
 
 #[cfg(test)]
 mod tests {
-    use super::super::{FlashMap, check};
+    use super::super::{FlashMap, Outside, check};
     use super::*;
 
     fn target(address_unit: AddressUnit) -> Target {
@@ -318,6 +340,8 @@ mod tests {
             product: "AXTEST".into(),
             flash: FlashMap { address_unit, program_words: 0x10000, page_words: 256 },
             file_name: "AXTEST_V{version}.elf.S".into(),
+            boot: None,
+            outside: Outside::Unknown,
         }
     }
 

@@ -1,16 +1,25 @@
-//! Program images: S-record files, what they hold, and whether they may be sent.
+//! Program images: S-record and Intel HEX files, what they hold, and whether they may be sent.
 //!
 //! [`check()`] reads a file of any size once and gives a [`Report`] with every defect in it; only a report without an
-//! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] knows one line, [`make`]
-//! builds sample files. This module does not know the products: whoever asks passes them as [`Target`]s.
+//! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] and [`ihex`] know
+//! one line, [`make`] builds sample files. This module does not know the products: whoever asks passes them as [`Target`]s.
 
 mod check;
+mod content;
+mod convert;
 mod defect;
+mod diff;
+mod digits;
 pub mod identity;
+pub mod ihex;
+mod ihex_file;
 mod lines;
 pub mod make;
+mod nature;
 mod report;
+mod scan;
 pub mod srecord;
+mod srecord_file;
 mod whole;
 
 use serde::Deserialize;
@@ -18,7 +27,9 @@ use serde::Deserialize;
 use crate::version::Version;
 
 pub use check::check;
+pub use convert::{ConvertError, Shape, convert};
 pub use defect::{Defect, DefectId, Severity, UnknownDefect};
+pub use diff::{Change, Difference, Differing, count_words, diff};
 pub use identity::{Identity, IdentityError};
 pub use lines::LineEnd;
 pub use report::{AddressRange, CheckedImage, Facts, Format, Report};
@@ -84,6 +95,22 @@ pub struct Target {
     pub flash: FlashMap,
     /// How its upload files are named, `{version}` standing for the version.
     pub file_name: String,
+    /// Its boot flash, in the flash map's unit: the loader lives there and cannot replace itself.
+    pub boot: Option<AddressRange>,
+    /// What its loader does with data that belongs elsewhere.
+    pub outside: Outside,
+}
+
+/// What a loader does with data outside of the program flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Outside {
+    /// Addresses of a larger part of the family (below 00200000h) are folded onto the program flash, those whose upper
+    /// half is 0020h go to data memory, others are skipped: all that without a word, and success is reported.
+    Folds,
+    /// It stops with an error, when the old program is erased already.
+    Refuses,
+    /// Nobody knows which loader it is.
+    Unknown,
 }
 
 impl Target {
@@ -120,9 +147,12 @@ pub struct Image {
 pub struct Block {
     /// Address of the first byte, in the image's unit.
     pub address: u32,
-    /// The bytes, at least one; whole words where addresses count words.
+    /// The bytes, 1 to [`MOST_BLOCK_BYTES`]; whole words where addresses count words.
     pub data: Vec<u8>,
 }
+
+/// The most bytes an S3 record can hold. Records of other kinds may have a few more; they become two blocks.
+pub const MOST_BLOCK_BYTES: usize = srecord::Kind::Data32.most_data();
 
 #[cfg(test)]
 mod tests {
@@ -134,6 +164,8 @@ mod tests {
             product: "AXTC4CO".into(),
             flash: FlashMap { address_unit: AddressUnit::Word, program_words: 0x10000, page_words: 256 },
             file_name: "AXTC4CO_V{version}.elf.S".into(),
+            boot: None,
+            outside: Outside::Unknown,
         };
         for name in ["AXTC4CO_V1.2.0.elf.S", "axtc4co_v1.2.0.elf.s", "AXTC4CO_V1.2.0 (1).elf.S", "AXTC4CO_V1.2.0.S"] {
             assert_eq!(target.version_in_name(name), Some(Version::new(1, 2, 0)), "{name}");

@@ -1,10 +1,10 @@
 //! What a check found, and the image if it may be sent.
 
-use super::check::Content;
+use super::content::Content;
 use super::defect::{Defect, DefectId};
 use super::identity::Identity;
 use super::lines::LineEnd;
-use super::{AddressUnit, Block, Image};
+use super::{AddressUnit, Block, Image, MOST_BLOCK_BYTES, ihex, srecord_file};
 
 /// Everything known about an image file.
 #[derive(Debug)]
@@ -42,19 +42,29 @@ impl Report {
         if !self.is_ok() {
             return None;
         }
-        let address_unit = self.content.unit;
-        let blocks = self.content.pieces.iter().map(|piece| {
-            let mut data = self.content.data(piece).to_vec();
-            data.resize(data.len().next_multiple_of(address_unit.bytes() as usize), 0xFF);
-            Block { address: piece.address, data }
-        });
-        let image = Image {
+        let image = self.image_as(self.content.unit);
+        Some(CheckedImage { image, identity: self.facts.identity.clone(), overridden: self.overridden.clone() })
+    }
+
+    /// The image, whatever is wrong with it, its addresses taken for this unit.
+    pub(super) fn image_as(&self, address_unit: AddressUnit) -> Image {
+        let mut blocks = Vec::with_capacity(self.content.pieces.len());
+        for piece in &self.content.pieces {
+            let mut address = piece.address;
+            for data in self.content.data(piece).chunks(MOST_BLOCK_BYTES) {
+                let mut data = data.to_vec();
+                data.resize(data.len().next_multiple_of(address_unit.bytes() as usize), 0xFF);
+                let next = address.wrapping_add(address_unit.addresses(data.len()) as u32);
+                blocks.push(Block { address, data });
+                address = next;
+            }
+        }
+        Image {
             header: self.facts.header.clone().unwrap_or_default(),
-            blocks: blocks.collect(),
+            blocks,
             entry: self.facts.entry.unwrap_or_default(),
             address_unit,
-        };
-        Some(CheckedImage { image, identity: self.facts.identity.clone(), overridden: self.overridden.clone() })
+        }
     }
 }
 
@@ -94,7 +104,7 @@ pub struct Facts {
 pub enum Format {
     /// Motorola S-records.
     SRecord,
-    /// Intel HEX: recognised, not read.
+    /// Intel HEX.
     IntelHex,
 }
 
@@ -104,6 +114,46 @@ impl Format {
         match self {
             Format::SRecord => "srec",
             Format::IntelHex => "ihex",
+        }
+    }
+
+    /// The name in text.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Format::SRecord => "S-record",
+            Format::IntelHex => "Intel HEX",
+        }
+    }
+
+    /// Characters of the longest record.
+    pub(super) const fn longest_record(self) -> usize {
+        match self {
+            Format::SRecord => 514,
+            Format::IntelHex => 521,
+        }
+    }
+
+    /// What ends a file.
+    pub(super) const fn terminator(self) -> &'static str {
+        match self {
+            Format::SRecord => "a terminator (S7)",
+            Format::IntelHex => "an end record (01)",
+        }
+    }
+
+    /// Column of a data record's address.
+    pub(super) const fn address_column(self) -> usize {
+        match self {
+            Format::SRecord => srecord_file::ADDRESS_COLUMN,
+            Format::IntelHex => ihex::OFFSET_COLUMN,
+        }
+    }
+
+    /// Column of a record's length.
+    pub(super) const fn length_column(self) -> usize {
+        match self {
+            Format::SRecord => srecord_file::LENGTH_COLUMN,
+            Format::IntelHex => ihex::LENGTH_COLUMN,
         }
     }
 }

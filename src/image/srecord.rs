@@ -7,6 +7,8 @@
 
 use std::fmt;
 
+use super::digits::{self, INVALID, LOWER, digit};
+
 /// What a record is for, and how wide its address is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
@@ -195,18 +197,18 @@ pub fn parse<'a>(line: &[u8], room: &'a mut Room) -> Result<Line<'a>, LineError>
     if !first.eq_ignore_ascii_case(&b'S') {
         return Err(LineError::NotARecord(first));
     }
-    let (&digit, rest) = rest.split_first().ok_or(LineError::Short { says: 1, holds: 0 })?;
-    let kind = Kind::from_digit(digit).ok_or(LineError::UnknownType(digit))?;
+    let (&type_digit, rest) = rest.split_first().ok_or(LineError::Short { says: 1, holds: 0 })?;
+    let kind = Kind::from_digit(type_digit).ok_or(LineError::UnknownType(type_digit))?;
     let (&[high, low], body) = rest.split_first_chunk::<2>().ok_or(LineError::Short { says: 1, holds: 0 })?;
-    let mut marks = digit_value(high) | digit_value(low);
-    let length = (digit_value(high) << 4) | (digit_value(low) & VALUE);
+    let mut marks = digit(high) | digit(low);
+    let length = digits::byte(digit(high), digit(low));
     let says = usize::from(length);
     let mut sum = length;
     let mut holds = 0;
     for (slot, pair) in room.iter_mut().zip(body.chunks_exact(2)).take(says) {
-        let (high, low) = (digit_value(pair[0]), digit_value(pair[1]));
+        let (high, low) = (digit(pair[0]), digit(pair[1]));
         marks |= high | low;
-        *slot = (high << 4) | (low & VALUE);
+        *slot = digits::byte(high, low);
         sum = sum.wrapping_add(*slot);
         holds += 1;
     }
@@ -249,13 +251,13 @@ impl Record<'_> {
         let mut sum = 0u8;
         let mut put = |byte: u8| {
             sum = sum.wrapping_add(byte);
-            text.extend([DIGITS[usize::from(byte >> 4)], DIGITS[usize::from(byte & 15)]]);
+            digits::put(text, byte);
         };
         put(length);
         self.address.to_be_bytes()[4 - width..].iter().for_each(|&byte| put(byte));
         self.data.iter().for_each(|&byte| put(byte));
         let checksum = !sum;
-        text.extend([DIGITS[usize::from(checksum >> 4)], DIGITS[usize::from(checksum & 15)]]);
+        digits::put(text, checksum);
     }
 
     /// The record as text, upper case and without a line end.
@@ -290,6 +292,9 @@ pub const LONGEST_HEADER: usize = Kind::Header.most_data() - 2;
 /// Characters of such a header without text.
 pub(super) const FEWEST_HEADER_CHARACTERS: usize = 14;
 
+/// Characters of a terminator with a four-byte entry point.
+pub(super) const TERMINATOR_CHARACTERS: usize = 14;
+
 /// A character as a message shows it: never a control code.
 pub(super) struct Shown(pub(super) u8);
 
@@ -318,38 +323,12 @@ impl fmt::Display for Bare {
 /// The first character that is no digit, among those the record takes; called only when there is one.
 #[cold]
 fn first_bad_character(line: &[u8], says: usize) -> LineError {
-    let bad = line.iter().enumerate().skip(2).take(2 + says * 2).find(|(_, found)| digit_value(**found) & INVALID != 0);
-    match bad {
-        Some((at, &found)) => LineError::Character { column: at + 1, found },
+    let end = line.len().min(4 + says * 2);
+    match digits::first_bad(line.get(2..end).unwrap_or_default()) {
+        Some((at, found)) => LineError::Character { column: at + 3, found },
         None => LineError::Short { says, holds: 0 },
     }
 }
-
-const fn digit_value(character: u8) -> u8 {
-    VALUES[character as usize]
-}
-
-const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
-
-/// The value's bits in an entry of [`VALUES`].
-const VALUE: u8 = 0x0F;
-/// Marks a lower-case digit.
-const LOWER: u8 = 0x10;
-/// Marks what is no digit.
-const INVALID: u8 = 0x80;
-
-/// Value and marks of every character. Marks of a whole line are collected by OR, so the loop has no branch.
-const VALUES: [u8; 256] = {
-    let mut values = [INVALID; 256];
-    let mut value = 0;
-    while value < 16 {
-        let digit = DIGITS[value as usize];
-        values[digit.to_ascii_lowercase() as usize] = value | LOWER;
-        values[digit as usize] = value;
-        value += 1;
-    }
-    values
-};
 
 #[cfg(test)]
 mod tests {
@@ -467,8 +446,8 @@ mod tests {
         fn any_single_wrong_digit_is_noticed((kind, address, data) in any_record(), at in any::<prop::sample::Index>(), digit in 0usize..16) {
             let mut text = Record { kind, address, data: &data }.to_text();
             let at = 4 + at.index(text.len() - 4);
-            prop_assume!(text[at] != DIGITS[digit]);
-            text[at] = DIGITS[digit];
+            prop_assume!(text[at] != b"0123456789ABCDEF"[digit]);
+            text[at] = b"0123456789ABCDEF"[digit];
             prop_assert!(parse(&text, &mut [0; 255]).is_ok_and(|line| line.wrong_checksum.is_some()));
         }
 

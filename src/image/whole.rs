@@ -1,10 +1,10 @@
 //! Rules about an image as a whole: where its data lies, whether it fits the unit, and what it says it is.
 
-use super::check::{Content, MOST_BYTES, Piece, Steps};
+use super::content::{Content, MOST_BYTES, Piece, Steps};
 use super::defect::{DefectId, Findings, Severity};
 use super::identity::{self, Identity, IdentityError};
-use super::report::{AddressRange, Facts};
-use super::{AddressUnit, Target};
+use super::report::{AddressRange, Facts, Format};
+use super::{AddressUnit, Outside, Target};
 
 /// What the caller knows and wants.
 pub(super) struct Request<'a> {
@@ -18,8 +18,9 @@ pub(super) struct Whole<'a> {
     pub steps: &'a Steps,
     /// Whether all data was read and kept; if not, what is missing is already an error.
     pub complete: bool,
-    /// Line of the terminator.
-    pub terminator: Option<u64>,
+    /// Line and column of the entry point.
+    pub entry_at: Option<(u64, usize)>,
+    pub format: Format,
 }
 
 impl Whole<'_> {
@@ -45,19 +46,20 @@ impl Whole<'_> {
 
         let by_address = by_address(content);
         facts.ranges = ranges(content, &by_address);
-        odd_lengths(content, findings);
-        wraps(content, findings);
-        overlaps(content, &by_address, findings);
-        data_memory(content, findings);
+        let column = self.format.address_column();
+        odd_lengths(content, self.format.length_column(), findings);
+        wraps(content, column, findings);
+        overlaps(content, &by_address, column, findings);
+        data_memory(content, &target, column, findings);
         let Some(flash) = target.flash else { return };
         if let Some((unit, line)) = seen.filter(|(unit, _)| *unit != flash.address_unit) {
-            findings.note(DefectId::AddressUnit, line, 5, || wrong_unit(unit, &target));
+            findings.note(DefectId::AddressUnit, line, column, || wrong_unit(unit, &target));
             // Every address means something else than it says; more complaints about addresses would only mislead.
             return;
         }
-        out_of_range(content, &target, flash.end(), findings);
+        elsewhere(content, &target, flash.end(), column, findings);
         if self.complete {
-            gaps(content, &by_address, flash.end(), findings);
+            gaps(content, &by_address, flash.end(), column, findings);
         }
         self.entry(content, facts, findings);
     }
@@ -109,9 +111,10 @@ impl Whole<'_> {
     }
 
     fn entry(&self, content: &Content, facts: &Facts, findings: &mut Findings) {
-        let (Some(line), Some(entry), true) = (self.terminator, facts.entry, self.complete) else { return };
+        let (Some((line, column)), true) = (self.entry_at, self.complete) else { return };
+        let entry = facts.entry.unwrap_or_default();
         if line_of(content, entry).is_none() {
-            findings.note(DefectId::EntryOutside, line, 5, || {
+            findings.note(DefectId::EntryOutside, line, column, || {
                 format!("no record writes the entry point 0x{entry:08X}: the program could not start")
             });
         }
@@ -122,6 +125,8 @@ impl Whole<'_> {
 struct Judged {
     product: Option<String>,
     flash: Option<super::FlashMap>,
+    boot: Option<AddressRange>,
+    outside: Outside,
 }
 
 /// The product the image names, else the one expected, else the one its file name claims. If nothing says anything,
@@ -130,10 +135,16 @@ fn target(request: &Request<'_>, identity: Option<&Identity>) -> Judged {
     let claimed = claim(request).map(|(product, _)| product);
     let names = [identity.map(|identity| identity.product.as_str()), request.expected, claimed];
     match names.into_iter().flatten().find_map(|name| named(request.targets, name)) {
-        Some(target) => Judged { product: Some(target.product.clone()), flash: Some(target.flash) },
+        Some(target) => Judged {
+            product: Some(target.product.clone()),
+            flash: Some(target.flash),
+            boot: target.boot,
+            outside: target.outside,
+        },
         None => {
             let largest = request.targets.iter().max_by_key(|target| target.flash.program_words);
-            Judged { product: None, flash: largest.map(|target| target.flash) }
+            let flash = largest.map(|target| target.flash);
+            Judged { product: None, flash, boot: None, outside: Outside::Unknown }
         }
     }
 }
@@ -203,26 +214,26 @@ fn ranges(content: &Content, by_address: &[Piece]) -> Vec<AddressRange> {
     ranges
 }
 
-fn odd_lengths(content: &Content, findings: &mut Findings) {
+fn odd_lengths(content: &Content, column: usize, findings: &mut Findings) {
     if content.unit == AddressUnit::Byte {
         return;
     }
     for piece in content.pieces.iter().filter(|piece| piece.length() % 2 == 1) {
-        findings.note(DefectId::OddLength, piece.line, 3, || {
+        findings.note(DefectId::OddLength, piece.line, column, || {
             format!("{} data bytes: the last word has no high byte", piece.length())
         });
     }
 }
 
-fn wraps(content: &Content, findings: &mut Findings) {
+fn wraps(content: &Content, column: usize, findings: &mut Findings) {
     for piece in content.pieces.iter().filter(|piece| span(content, piece).end > ADDRESSES) {
-        findings.note(DefectId::AddressWrap, piece.line, 5, || {
+        findings.note(DefectId::AddressWrap, piece.line, column, || {
             format!("{} bytes from 0x{:08X} on run past the last address", piece.length(), piece.address)
         });
     }
 }
 
-fn overlaps(content: &Content, by_address: &[Piece], findings: &mut Findings) {
+fn overlaps(content: &Content, by_address: &[Piece], column: usize, findings: &mut Findings) {
     let mut furthest: Option<&Piece> = None;
     for piece in by_address {
         let this = span(content, piece);
@@ -230,7 +241,7 @@ fn overlaps(content: &Content, by_address: &[Piece], findings: &mut Findings) {
             let end = span(content, before).end;
             if this.start < end {
                 let (line, other) = (piece.line.max(before.line), piece.line.min(before.line));
-                findings.note(DefectId::Overlap, line, 5, || {
+                findings.note(DefectId::Overlap, line, column, || {
                     format!("{}: written by line {other} already", shown(this.start, this.end.min(end)))
                 });
             }
@@ -242,15 +253,34 @@ fn overlaps(content: &Content, by_address: &[Piece], findings: &mut Findings) {
     }
 }
 
-/// Whether the address carries the linker's mark for data memory.
-fn is_data_memory(piece: &Piece) -> bool {
-    piece.address >> 24 == DATA_MEMORY >> 24
+impl Judged {
+    /// Whether the address carries a mark for data memory: the linker's, or the one of a loader that knows such.
+    fn is_data_memory(&self, piece: &Piece) -> bool {
+        let mark_of_loader = match self.outside {
+            Outside::Folds | Outside::Unknown => piece.address >> 16 == DATA_HIGH_HALF,
+            Outside::Refuses => false,
+        };
+        piece.address >> 24 == DATA_MEMORY >> 24 || mark_of_loader
+    }
+
+    /// What becomes of data outside of the program flash, from this address on.
+    fn fate(&self, start: u64, flash_end: u64) -> String {
+        let folded = address(start % flash_end);
+        match self.outside {
+            Outside::Folds if start >> 16 < u64::from(DATA_HIGH_HALF) => {
+                format!("the loader folds that to {folded} over the program, silently")
+            }
+            Outside::Folds => "the loader skips that, silently".into(),
+            Outside::Refuses => "the loader stops there, with the old program erased".into(),
+            Outside::Unknown => format!("a loader skips that or folds it to {folded}, silently"),
+        }
+    }
 }
 
-fn data_memory(content: &Content, findings: &mut Findings) {
-    let flagged = content.pieces.iter().copied().filter(is_data_memory);
+fn data_memory(content: &Content, target: &Judged, column: usize, findings: &mut Findings) {
+    let flagged = content.pieces.iter().copied().filter(|piece| target.is_data_memory(piece));
     runs(content, flagged, |line, run| {
-        findings.note(DefectId::DataMemory, line, 5, || {
+        findings.note(DefectId::DataMemory, line, column, || {
             format!(
                 "{}: marked as data memory; loaders that do not know the mark write into the program",
                 shown(run.start, run.end)
@@ -259,21 +289,27 @@ fn data_memory(content: &Content, findings: &mut Findings) {
     });
 }
 
-fn out_of_range(content: &Content, target: &Judged, flash_end: u64, findings: &mut Findings) {
-    let outside = content.pieces.iter().copied().filter(|piece| {
-        let span = span(content, piece);
-        span.end > flash_end && span.end <= ADDRESSES && !is_data_memory(piece)
-    });
+/// Notes what lies outside of the program flash, the boot flash apart.
+fn elsewhere(content: &Content, target: &Judged, flash_end: u64, column: usize, findings: &mut Findings) {
     let whose = target.product.as_ref().map_or("any unit's".to_owned(), |product| format!("the {product}'s"));
-    runs(content, outside, |line, run| {
-        findings.note(DefectId::OutOfRange, line, 5, || {
+    let in_boot = |span: &AddressRange| target.boot.is_some_and(|boot| span.start < boot.end && boot.start < span.end);
+    let outside = |piece: &Piece| {
+        let span = span(content, piece);
+        span.end > flash_end && span.end <= ADDRESSES && !target.is_data_memory(piece)
+    };
+    let pieces = || content.pieces.iter().copied().filter(outside);
+    runs(content, pieces().filter(|piece| in_boot(&span(content, piece))), |line, run| {
+        findings.note(DefectId::BootFlash, line, column, || {
+            let fate = target.fate(run.start, flash_end);
+            format!("{}: {whose} boot flash, where the loader lives; {fate}", shown(run.start, run.end))
+        });
+    });
+    runs(content, pieces().filter(|piece| !in_boot(&span(content, piece))), |line, run| {
+        findings.note(DefectId::OutOfRange, line, column, || {
             let start = run.start.max(flash_end);
-            format!(
-                "{}: outside {whose} program flash (to {}); a loader skips that or folds it to {}, silently",
-                shown(start, run.end),
-                address(flash_end - 1),
-                address(start % flash_end),
-            )
+            let fate = target.fate(start, flash_end);
+            let last = address(flash_end - 1);
+            format!("{}: outside {whose} program flash (to {last}); {fate}", shown(start, run.end))
         });
     });
 }
@@ -297,7 +333,7 @@ fn runs(content: &Content, pieces: impl Iterator<Item = Piece>, mut each: impl F
     }
 }
 
-fn gaps(content: &Content, by_address: &[Piece], flash_end: u64, findings: &mut Findings) {
+fn gaps(content: &Content, by_address: &[Piece], flash_end: u64, column: usize, findings: &mut Findings) {
     let mut next = 0;
     for piece in by_address {
         let span = span(content, piece);
@@ -305,7 +341,7 @@ fn gaps(content: &Content, by_address: &[Piece], flash_end: u64, findings: &mut 
             break;
         }
         if span.start > next {
-            findings.note(DefectId::Gap, piece.line, 5, || {
+            findings.note(DefectId::Gap, piece.line, column, || {
                 format!("no record writes {}; what an older program left there may stay", shown(next, span.start))
             });
         }
@@ -331,7 +367,9 @@ fn address(address: u64) -> String {
     if address < 0x1_0000 { format!("0x{address:04X}") } else { format!("0x{address:08X}") }
 }
 
-/// Number of addresses an S3 record can name.
+/// Number of addresses a record can name.
 const ADDRESSES: u64 = 1 << 32;
 /// CodeWarrior's mark for data memory in an address.
 const DATA_MEMORY: u32 = 0x0200_0000;
+/// The upper half of addresses that loaders which fold take for data memory.
+const DATA_HIGH_HALF: u32 = 0x0020;

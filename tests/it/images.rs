@@ -33,7 +33,7 @@ const SOUND: [(&str, &str); 4] =
     [("AXTC4CO", "1.1.0"), ("AXTC4CO", "1.2.0"), ("AXRTD8CO", "2.1.1"), ("AXRTD8CO", "2.2.0")];
 
 /// The bad and the odd files, by defect, with the line at which each is found.
-const BAD: [(&str, u64); 40] = [
+const BAD: [(&str, u64); 41] = [
     ("empty-file", 1),
     ("not-s-record", 1),
     ("byte-order-mark", 1),
@@ -67,6 +67,7 @@ const BAD: [(&str, u64); 40] = [
     ("overlap", 16),
     ("address-unit", 3),
     ("out-of-range", 22),
+    ("boot-flash", 22),
     ("data-memory", 22),
     ("gap", 15),
     ("entry-outside", 22),
@@ -206,7 +207,15 @@ fn an_image_is_checked_against_the_flash_of_its_product() {
         report["defects"].as_array().expect("a list").iter().filter_map(|defect| defect["id"].as_str()).collect();
     assert!(defects.contains(&"wrong-product"), "{defects:?}");
 
-    // One word behind the last of 512 KByte.
+    // What becomes of data elsewhere depends on the loader.
+    let folded = in_tree_text("firmware_images/bad/boot-flash.elf.S");
+    let said = |options: &[&str]| text(&axcon(&[&["image", "check", &folded], options].concat()).stdout);
+    assert!(said(&[]).contains("folds that to 0x0000 over the program, silently"), "{}", said(&[]));
+    let refused = said(&["--loader", "g3"]);
+    assert!(refused.contains("the loader stops there, with the old program erased"), "{refused}");
+    assert_eq!(axcon(&["image", "check", "--loader", "g9", &folded]).status.code(), Some(2));
+
+    // Behind the last of 512 KByte and the boot flash.
     let folder = tempfile::tempdir().expect("a folder");
     let beyond = folder.path().join("AXRTD8CO_V2.2.0.elf.S").display().to_string();
     let recipe = ["--words", "320", "--defect", "out-of-range", "--out", &beyond];
@@ -215,7 +224,7 @@ fn an_image_is_checked_against_the_flash_of_its_product() {
     let refused = axcon(&["image", "check", &beyond]);
     assert_eq!(refused.status.code(), Some(5));
     let said = text(&refused.stdout);
-    assert!(said.contains("out-of-range") && said.contains("0x00040000: outside the AXRTD8CO"), "{said}");
+    assert!(said.contains("out-of-range") && said.contains("0x00044000: outside the AXRTD8CO"), "{said}");
 }
 
 #[test]

@@ -11,6 +11,8 @@ mod emulator;
 mod foreigner;
 #[cfg(unix)]
 mod hostile;
+mod image_corpus;
+mod image_files;
 mod images;
 #[cfg(unix)]
 mod live;

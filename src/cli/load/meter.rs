@@ -217,6 +217,6 @@ mod tests {
         board.set(0, "check".into());
         board.set(1, "done".into());
         let text = said(&shared);
-        assert!(text.ends_with("\x1b[2A\r/dev/ttyUSB0  check\x1b[K\r\nu1            done\x1b[K\r\n"), "{text:?}");
+        assert!(text.ends_with("\x1b[2A\r/dev/ttyUSB0  check\x1b[K\r\n\ru1            done\x1b[K\r\n"), "{text:?}");
     }
 }

@@ -1,0 +1,250 @@
+//! `axcon image`: work on program images without a unit.
+//!
+//! Reading a file and showing its report are shared with `axcon load`, which refuses for the same reasons in the same
+//! words. Comparing and converting have pages of their own; [`report`] says a report as text and JSON.
+
+mod convert;
+mod diff;
+mod report;
+mod save;
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use clap::Subcommand;
+
+use super::Global;
+use super::error::{CliError, Kind};
+use super::output::Output;
+use crate::device::{LoaderKind, Product};
+use crate::image::make::{self, Recipe};
+use crate::image::{self, DefectId, Report, Target};
+use crate::version::Version;
+
+pub use report::{DefectObject, ImageObject, defect_objects, report_text};
+use report::{contents, facts_text, grouped};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Find every defect of an image; exit code 5 if it must not be sent.
+    Check(CheckArgs),
+    /// Show what is in an image, sound or not.
+    Info(InfoArgs),
+    /// Compare two images; exit code 1 if they differ.
+    Diff(diff::Args),
+    /// Write an image in another format, with other addresses or records; it must be sound.
+    Convert(convert::Args),
+    /// Make a sample image for trials with an emulated unit.
+    // Its own --version says what to make.
+    #[command(disable_version_flag = true)]
+    Make(MakeArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct CheckArgs {
+    /// The image; - is standard input.
+    file: PathBuf,
+    /// The product it should be for.
+    #[arg(long, value_name = "NAME", value_parser = product)]
+    product: Option<&'static Product>,
+    /// The loader it is judged for; by default the one the product is believed to have.
+    #[arg(long, value_name = "PROFILE", value_parser = loader)]
+    loader: Option<LoaderKind>,
+    /// Let this error pass. What is allowed is still listed.
+    #[arg(long, value_name = "DEFECT", value_parser = allowable)]
+    allow: Vec<DefectId>,
+}
+
+#[derive(Debug, clap::Args)]
+struct InfoArgs {
+    /// The image; - is standard input.
+    file: PathBuf,
+}
+
+#[derive(Debug, clap::Args)]
+struct MakeArgs {
+    /// The product it is for.
+    #[arg(long, value_name = "NAME", value_parser = product)]
+    product: &'static Product,
+    /// The version it says it is, e.g. 1.2.0.
+    #[arg(long, value_name = "VERSION")]
+    version: Version,
+    /// Its size in 16-bit words; by default three quarters of the flash, 81,920 at most.
+    #[arg(long, value_name = "N")]
+    words: Option<u32>,
+    /// Give it this one defect.
+    #[arg(long, value_name = "DEFECT", value_parser = flaw)]
+    defect: Option<DefectId>,
+    /// Where to write it; - is standard output. By default the name the product's upload files have.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// If the image is refused or cannot be read or written.
+pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    match args.command {
+        Command::Check(args) => check(&args, output),
+        Command::Info(args) => info(&args, output),
+        Command::Diff(args) => diff::run(&args, output),
+        Command::Convert(args) => convert::run(&args, global, output),
+        Command::Make(args) => make(&args, global, output),
+    }
+}
+
+fn check(args: &CheckArgs, output: &mut Output) -> Result<(), CliError> {
+    let expected = args.product.map(|product| product.name.as_str());
+    let mut targets = targets();
+    if let Some(loader) = args.loader {
+        targets.iter_mut().for_each(|target| target.outside = loader.outside());
+    }
+    let report = read_for(&args.file, &targets, expected, &args.allow)?;
+    let name = shown(&args.file);
+    if output.json {
+        output.object(&ImageObject::new(&report, &name))?;
+    } else {
+        output.data(report_text(&report, &name).as_bytes())?;
+    }
+    if report.is_ok() { Ok(()) } else { Err(CliError::reported(Kind::ImageRefused)) }
+}
+
+fn info(args: &InfoArgs, output: &mut Output) -> Result<(), CliError> {
+    let report = read(&args.file, None, &[])?;
+    let name = shown(&args.file);
+    if output.json {
+        output.object(&ImageObject::new(&report, &name))
+    } else {
+        output.data(facts_text(&report, &name).as_bytes())
+    }
+}
+
+fn make(args: &MakeArgs, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let target = args.product.target();
+    let words = args.words.unwrap_or_else(|| make::usual_words(&target));
+    let recipe = Recipe { target: &target, version: args.version, words, flaw: args.defect };
+    let bytes = make::make(&recipe).map_err(|error| CliError::new(Kind::Usage, error))?;
+    let path = args.out.clone().unwrap_or_else(|| args.product.file_name(args.version).into());
+    if path == Path::new("-") {
+        return output.data(&bytes);
+    }
+    save::save(&path, &bytes, global.yes)?;
+    let report =
+        image::check(&bytes[..], None, &targets(), None, &[]).map_err(|error| CliError::new(Kind::Failed, error))?;
+    let name = shown(&path);
+    if output.json {
+        return output.object(&ImageObject::new(&report, &name));
+    }
+    output.remark(&format!("{name}: {}, {} bytes written", contents(&report), grouped(bytes.len() as u64)));
+    Ok(())
+}
+
+/// Reads and checks an image file for `image` and `load`.
+///
+/// # Errors
+/// Only if the file cannot be read: the kind is [`Kind::ImageRefused`] then. A bad file is a report.
+pub fn read(path: &Path, expected: Option<&str>, allow: &[DefectId]) -> Result<Report, CliError> {
+    read_for(path, &targets(), expected, allow)
+}
+
+fn read_for(path: &Path, targets: &[Target], expected: Option<&str>, allow: &[DefectId]) -> Result<Report, CliError> {
+    if path == Path::new("-") {
+        return checked(io::stdin().lock(), path, targets, expected, allow);
+    }
+    match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => {
+            let message = format!("{} is a directory, not an image file", shown(path));
+            return Err(CliError::message(Kind::ImageRefused, message).hint("Name the .S file itself."));
+        }
+        Ok(_) => {}
+        Err(error) => return Err(unreadable(path, error)),
+    }
+    let file = File::open(path).map_err(|error| unreadable(path, error))?;
+    checked(file, path, targets, expected, allow)
+}
+
+fn checked(
+    reader: impl Read,
+    path: &Path,
+    targets: &[Target],
+    expected: Option<&str>,
+    allow: &[DefectId],
+) -> Result<Report, CliError> {
+    let name = path.file_name().map(|name| name.to_string_lossy());
+    image::check(reader, name.as_deref(), targets, expected, allow).map_err(|error| unreadable(path, error))
+}
+
+fn unreadable(path: &Path, error: io::Error) -> CliError {
+    let hint = match error.kind() {
+        io::ErrorKind::NotFound => "Check the name; upload files are called like AXTC4CO_V1.2.0.elf.S.",
+        io::ErrorKind::PermissionDenied => "Ask whoever owns the file for the right to read it, or copy it.",
+        _ => "Copy the file to a local disk and try again.",
+    };
+    let context = format!("cannot read the image {}", shown(path));
+    CliError::new(Kind::ImageRefused, anyhow::Error::new(error).context(context)).hint(hint)
+}
+
+fn targets() -> Vec<Target> {
+    Product::all().iter().map(Product::target).collect()
+}
+
+pub(super) fn product(name: &str) -> Result<&'static Product, String> {
+    Product::named(name).ok_or_else(|| {
+        let known: Vec<&str> = Product::all().iter().map(|product| product.name.as_str()).collect();
+        format!("no such product; known: {}", known.join(", "))
+    })
+}
+
+fn loader(name: &str) -> Result<LoaderKind, String> {
+    LoaderKind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
+        let known: Vec<&str> = LoaderKind::ALL.into_iter().map(LoaderKind::name).collect();
+        format!("no such loader; known: {}", known.join(", "))
+    })
+}
+
+/// Reads the name of a defect that may be allowed; `load --allow` uses it too.
+///
+/// # Errors
+/// If there is none of this name, or if nothing could be sent in spite of it.
+pub fn allowable(name: &str) -> Result<DefectId, String> {
+    let id: DefectId = name.parse().map_err(|error| format!("{error}; `docs/images.md` lists them"))?;
+    if id.can_be_allowed() {
+        Ok(id)
+    } else {
+        Err("it leaves part of the program unknown, so it cannot be allowed".into())
+    }
+}
+
+fn flaw(name: &str) -> Result<DefectId, String> {
+    make::flaws().find(|id| id.name() == name).ok_or_else(|| {
+        let known: Vec<&str> = make::flaws().map(DefectId::name).collect();
+        format!("no such defect can be made; possible: {}", known.join(", "))
+    })
+}
+
+/// A path for the screen: a name may hold anything, a terminal must not get it.
+pub fn shown(path: &Path) -> String {
+    if path == Path::new("-") {
+        return "standard input".into();
+    }
+    path.to_string_lossy().chars().map(|letter| if letter.is_control() { '?' } else { letter }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_name_cannot_reach_the_terminal_as_control_codes() {
+        assert_eq!(shown(Path::new("a\x1b[31m.S")), "a?[31m.S");
+    }
+}
