@@ -51,7 +51,9 @@ impl Grammar for IntelHexFile {
     fn lose(&mut self, scan: &mut Scan, text: &[u8]) {
         match text.get(7..9).filter(|_| text.first() == Some(&b':')) {
             // Without data and offset it can hardly have been anything else.
-            Some(_) if text.starts_with(b":000000") => scan.terminator = Some(Terminator::Lost),
+            Some(kind) if text.starts_with(b":000000") && !kind.iter().all(u8::is_ascii_hexdigit) => {
+                scan.terminator = Some(Terminator::Lost);
+            }
             Some(b"01") => scan.terminator = Some(Terminator::Lost),
             Some(b"02" | b"04") => self.base = None,
             Some(b"03" | b"05") => self.start_seen = true,
