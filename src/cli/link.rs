@@ -94,7 +94,7 @@ pub fn link_error(error: LinkError) -> CliError {
         Cause::Baud { .. } => Kind::Usage,
     };
     let mut hints = Vec::new();
-    let is_network = matches!(error.port.parse(), Ok(LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_)));
+    let is_network = error.port.parse().is_ok_and(|spec: LinkSpec| spec.is_network());
     match &error.cause {
         Cause::Gone if is_network => {
             hints.push(

@@ -15,7 +15,7 @@ use super::clock::Clock;
 use super::lines::Lines;
 use super::network::NetworkError;
 use super::ports::{self, Holder};
-use super::socket::{self, Protocol};
+use super::socket::{self, Dialled, Protocol};
 use crate::device::Product;
 use crate::record::Adapter;
 use crate::time::Duration;
@@ -89,6 +89,13 @@ impl std::str::FromStr for LinkSpec {
             known: Product::all().iter().map(|product| format!("{EMULATED}{}", product.name.to_lowercase())).collect(),
         };
         Product::named(name).map(LinkSpec::Emulated).ok_or_else(unknown)
+    }
+}
+
+impl LinkSpec {
+    /// Whether opening it may take seconds, because somebody else has to answer.
+    pub fn is_network(&self) -> bool {
+        matches!(self, LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_))
     }
 }
 
@@ -253,17 +260,9 @@ impl Connection {
                 Ok(connection)
             }
             LinkSpec::Emulated(product) => Connection::emulated(spec, product, options, clock, inputs),
-            LinkSpec::Tcp(address) => {
-                let (lines, outgoing) =
-                    socket::open(&spec.to_string(), (Protocol::Raw, address), options, clock, inputs)?;
-                let mut connection = Connection::new(spec, options, lines, outgoing, Some("tcp".into()));
-                connection.settings = "line rate set by the server".into();
-                Ok(connection)
-            }
-            LinkSpec::Rfc2217(address) => {
-                let protocol = (Protocol::ComPort, address);
-                let (lines, outgoing) = socket::open(&spec.to_string(), protocol, options, clock, inputs)?;
-                Ok(Connection::new(spec, options, lines, outgoing, Some("rfc2217".into())))
+            LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_) => {
+                let dialled = Connection::dial(spec, options, clock)?;
+                Connection::over(spec, dialled, options, clock, inputs)
             }
             // There is no line: who can do with a recording opens it as one.
             LinkSpec::Replay(_) => Err(LinkError {
@@ -272,6 +271,42 @@ impl Connection {
                 cause: Cause::NotSerial { what: "a recording" },
             }),
         }
+    }
+
+    /// The part of opening a network link that may take seconds. Nothing comes before [`over`](Connection::over).
+    ///
+    /// # Errors
+    /// If nobody answers there, the port cannot be set up, or it is another kind of link.
+    pub fn dial(spec: &LinkSpec, options: Options, clock: Clock) -> Result<Dialled, LinkError> {
+        match spec {
+            LinkSpec::Tcp(address) => socket::dial(spec.to_string(), (Protocol::Raw, address), options, clock),
+            LinkSpec::Rfc2217(address) => socket::dial(spec.to_string(), (Protocol::ComPort, address), options, clock),
+            LinkSpec::Serial(_) | LinkSpec::Emulated(_) | LinkSpec::Replay(_) => Err(LinkError {
+                port: spec.to_string(),
+                operation: Operation::Open,
+                cause: Cause::Io(io::ErrorKind::Unsupported.into()),
+            }),
+        }
+    }
+
+    /// The rest of opening a network link: starts reading, as [`open`](Connection::open) does. Never waits.
+    ///
+    /// # Errors
+    /// If the system has no more threads.
+    pub fn over(
+        spec: &LinkSpec,
+        dialled: Dialled,
+        options: Options,
+        clock: Clock,
+        inputs: SyncSender<Input>,
+    ) -> Result<Self, LinkError> {
+        let driver = if matches!(spec, LinkSpec::Tcp(_)) { "tcp" } else { "rfc2217" };
+        let (lines, outgoing) = socket::start(dialled, clock, inputs)?;
+        let mut connection = Connection::new(spec, options, lines, outgoing, Some(driver.into()));
+        if matches!(spec, LinkSpec::Tcp(_)) {
+            connection.settings = "line rate set by the server".into();
+        }
+        Ok(connection)
     }
 
     #[cfg(unix)]

@@ -22,7 +22,7 @@ mod duplex;
 mod lines;
 #[cfg(unix)]
 mod serial;
-mod socket;
+pub mod socket;
 #[cfg(unix)]
 mod wait;
 

@@ -45,16 +45,30 @@ const READ: usize = 4096;
 /// wait on the channel itself could not be called off.
 const RETRY: Duration = Duration::from_millis(2);
 
-/// Connects, sets the port up where there is one to set up, and starts the threads; the sender feeds the writer, which
-/// ends when it is dropped. `name` is the link as the user wrote it.
-pub fn open(
-    name: &str,
+/// A connection that has come about, with its port set up where there is one to set up; nobody reads from it yet.
+#[derive(Debug)]
+pub struct Dialled {
+    name: String,
+    socket: TcpStream,
+    /// For a remote port only.
+    client: Option<Client>,
+    /// What the unit has said already.
+    early: Vec<u8>,
+}
+
+/// Connects, and sets the port up where there is one to set up. `name` is the link as the user wrote it. Takes as long
+/// as the other side lets it wait, within [`network::CONNECT_PATIENCE`] and [`network::SET_UP_PATIENCE`], and what the
+/// system needs to find the host.
+pub fn dial(
+    name: String,
     (protocol, address): (Protocol, &Address),
     options: Options,
     clock: Clock,
-    inputs: SyncSender<Input>,
-) -> Result<(Lines, SyncSender<Vec<u8>>), LinkError> {
-    let failed = |operation| move |cause: Cause| LinkError { port: name.to_owned(), operation, cause };
+) -> Result<Dialled, LinkError> {
+    let failed = |operation| {
+        let port = name.clone();
+        move |cause: Cause| LinkError { port, operation, cause }
+    };
     let socket = network::connect(address, clock).map_err(Cause::from).map_err(failed(Operation::Open))?;
     let mut early = Vec::new();
     let client = match protocol {
@@ -67,8 +81,21 @@ pub fn open(
             Some(client)
         }
     };
+    Ok(Dialled { name, socket, client, early })
+}
+
+/// Starts the threads; the sender feeds the writer, which ends when it is dropped.
+pub fn start(
+    dialled: Dialled,
+    clock: Clock,
+    inputs: SyncSender<Input>,
+) -> Result<(Lines, SyncSender<Vec<u8>>), LinkError> {
+    let Dialled { name, socket, client, early } = dialled;
+    let protocol = if client.is_some() { Protocol::ComPort } else { Protocol::Raw };
+    let port = name.clone();
+    let system = |error: io::Error| LinkError { port, operation: Operation::Open, cause: Cause::Io(error) };
     let shared = Arc::new(Shared {
-        name: name.to_owned(),
+        name,
         socket,
         inputs,
         turn: Mutex::new(()),
@@ -81,13 +108,15 @@ pub fn open(
     let (done, written) = sync_channel(1);
     let (over, ended) = sync_channel(1);
     let mut lines = Lines { shared: shared.clone(), threads: Vec::new(), written, ended };
-    let system = |error: io::Error| failed(Operation::Open)(Cause::Io(error));
     let reading = shared.clone();
     let reader = thread::Builder::new().name("port reader".into()).spawn(move || {
         reading.read(client, early, clock);
         let _ = over.try_send(());
     });
-    lines.threads.push(reader.map_err(system)?);
+    match reader {
+        Ok(reader) => lines.threads.push(reader),
+        Err(error) => return Err(system(error)),
+    }
     let writer = thread::Builder::new().name("port writer".into()).spawn(move || {
         shared.write(&queue, protocol);
         let _ = done.try_send(());

@@ -2,8 +2,8 @@
 //!
 //! Everything that happens comes on one channel; the app is told, its effects are performed in their order, and the
 //! picture is drawn when something has changed: at once after a key, else at most a frame apart. Nothing wakes the
-//! loop without an input or a due timer. Files, ports and folders are looked at in threads of their own, so that a
-//! slow disk does not hold the keys.
+//! loop without an input or a due timer. Files, ports and folders are looked at in threads of their own, and a network
+//! link is dialled in one, so that a slow disk or a silent host does not hold the keys.
 
 use std::collections::VecDeque;
 use std::io;
@@ -22,6 +22,7 @@ use crate::host::ports;
 use crate::host::recorder::{Plan, Recorder};
 use crate::host::replay::{Recording, RecordingError};
 use crate::host::signal::Signals;
+use crate::host::socket::Dialled;
 use crate::host::terminal::{self, Screen};
 use crate::record::{Direction, Ending, Piece};
 use crate::time::{Duration, Instant};
@@ -82,6 +83,7 @@ pub fn run(world: World) -> io::Result<End> {
         size: (size.width, size.height),
     });
     let (answer, answers) = channel();
+    let (dialling, dialled) = channel();
     let mut console = Console {
         app,
         world,
@@ -91,6 +93,9 @@ pub fn run(world: World) -> io::Result<End> {
         answer,
         answers,
         link: None,
+        dialling,
+        dialled,
+        dial: 0,
         comeback: None,
         retry: None,
         replay: None,
@@ -100,6 +105,9 @@ pub fn run(world: World) -> io::Result<End> {
     };
     console.serve(&mut screen)
 }
+
+/// Which dial, of what, and what came of it.
+type DialResult = (u64, String, LinkSpec, Result<Dialled, LinkError>);
 
 struct Console {
     app: App,
@@ -114,6 +122,11 @@ struct Console {
     /// What has to come back should the link be lost, and when it is looked for again once it is.
     comeback: Option<Comeback>,
     retry: Option<Instant>,
+    /// Where threads put what came of dialling a network link; they wake the loop behind it.
+    dialling: Sender<DialResult>,
+    dialled: Receiver<DialResult>,
+    /// The last dial, by number: whatever an earlier one brings is not wanted any more.
+    dial: u64,
     /// A recording that is being played.
     replay: Option<Replay>,
     /// By how much the console's time is ahead of the clock: recordings pass faster than they were made.
@@ -191,6 +204,9 @@ impl Console {
                     while let Ok(answer) = self.answers.try_recv() {
                         leaves |= self.handle(answer);
                     }
+                    while let Ok(result) = self.dialled.try_recv() {
+                        leaves |= self.take_dialled(result);
+                    }
                     leaves
                 }
                 host::Input::Typed(_) | host::Input::TypedEnd => false,
@@ -223,8 +239,13 @@ impl Console {
             match effect {
                 Effect::OpenLink(name) => {
                     self.close_link();
-                    let opened = self.open(&name);
-                    leaves |= self.handle(opened);
+                    match name.parse::<LinkSpec>() {
+                        Ok(spec) if spec.is_network() => self.dial(name, spec),
+                        Ok(_) | Err(_) => {
+                            let opened = self.open(&name);
+                            leaves |= self.handle(opened);
+                        }
+                    }
                 }
                 Effect::CloseLink => self.close_link(),
                 Effect::Transmit(transmit) => {
@@ -261,24 +282,55 @@ impl Console {
             };
         }
         match (self.world.open)(name, self.world.baud, self.clock, self.sender.clone()) {
-            Ok(connection) => {
-                self.recorder = Recorder::start(&self.world.recording, &connection, self.clock);
-                let recording = self.recorder.path().map(|path| path.display().to_string());
-                let recording = recording.or_else(|| self.recorder.take_warning());
-                let options = link::Options { baud: self.world.baud };
-                self.comeback = spec.ok().and_then(|spec| Comeback::of(&spec, &connection, options));
-                self.link = Some(connection);
-                let start_of_day = host::clock::day_before(self.clock.time_of_day(), self.skew);
-                Input::LinkOpened(LinkInfo {
-                    link: name.to_owned(),
-                    baud: self.world.baud,
-                    read_only: false,
-                    recording,
-                    start_of_day,
-                })
-            }
+            Ok(connection) => self.begin(name, connection, spec.ok()),
             Err(failure) => Input::LinkFailed(failure),
         }
+    }
+
+    /// Begins to dial a network link, in a thread: a host that is switched off answers nothing for seconds.
+    fn dial(&mut self, name: String, spec: LinkSpec) {
+        let (dial, clock, options) = (self.dial, self.clock, link::Options { baud: self.world.baud });
+        let (dialling, sender) = (self.dialling.clone(), self.sender.clone());
+        let begun = thread::Builder::new().name("dial".into()).spawn(move || {
+            let result = Connection::dial(&spec, options, clock);
+            if dialling.send((dial, name, spec, result)).is_ok() {
+                let _ = sender.send(host::Input::Wake);
+            }
+        });
+        debug_assert!(begun.is_ok());
+    }
+
+    /// Takes what came of dialling, unless the user has gone on to something else. Gives `true` when it is to end.
+    fn take_dialled(&mut self, (dial, name, spec, result): DialResult) -> bool {
+        if dial != self.dial {
+            return false;
+        }
+        let options = link::Options { baud: self.world.baud };
+        let connection =
+            result.and_then(|dialled| Connection::over(&spec, dialled, options, self.clock, self.sender.clone()));
+        let input = match connection {
+            Ok(connection) => self.begin(&name, connection, Some(spec)),
+            Err(error) => Input::LinkFailed((self.world.explain)(error)),
+        };
+        self.handle(input)
+    }
+
+    /// Takes over an open link and starts its recording.
+    fn begin(&mut self, name: &str, connection: Connection, spec: Option<LinkSpec>) -> Input {
+        self.recorder = Recorder::start(&self.world.recording, &connection, self.clock);
+        let recording = self.recorder.path().map(|path| path.display().to_string());
+        let recording = recording.or_else(|| self.recorder.take_warning());
+        let options = link::Options { baud: self.world.baud };
+        self.comeback = spec.and_then(|spec| Comeback::of(&spec, &connection, options));
+        self.link = Some(connection);
+        let start_of_day = host::clock::day_before(self.clock.time_of_day(), self.skew);
+        Input::LinkOpened(LinkInfo {
+            link: name.to_owned(),
+            baud: self.world.baud,
+            read_only: false,
+            recording,
+            start_of_day,
+        })
     }
 
     fn begin_replay(&mut self, name: &str, recording: Recording) -> Input {
@@ -366,6 +418,7 @@ impl Console {
 
     /// Closes the link; what it has put on the channel and nobody has taken is forgotten.
     fn close_link(&mut self) {
+        self.dial += 1;
         self.replay = None;
         self.comeback = None;
         self.retry = None;

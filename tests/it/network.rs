@@ -14,6 +14,7 @@ use axcon::host::clock::Clock;
 use axcon::host::link::{CLOSE_PATIENCE, Cause, Connection, Options};
 use axcon::host::{Input, channel};
 
+use crate::support::screen::Screen;
 use crate::support::server::Server;
 use crate::support::shell::{PATIENCE, Running, World};
 
@@ -288,6 +289,39 @@ fn closing_takes_a_bounded_time_when_the_other_side_reads_nothing() {
     drop(connection);
     assert!(begun.elapsed() < CLOSE_PATIENCE + PATIENCE / 2);
     go.send(()).expect("somebody waits");
+}
+
+// The console.
+
+#[test]
+fn the_console_shows_a_unit_behind_a_raw_socket() {
+    let world = World::new();
+    let _unit = unit(&world);
+    let server = Server::of_port(&world.path("u0"));
+    let mut screen = Screen::start(world.command(&["--port", &server.link(RAW)]), 24, 80);
+    let overview = screen.wait("application runs");
+    assert!(overview.contains("AXTC4CO") && overview.contains("tcp://127.0.0.1"), "{overview}");
+    screen.keys("q");
+    assert_eq!(screen.wait_end(), Some(0));
+}
+
+#[test]
+fn the_console_can_be_left_while_a_server_says_nothing_and_says_why_when_that_lasts() {
+    let server = Server::start(|mut client| {
+        let _ = client.read_to_end(&mut Vec::new());
+    });
+    let world = World::new();
+    for leaves in [true, false] {
+        let mut screen = Screen::start(world.command(&["--port", &server.link(RFC2217)]), 24, 100);
+        screen.wait("Opening rfc2217://127.0.0.1");
+        if leaves {
+            screen.keys("q");
+            assert_eq!(screen.wait_end(), Some(0));
+        } else {
+            let failed = screen.wait("Not connected");
+            assert!(failed.contains("no word of telnet"), "{failed}");
+        }
+    }
 }
 
 // The foreign server.
