@@ -2,7 +2,7 @@
 //!
 //! `:`, a length byte (of the data alone), a two-byte offset, a type, data, and a check sum: all bytes add up to 0
 //! modulo 256. Six types: data, the end, two ways to say where the 64 K of the offsets lie, and two to name the entry
-//! point. Whole-file rules are [`super::ihex_file`]'s. Lines are read here, since a file may hold anything and a defect
+//! point. Whole-file rules are `ihex_file`'s. Lines are read here, since a file may hold anything and a defect
 //! needs its column; they are written by the crate `ihex`.
 
 use std::fmt;

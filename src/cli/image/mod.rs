@@ -1,7 +1,7 @@
 //! `axcon image`: work on program images without a unit.
 //!
 //! Reading a file and showing its report are shared with `axcon load`, which refuses for the same reasons in the same
-//! words. Comparing and converting have pages of their own; [`report`] says a report as text and JSON.
+//! words. Comparing and converting have pages of their own; `report` says a report as text and JSON.
 
 mod convert;
 mod diff;
