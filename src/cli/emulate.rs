@@ -35,6 +35,11 @@ pub struct Args {
     /// Which bootloader is in the unit, if not the product's own.
     #[arg(long, value_name = "PROFILE", value_parser = loader)]
     loader: Option<LoaderKind>,
+    /// Let something go wrong: bytes lost, an XON that never comes, a reset or a power cut in the middle of a file, flash
+    /// that fails, a slow adapter, a pulled cable. Several are possible; a number before SPEC says which unit it is for,
+    /// else it is for all. docs/emulator.md describes them, and so does `help faults` on standard input.
+    #[arg(long = "fault", value_name = "SPEC", action = clap::ArgAction::Append)]
+    faults: Vec<String>,
     /// So many units of each product.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=MOST_UNITS as i64))]
     count: u16,
@@ -82,6 +87,7 @@ mod hosting {
     use crate::device::Complaint;
     use crate::device::Product;
     use crate::emulator::Unit;
+    use crate::emulator::fault::{self, Fault};
     use crate::emulator::scenario::{self, LARGEST_FILE, Scenario, Stage, Verb};
     use crate::host::Input;
     use crate::host::pty::{PortLink, PortLinkError};
@@ -93,6 +99,7 @@ mod hosting {
     #[derive(Serialize)]
     struct Started<'a> {
         schema: &'static str,
+        unit: usize,
         product: &'a str,
         serial: String,
         pty: String,
@@ -102,6 +109,8 @@ mod hosting {
     struct Running {
         link: Option<PortLink>,
         unit: HostedUnit,
+        /// The pseudo-terminal it is on.
+        pty: PathBuf,
         product: &'static Product,
     }
 
@@ -114,6 +123,11 @@ mod hosting {
             place: usize,
             verb: String,
             answer: Answer,
+        },
+        /// The cable of a unit is in again.
+        Replugged {
+            place: usize,
+            pty: PathBuf,
         },
         Failed(HostError),
     }
@@ -137,19 +151,20 @@ mod hosting {
     /// If a unit cannot be hosted, at the start or later.
     pub fn run(args: Args, _global: &Global, output: &mut Output) -> Result<(), CliError> {
         let products = products(&args)?;
+        let faults = faults(&args.faults, &products)?;
         let scenario = args.scenario.as_deref().map(read_scenario).transpose()?;
         let (news, happened) = std::sync::mpsc::sync_channel(NEWS);
         // Signals first: an interrupt in between would leave links behind.
         let signals = listen_for_signals(news.clone())?;
         let mut units = Vec::new();
         for (place, product) in products.into_iter().enumerate() {
-            units.push(start(&args, place, product, scenario.as_ref(), news.clone(), output)?);
+            units.push(start(&args, place, product, scenario.as_ref(), &faults[place], news.clone(), output)?);
         }
-        for running in &units {
-            announce(running, output)?;
+        for (place, running) in units.iter().enumerate() {
+            announce(place, running, "", output)?;
         }
         listen_for_lines(news.clone())?;
-        let end = serve(&units, &news, &happened, output);
+        let end = serve(&args, &mut units, &news, &happened, output);
         drop(signals);
         end
     }
@@ -169,6 +184,43 @@ mod hosting {
             return Err(CliError::message(Kind::Usage, message).hint("start 'axcon emulate' several times"));
         }
         Ok(products)
+    }
+
+    /// The faults of each unit.
+    fn faults(specs: &[String], products: &[&Product]) -> Result<Vec<Vec<Fault>>, CliError> {
+        let mut faults = vec![Vec::new(); products.len()];
+        for spec in specs {
+            let refused = |complaint: String| {
+                let shown = crate::wire::visible::line(spec.as_bytes());
+                CliError::message(Kind::Usage, format!("--fault '{shown}': {complaint}"))
+                    .hint("docs/emulator.md describes the faults, for example: --fault 'lost to-unit at byte 5000'")
+            };
+            let (places, begin) = places(spec, products.len()).map_err(refused)?;
+            // Blank as many columns as stand before the fault, so that its complaints count them.
+            let blanks = spec.chars().count() - spec.chars().skip(begin).count();
+            let fault: String = std::iter::repeat_n(' ', blanks).chain(spec.chars().skip(begin)).collect();
+            for place in places.unwrap_or_else(|| (0..products.len()).collect()) {
+                let fault = Fault::read(&fault, products[place]).map_err(|error| refused(error.to_string()))?;
+                faults[place].push(fault);
+            }
+        }
+        Ok(faults)
+    }
+
+    /// The units that a line names with its first word, if it does, and where the rest of it begins, in characters.
+    fn places(line: &str, units: usize) -> Result<(Option<Vec<usize>>, usize), String> {
+        let trimmed = line.trim_start();
+        let before = line.chars().count() - trimmed.chars().count();
+        let first = trimmed.split(char::is_whitespace).next().unwrap_or_default();
+        let behind = before + first.chars().count();
+        if first.eq_ignore_ascii_case("all") {
+            return Ok((Some((0..units).collect()), behind));
+        }
+        match first.parse::<usize>() {
+            Ok(number) if (1..=units).contains(&number) => Ok((Some(vec![number - 1]), behind)),
+            Ok(number) => Err(format!("there is no unit {number}: they are numbered 1 to {units}")),
+            Err(_) => Ok((None, 0)),
+        }
     }
 
     /// A scenario's file: its name and its text.
@@ -196,6 +248,7 @@ mod hosting {
         place: usize,
         product: &'static Product,
         scenario: Option<&(String, String)>,
+        faults: &[Fault],
         news: SyncSender<News>,
         output: &mut Output,
     ) -> Result<Running, CliError> {
@@ -227,24 +280,30 @@ mod hosting {
                 Some(state)
             }
         };
-        let emulated = Stage::new(Unit::new(setup), scenario);
+        let emulated = Stage::new(Unit::new(setup), scenario).with_faults(seed, faults);
+        let plugs = news.clone();
         let hosting = Hosting {
             line_rate: if args.line_rate == "off" { LineRate::Off } else { LineRate::Real },
             state,
             seed,
+            // The unit's thread must not wait for us: should this be dropped, `unplug` and `plug` bring it again.
+            replugged: Some(Box::new(move |pty| {
+                let _ = plugs.try_send(News::Replugged { place, pty: pty.to_owned() });
+            })),
             failed: Some(Box::new(move |error| {
                 let _ = news.send(News::Failed(error));
             })),
             ..Hosting::default()
         };
         let unit = HostedUnit::start(emulated, hosting).map_err(|error| CliError::new(Kind::Failed, error))?;
-        let link = args
-            .link
-            .as_ref()
-            .map(|link| PortLink::create(&numbered(link, place), unit.serial()))
-            .transpose()
-            .map_err(link_error)?;
-        Ok(Running { link, unit, product })
+        let pty = unit.serial().to_owned();
+        let link = link(args, place, &pty)?;
+        Ok(Running { link, unit, pty, product })
+    }
+
+    fn link(args: &Args, place: usize, pty: &Path) -> Result<Option<PortLink>, CliError> {
+        let link = args.link.as_ref().map(|link| PortLink::create(&numbered(link, place), pty));
+        link.transpose().map_err(link_error)
     }
 
     fn link_error(error: PortLinkError) -> CliError {
@@ -254,19 +313,20 @@ mod hosting {
         }
     }
 
-    fn announce(running: &Running, output: &mut Output) -> Result<(), CliError> {
-        let pty = running.unit.serial().display().to_string();
+    fn announce(place: usize, running: &Running, prefix: &str, output: &mut Output) -> Result<(), CliError> {
+        let pty = running.pty.display().to_string();
         let serial = running.link.as_ref().map_or_else(|| pty.clone(), |link| link.path().display().to_string());
         if output.json {
             let product = running.product.name.as_str();
-            output.object(&Started { schema: "axcon.emulate/1", product, serial, pty })
+            output.object(&Started { schema: "axcon.emulate/1", unit: place + 1, product, serial, pty })
         } else {
-            output.data(format!("serial: {serial}\n").as_bytes())
+            output.data(format!("{prefix}serial: {serial}\n").as_bytes())
         }
     }
 
     fn serve(
-        units: &[Running],
+        args: &Args,
+        units: &mut [Running],
         news: &SyncSender<News>,
         happened: &Receiver<News>,
         output: &mut Output,
@@ -279,6 +339,7 @@ mod hosting {
                         Ok(None) => {}
                         Ok(Some(Order::Quit)) => return Ok(()),
                         Ok(Some(Order::Help)) => output.remark(&help()),
+                        Ok(Some(Order::HelpFaults)) => output.remark(fault::HELP),
                         Ok(Some(Order::Tell(verbs))) => {
                             for (place, verb) in verbs {
                                 tell(&units[place], place, verb, line.trim(), news, output);
@@ -288,6 +349,14 @@ mod hosting {
                     }
                 }
                 Ok(News::Answered { place, verb, answer }) => report(place, &verb, &answer, units.len(), output)?,
+                Ok(News::Replugged { place, pty }) => {
+                    let prefix = prefix(place, units.len());
+                    let running = &mut units[place];
+                    running.link = None;
+                    running.link = link(args, place, &pty)?;
+                    running.pty = pty;
+                    announce(place, running, &prefix, output)?;
+                }
                 Ok(News::Failed(error)) => return Err(CliError::new(Kind::Failed, error)),
                 Ok(News::Input(Input::Signal(_))) | Err(_) => return Ok(()),
                 Ok(News::Input(_)) => {}
@@ -313,7 +382,7 @@ mod hosting {
             let schema = "axcon.emulate-answer/1";
             return output.object(&Answered { schema, unit: place + 1, verb, ok: answer.is_ok(), said });
         }
-        let unit = if units > 1 { format!("{}: ", place + 1) } else { String::new() };
+        let unit = prefix(place, units);
         match answer {
             Ok(None) => Ok(()),
             Ok(Some(said)) => output.data(format!("{unit}{said}\n").as_bytes()),
@@ -322,6 +391,11 @@ mod hosting {
                 Ok(())
             }
         }
+    }
+
+    /// What tells the units of a run apart in text.
+    fn prefix(place: usize, units: usize) -> String {
+        if units > 1 { format!("{}: ", place + 1) } else { String::new() }
     }
 
     fn listen_for_signals(news: SyncSender<News>) -> Result<Signals, CliError> {
@@ -364,13 +438,14 @@ mod hosting {
     enum Order {
         Quit,
         Help,
+        HelpFaults,
         /// Verbs with the places of their units.
         Tell(Vec<(usize, Verb)>),
     }
 
     fn help() -> String {
         format!(
-            "{}\nquit                       end\nhelp                       this text\n\
+            "{}\nquit                       end\nhelp, help faults          this text, and what can go wrong\n\
              With several units, a number first says which one: 2 power off; 'all' means every one",
             scenario::HELP
         )
@@ -384,21 +459,15 @@ mod hosting {
                 "" => return Ok(None),
                 "quit" => return Ok(Some(Order::Quit)),
                 "help" => return Ok(Some(Order::Help)),
+                "help faults" => return Ok(Some(Order::HelpFaults)),
                 _ => {}
             }
-            let (first, rest) = trimmed.split_once(char::is_whitespace).unwrap_or((trimmed, ""));
-            let (places, verb) = if first.eq_ignore_ascii_case("all") {
-                ((0..products.len()).collect(), rest)
-            } else if let Ok(number) = first.parse::<usize>() {
-                if number == 0 || number > products.len() {
-                    return Err(format!("there is no unit {number}: they are numbered 1 to {}", products.len()));
-                }
-                (vec![number - 1], rest)
-            } else {
-                (vec![0], trimmed)
-            };
+            let (places, begin) = places(trimmed, products.len())?;
+            let places = places.unwrap_or_else(|| vec![0]);
+            let verb: String = trimmed.chars().skip(begin).collect();
+            let verb = verb.trim_start();
             let verbs = places.into_iter().map(|place| Ok((place, Verb::read(verb, products[place])?)));
-            let verbs: Result<Vec<_>, scenario::VerbError> = verbs.collect();
+            let verbs: Result<Vec<_>, scenario::WordError> = verbs.collect();
             verbs.map(|verbs| Some(Order::Tell(verbs))).map_err(|error| {
                 format!("{}: {error} ('help' says what there is)", crate::wire::visible::line(verb.as_bytes()))
             })
@@ -418,6 +487,7 @@ mod hosting {
     #[cfg(test)]
     mod tests {
         use super::*;
+        use crate::time::Duration;
 
         #[test]
         fn orders_name_their_units_and_bad_ones_name_the_good() {
@@ -436,6 +506,32 @@ mod hosting {
                 "{complaint}"
             );
             assert!(read("2").expect_err("nothing to do").contains("a verb is missing"));
+            assert_eq!(read("help  faults").map_err(|complaint| complaint.contains("'help' is not known")), Err(true));
+            assert_eq!(read("Help Faults"), Ok(Some(Order::HelpFaults)));
+            let fault = Fault::read("queue 64", products[1]).expect("a fault");
+            assert_eq!(read("2 fault queue 64"), tell(&[(1, Verb::Fault(fault))]));
+        }
+
+        #[test]
+        fn faults_are_for_all_units_or_the_one_that_is_named() {
+            let products: Vec<&Product> = Product::all().iter().collect();
+            let read = |specs: &[&str]| {
+                let specs: Vec<String> = specs.iter().map(|&spec| spec.to_owned()).collect();
+                faults(&specs, &products).map_err(|error| error.to_string())
+            };
+            let (latency, queue) = (Fault::Latency(Duration::from_millis(16)), Fault::Queue(64));
+            assert_eq!(read(&["latency 16", " 2 queue 64"]), Ok(vec![vec![latency], vec![latency, queue]]));
+            // Only the second unit has so much flash.
+            assert!(read(&["2 flash stuck at word 0x20000"]).is_ok());
+            let complaint = read(&["flash stuck at word 0x20000"]).expect_err("the first has not");
+            assert!(
+                complaint.starts_with("--fault 'flash stuck at word 0x20000': column 21: '0x20000' is not 0"),
+                "{complaint}"
+            );
+            let complaint = read(&[" 1  explode"]).expect_err("no fault");
+            assert!(complaint.starts_with("--fault ' 1  explode': column 5: 'explode' is not known"), "{complaint}");
+            let complaint = read(&["3 latency 1"]).expect_err("no such unit");
+            assert!(complaint.contains("there is no unit 3: they are numbered 1 to 2"), "{complaint}");
         }
 
         #[test]

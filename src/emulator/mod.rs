@@ -11,6 +11,7 @@
 mod bootloader;
 pub mod cable;
 mod dialect;
+pub mod fault;
 pub mod faults;
 mod firmware;
 pub mod its90;
@@ -23,6 +24,7 @@ pub mod rtd_curve;
 pub mod scenario;
 pub mod sensors;
 mod uart;
+pub mod words;
 
 pub use network::{NetworkState, NmtCommand};
 

@@ -40,8 +40,18 @@ pub trait Hosted: Endpoint + Send + 'static {
     /// # Errors
     /// If the unit refuses.
     fn perform(&mut self, now: Instant, verb: &Verb) -> Answer;
-    /// Whether the unit has sent XOFF and not yet XON.
+    /// Whether the client has heard XOFF and not yet XON.
     fn holds_sender(&self) -> bool;
+    /// Another client has come, which knows nothing of an XOFF.
+    fn forget_hold(&mut self) {}
+    /// Bytes that an adapter takes ahead of the line, beside [`AHEAD`].
+    fn queue(&self) -> usize {
+        0
+    }
+    /// Whether the cable is in.
+    fn is_plugged(&self) -> bool {
+        true
+    }
     /// The next write to memory that outlives the power.
     fn poll_store(&mut self) -> Option<Store>;
 }
@@ -59,7 +69,19 @@ impl Hosted for Stage {
     }
 
     fn holds_sender(&self) -> bool {
-        self.unit().holds_sender()
+        self.holds_client()
+    }
+
+    fn forget_hold(&mut self) {
+        Stage::forget_hold(self);
+    }
+
+    fn queue(&self) -> usize {
+        Stage::queue(self)
+    }
+
+    fn is_plugged(&self) -> bool {
+        Stage::is_plugged(self)
     }
 
     fn poll_store(&mut self) -> Option<Store> {
@@ -89,6 +111,8 @@ pub struct Hosting {
     pub state: Option<State>,
     /// Decides what garbage looks like.
     pub seed: u64,
+    /// Called from the unit's thread when a cable that was pulled is in again, with what a client opens from then on.
+    pub replugged: Option<Box<dyn FnMut(&Path) + Send>>,
     /// Called once, from the unit's thread, if hosting fails later on.
     pub failed: Option<Box<dyn FnOnce(HostError) + Send>>,
 }
@@ -190,6 +214,8 @@ impl HostedUnit {
             line_rate: hosting.line_rate,
             power: hosting.power,
             state: hosting.state,
+            replugged: hosting.replugged,
+            cable_is_in: true,
             garbage: Rng::new(hosting.seed),
             attended: false,
             client: ClientSettings { baud: BAUD, obeys_xoff: false },
@@ -212,7 +238,7 @@ impl HostedUnit {
         Ok(HostedUnit { serial, counts, orders: sender, bell: Some(bell), thread: Some(thread) })
     }
 
-    /// What a client opens.
+    /// What a client opens, as long as nobody has pulled the cable.
     pub fn serial(&self) -> &Path {
         &self.serial
     }
@@ -252,6 +278,8 @@ struct Host<U> {
     line_rate: LineRate,
     power: Power,
     state: Option<State>,
+    replugged: Option<Box<dyn FnMut(&Path) + Send>>,
+    cable_is_in: bool,
     garbage: Rng,
     /// Whether anybody has the port open.
     attended: bool,
@@ -305,6 +333,9 @@ impl<U: Hosted> Host<U> {
     fn note_visits(&mut self) -> Result<(), HostError> {
         let visits = self.pty.visits().map_err(|error| HostError::Pty("watch", error))?;
         if visits.contains(&Visit::Opened) {
+            if !self.attended {
+                self.plugged.unit_mut().forget_hold();
+            }
             self.attended = true;
             self.leaving = false;
             if self.power == Power::AtFirstClient {
@@ -339,7 +370,8 @@ impl<U: Hosted> Host<U> {
         self.at = at;
         match self.line_rate {
             LineRate::Real => {
-                self.take_bytes(AHEAD.saturating_sub(self.plugged.to_unit().in_flight()))?;
+                let ahead = AHEAD + self.plugged.unit().queue();
+                self.take_bytes(ahead.saturating_sub(self.plugged.to_unit().in_flight()))?;
                 self.advance()?;
             }
             LineRate::Off => {
@@ -353,6 +385,27 @@ impl<U: Hosted> Host<U> {
                 }
             }
         }
+        self.note_cable()
+    }
+
+    /// A cable that is pulled hangs up on the client, like an adapter that is pulled; in again, it is another port.
+    fn note_cable(&mut self) -> Result<(), HostError> {
+        let is_in = self.plugged.unit().is_plugged();
+        if is_in == self.cable_is_in {
+            return Ok(());
+        }
+        self.cable_is_in = is_in;
+        if is_in {
+            if let Some(replugged) = &mut self.replugged {
+                replugged(self.pty.path());
+            }
+            return Ok(());
+        }
+        // The new one is there before the old one goes, so it cannot get its name: who opens that finds no port.
+        self.pty = Pty::open(BAUD).map_err(|error| HostError::Pty("open", error))?;
+        self.client = ClientSettings { baud: BAUD, obeys_xoff: false };
+        (self.attended, self.leaving, self.backlog) = (false, false, false);
+        self.heard.clear();
         Ok(())
     }
 
@@ -368,8 +421,8 @@ impl<U: Hosted> Host<U> {
         if room == 0 {
             return Ok(0);
         }
-        let mut buffer = [0; AHEAD];
-        let count = self.pty.read(&mut buffer[..room]).map_err(|error| HostError::Pty("read", error))?;
+        let mut buffer = [0; BURST];
+        let count = self.pty.read(&mut buffer[..room.min(BURST)]).map_err(|error| HostError::Pty("read", error))?;
         // Few bytes need not be all: the system carries them over in its own time. The next slice looks again.
         self.backlog = count > 0;
         if count == 0 {
@@ -391,7 +444,7 @@ impl<U: Hosted> Host<U> {
         Ok(count)
     }
 
-    /// Whether what waits in the pseudo-terminal may go on the line: not while the unit holds a client that obeys.
+    /// Whether what waits in the pseudo-terminal may go on the line: not while a client that obeys is held.
     fn takes_bytes(&self) -> bool {
         !(self.plugged.unit().holds_sender() && self.client.obeys_xoff)
     }

@@ -1,15 +1,20 @@
 //! Scenarios: what happens to a unit, and when, as a file says it.
 //!
 //! A file is TOML with deeds at moments and ramps between moments; `docs/emulator.md` describes it. A [`Scenario`] is
-//! what was read, the [`Stage`] is a unit with its scenario playing: an endpoint like the unit alone.
+//! what was read, the [`Stage`] is a unit with its scenario playing and its faults happening: an endpoint like the unit
+//! alone.
 
 mod verb;
 
-pub use verb::{HELP, Verb, VerbError};
+pub use super::words::WordError;
+pub use verb::{HELP, Verb};
+
+use std::collections::VecDeque;
 
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::fault::{Arrival, Deed, Fault, Middleman, Way};
 use super::{NetworkState, Running, Store, Unit};
 use crate::device::{Complaint, Complaints, Product};
 use crate::endpoint::{Endpoint, Transmit};
@@ -149,16 +154,16 @@ fn seconds(raw: &Spanned<f64>, key: &str, complaints: &mut Complaints<'_>) -> Du
 }
 
 /// A verb that does something; a file has nobody to answer.
-fn act(line: &str, product: &Product) -> Result<Verb, VerbError> {
+fn act(line: &str, product: &Product) -> Result<Verb, WordError> {
     match Verb::read(line, product)? {
         Verb::Read(_) | Verb::Status => {
-            Err(VerbError { column: 1, message: "a scenario does things; nobody would hear the answer".into() })
+            Err(WordError { column: 1, message: "a scenario does things; nobody would hear the answer".into() })
         }
         verb => Ok(verb),
     }
 }
 
-/// A unit with its scenario playing.
+/// A unit with its scenario playing, on a cable with faults.
 #[derive(Debug)]
 pub struct Stage {
     unit: Unit,
@@ -169,6 +174,9 @@ pub struct Stage {
     next: usize,
     /// When the supply comes back.
     power_at: Option<Instant>,
+    middleman: Middleman,
+    /// What the client gets.
+    outgoing: VecDeque<Transmit>,
 }
 
 impl Stage {
@@ -179,7 +187,25 @@ impl Stage {
 
     /// A unit whose scenario begins at time zero.
     pub fn new(unit: Unit, scenario: Scenario) -> Self {
-        Stage { unit, scenario, began: Instant::ZERO, next: 0, power_at: None }
+        Stage {
+            unit,
+            scenario,
+            began: Instant::ZERO,
+            next: 0,
+            power_at: None,
+            middleman: Middleman::new(0),
+            outgoing: VecDeque::new(),
+        }
+    }
+
+    /// The same with these faults from the beginning on; `seed` decides what chance decides about them, and about those
+    /// ordered later.
+    pub fn with_faults(mut self, seed: u64, faults: &[Fault]) -> Self {
+        self.middleman = Middleman::new(seed);
+        for &fault in faults {
+            self.suffer(fault);
+        }
+        self
     }
 
     /// The unit.
@@ -187,16 +213,43 @@ impl Stage {
         &self.unit
     }
 
+    /// The unit, to do something to it that no verb does.
+    pub fn unit_mut(&mut self) -> &mut Unit {
+        &mut self.unit
+    }
+
+    /// Whether the client has heard XOFF and not yet XON. A unit that starts anew holds nobody.
+    pub fn holds_client(&self) -> bool {
+        self.middleman.client_is_held() && self.unit.running() == Running::Loader
+    }
+
+    /// Another client has come: it knows nothing of an XOFF.
+    pub fn forget_hold(&mut self) {
+        self.middleman.forget_hold();
+    }
+
+    /// Whether the cable is in.
+    pub fn is_plugged(&self) -> bool {
+        self.middleman.is_plugged()
+    }
+
+    /// Bytes that the adapter takes ahead of the line.
+    pub fn queue(&self) -> usize {
+        self.middleman.queue()
+    }
+
     /// Supply voltage comes.
     pub fn power_on(&mut self, now: Instant) {
         self.power_at = None;
         self.unit.power_on(now);
+        self.collect(now);
     }
 
     /// Supply voltage goes.
     pub fn power_off(&mut self, now: Instant) {
         self.power_at = None;
         self.unit.power_off(now);
+        self.collect(now);
     }
 
     /// The next write to memory that outlives the power.
@@ -210,7 +263,74 @@ impl Stage {
     /// If the unit refuses, with its reason.
     pub fn perform(&mut self, now: Instant, verb: &Verb) -> Result<Option<String>, String> {
         self.handle_timeout(now);
-        self.act(now, verb)
+        let answer = self.act(now, verb);
+        self.collect(now);
+        answer
+    }
+
+    fn suffer(&mut self, fault: Fault) {
+        if let Fault::Flash { word, defect } = fault {
+            self.unit.spoil_word(word, defect);
+        }
+        self.middleman.order(fault);
+    }
+
+    /// What the unit has sent goes on the cable, and what has arrived to the client.
+    fn collect(&mut self, now: Instant) {
+        while let Some(transmit) = self.unit.poll_transmit() {
+            if self.middleman.is_idle() {
+                self.middleman.note_client_heard(&transmit.bytes);
+                self.outgoing.push_back(transmit);
+            } else {
+                transmit.bytes.iter().for_each(|&byte| self.middleman.carry(now, Way::FromUnit, byte));
+            }
+        }
+        let arrived: Vec<u8> = std::iter::from_fn(|| self.middleman.next_to_client(now)).collect();
+        if !arrived.is_empty() {
+            self.middleman.note_client_heard(&arrived);
+            self.outgoing.push_back(Transmit::open(arrived));
+        }
+        if matches!(self.unit.running(), Running::Off | Running::Starting) {
+            self.middleman.forget_hold();
+        }
+    }
+
+    /// Something arrives at the unit.
+    fn deliver(&mut self, now: Instant, arrival: Arrival) {
+        let loads = self.unit.running() == Running::Loader;
+        match arrival {
+            Arrival::Byte(byte) => self.unit.handle_bytes(now, &[byte]),
+            Arrival::Unreadable => self.unit.handle_framing_error(now),
+        }
+        self.collect(now);
+        if !loads {
+            self.middleman.note_no_loader();
+            return;
+        }
+        for deed in self.middleman.note_loader_got(arrival) {
+            self.power_off(now);
+            match deed {
+                Deed::Reset => self.power_on(now),
+                Deed::PowerCut(off) => self.power_at = off.map(|off| now + off),
+            }
+        }
+    }
+
+    /// Does what is due at this moment.
+    fn step(&mut self, now: Instant) {
+        self.unit.handle_timeout(now);
+        self.collect(now);
+        if self.power_at.is_some_and(|at| at <= now) {
+            self.power_on(now);
+        }
+        if self.due().is_some_and(|at| at <= now) {
+            self.play(now);
+            self.collect(now);
+        }
+        self.middleman.handle_timeout(now);
+        while let Some(arrival) = self.middleman.next_to_unit(now) {
+            self.deliver(now, arrival);
+        }
     }
 
     fn act(&mut self, now: Instant, verb: &Verb) -> Result<Option<String>, String> {
@@ -234,6 +354,12 @@ impl Stage {
                 let unit = entry.and_then(|entry| entry.unit.as_deref()).map(|unit| format!(" {unit}"));
                 return Ok(Some(format!("{at} = {value}{}{}", unit.unwrap_or_default(), meaning.unwrap_or_default())));
             }
+            Verb::Fault(fault) => self.suffer(*fault),
+            Verb::Heal => {
+                self.middleman.heal();
+                self.unit.repair_flash();
+            }
+            Verb::Plug(plugged) => self.middleman.plug(*plugged),
             Verb::Status => return Ok(Some(self.status())),
         }
         Ok(None)
@@ -251,7 +377,8 @@ impl Stage {
                 Some(NetworkState::PreOperational) | None => "runs, pre-operational",
             },
         };
-        format!("{product} {state}")
+        let cable = if self.middleman.is_plugged() { "" } else { ", its cable is out" };
+        format!("{product} {state}{cable}")
     }
 
     /// When the scenario has something to do.
@@ -277,31 +404,39 @@ impl Stage {
 
     /// The next moment of the stage's own.
     fn own_deadline(&self) -> Option<Instant> {
-        [self.due(), self.power_at].into_iter().flatten().min()
+        [self.due(), self.power_at, self.middleman.deadline()].into_iter().flatten().min()
     }
 }
 
 impl Endpoint for Stage {
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.handle_timeout(now);
-        self.unit.handle_bytes(now, bytes);
+        if self.middleman.is_idle() {
+            self.unit.handle_bytes(now, bytes);
+            self.collect(now);
+            return;
+        }
+        bytes.iter().for_each(|&byte| self.middleman.carry(now, Way::ToUnit, byte));
+        self.step(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        while let Some(due) = self.own_deadline().filter(|&due| due <= now) {
-            self.unit.handle_timeout(due);
-            if self.power_at.is_some_and(|at| at <= due) {
-                self.power_on(due);
+        loop {
+            let mut due = self.own_deadline();
+            if !self.middleman.is_idle() {
+                // What the unit says has to go on the cable at its own moment.
+                due = [due, self.unit.poll_timeout()].into_iter().flatten().min();
             }
-            if self.due().is_some_and(|at| at <= due) {
-                self.play(due);
+            match due.filter(|&due| due <= now) {
+                Some(due) => self.step(due),
+                None => break,
             }
         }
-        self.unit.handle_timeout(now);
+        self.step(now);
     }
 
     fn poll_transmit(&mut self) -> Option<Transmit> {
-        self.unit.poll_transmit()
+        self.outgoing.pop_front()
     }
 
     fn poll_timeout(&self) -> Option<Instant> {

@@ -1,12 +1,12 @@
 //! What can be done to an emulated unit from outside its serial port, one line each: on standard input, and in scenario
 //! files.
 
-use std::fmt;
-
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::emulator::NmtCommand;
+use crate::emulator::fault::Fault;
 use crate::emulator::knob::{Knob, Lead};
+use crate::emulator::words::{LONGEST_OFF_S, WordError, Words, shown, unknown};
 use crate::time::Duration;
 
 /// One deed.
@@ -24,26 +24,15 @@ pub enum Verb {
     Write(ObjectAddress, Value),
     /// Read an entry of the object dictionary as the network does.
     Read(ObjectAddress),
+    /// Let something go wrong from now on.
+    Fault(Fault),
+    /// End all faults, those of the flash too, and plug the cable in.
+    Heal,
+    /// Plug the cable in, or out.
+    Plug(bool),
     /// Say what the unit does.
     Status,
 }
-
-/// What is wrong with a line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct VerbError {
-    /// Column of the word it is about, from 1.
-    pub column: usize,
-    /// What was found, and what is allowed.
-    pub message: String,
-}
-
-impl fmt::Display for VerbError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "column {}: {}", self.column, self.message)
-    }
-}
-
-impl std::error::Error for VerbError {}
 
 /// All verbs with what they do, for help texts.
 pub const HELP: &str = "set N temperature C        the sensor of input N has this temperature in °C, exactly
@@ -61,40 +50,28 @@ power cycle [SECONDS]      off and on again, after 1 second if not said
 nmt start|stop|pre-operational|reset|reset-communication
 write INDEX:SUB VALUE      write an entry as the network does, e.g. write 6112:1 0
 read INDEX:SUB             read one
+fault WHAT ...             let something go wrong; 'fault' alone says what there is
+heal                       end all faults
+unplug, plug               pull the serial cable, or plug it in again
 status                     what the unit does";
 
-/// Longest time a power cycle takes.
-const LONGEST_CYCLE_S: f64 = 86_400.0;
 /// How long the supply is off if nothing is said.
 const USUAL_CYCLE: Duration = Duration::from_secs(1);
-
-/// Words with their columns.
-struct Words<'a> {
-    words: Vec<(usize, &'a str)>,
-    next: usize,
-    /// Column behind the last word.
-    end: usize,
-}
 
 impl Verb {
     /// Reads a line for a unit of a product, in any case of its letters.
     ///
     /// # Errors
     /// If it is none, with the column.
-    pub fn read(line: &str, product: &Product) -> Result<Verb, VerbError> {
+    pub fn read(line: &str, product: &Product) -> Result<Verb, WordError> {
         let mut words = Words::of(line);
         let verb = Verb::parse(&mut words, product)?;
-        match words.take() {
-            None => Ok(verb),
-            Some((column, word)) => Err(VerbError {
-                column,
-                message: format!("'{}' is too much: the line is complete before it", shown(word)),
-            }),
-        }
+        words.end()?;
+        Ok(verb)
     }
 
-    fn parse(words: &mut Words<'_>, product: &Product) -> Result<Verb, VerbError> {
-        let verbs = "set, process, open, short, repair, freeze, thaw, power, nmt, write, read, status";
+    fn parse(words: &mut Words<'_>, product: &Product) -> Result<Verb, WordError> {
+        let verbs = "set, process, open, short, repair, freeze, thaw, power, nmt, write, read, fault, heal, unplug, plug, status";
         let (column, word) = words.expect("a verb", verbs)?;
         match word.to_ascii_lowercase().as_str() {
             "set" => Verb::set(words),
@@ -140,16 +117,20 @@ impl Verb {
                 let (column, word) = words.expect("a value", "a number, true, false")?;
                 let value = data_type
                     .and_then(|data_type| data_type.parse(word))
-                    .ok_or_else(|| VerbError { column, message: format!("'{}' is no value of {at}", shown(word)) })?;
+                    .ok_or_else(|| WordError { column, message: format!("'{}' is no value of {at}", shown(word)) })?;
                 Ok(Verb::Write(at, value))
             }
             "read" => words.entry(product).map(Verb::Read),
+            "fault" => Fault::parse(words, product).map(Verb::Fault),
+            "heal" => Ok(Verb::Heal),
+            "unplug" => Ok(Verb::Plug(false)),
+            "plug" => Ok(Verb::Plug(true)),
             "status" => Ok(Verb::Status),
             _ => Err(unknown(column, word, verbs)),
         }
     }
 
-    fn set(words: &mut Words<'_>) -> Result<Verb, VerbError> {
+    fn set(words: &mut Words<'_>) -> Result<Verb, WordError> {
         let what = "1, cold-junction, supply, current";
         let (column, word) = words.expect("an input or a quantity", what)?;
         let knob = match word.to_ascii_lowercase().as_str() {
@@ -173,75 +154,36 @@ impl Verb {
     }
 }
 
-impl<'a> Words<'a> {
-    fn of(line: &'a str) -> Self {
-        let mut words = Vec::new();
-        let mut rest = line;
-        let mut column = 1;
-        while let Some(begin) = rest.find(|c: char| !c.is_whitespace()) {
-            column += rest[..begin].chars().count();
-            rest = &rest[begin..];
-            let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
-            words.push((column, &rest[..end]));
-            column += rest[..end].chars().count();
-            rest = &rest[end..];
-        }
-        Words { words, next: 0, end: column }
-    }
-
-    fn take(&mut self) -> Option<(usize, &'a str)> {
-        let word = self.words.get(self.next).copied();
-        self.next += 1;
-        word
-    }
-
-    fn expect(&mut self, what: &str, allowed: &str) -> Result<(usize, &'a str), VerbError> {
-        self.take().ok_or_else(|| VerbError { column: self.end, message: format!("{what} is missing: {allowed}") })
-    }
-
-    fn input(&mut self) -> Result<u8, VerbError> {
+impl Words<'_> {
+    fn input(&mut self) -> Result<u8, WordError> {
         let (column, word) = self.expect("an input", "its number, from 1")?;
         input(column, word)
     }
 
-    fn number(&mut self, what: &str) -> Result<f64, VerbError> {
-        let (column, word) = self.expect(what, "a number")?;
-        word.parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(|| VerbError {
-            column,
-            message: format!("'{}' is not {what}: write a number like 23.5", shown(word)),
-        })
+    fn cycle(&mut self) -> Result<Duration, WordError> {
+        if self.is_over() { Ok(USUAL_CYCLE) } else { self.seconds(LONGEST_OFF_S) }
     }
 
-    fn cycle(&mut self) -> Result<Duration, VerbError> {
-        let Some(&(column, word)) = self.words.get(self.next) else { return Ok(USUAL_CYCLE) };
-        let seconds = self.number("a time in seconds")?;
-        if !(0.0..=LONGEST_CYCLE_S).contains(&seconds) {
-            let message = format!("'{}' is not 0 to {LONGEST_CYCLE_S} seconds", shown(word));
-            return Err(VerbError { column, message });
-        }
-        Ok(Duration::from_secs_f64(seconds))
-    }
-
-    fn entry(&mut self, product: &Product) -> Result<ObjectAddress, VerbError> {
+    fn entry(&mut self, product: &Product) -> Result<ObjectAddress, WordError> {
         let (column, word) = self.expect("an entry", "index and sub-index, e.g. 6112:1")?;
         let at: ObjectAddress = word
             .parse()
-            .map_err(|error| VerbError { column, message: format!("{error}").replace(word, &shown(word)) })?;
+            .map_err(|error| WordError { column, message: format!("{error}").replace(word, &shown(word)) })?;
         if product.dictionary.entry(at).is_none() {
-            return Err(VerbError { column, message: format!("an {} has no entry {at}", product.name) });
+            return Err(WordError { column, message: format!("an {} has no entry {at}", product.name) });
         }
         Ok(at)
     }
 }
 
-fn input(column: usize, word: &str) -> Result<u8, VerbError> {
-    word.parse().ok().filter(|&number| number > 0).ok_or_else(|| VerbError {
+fn input(column: usize, word: &str) -> Result<u8, WordError> {
+    word.parse().ok().filter(|&number| number > 0).ok_or_else(|| WordError {
         column,
         message: format!("'{}' is no input: write its number, from 1", shown(word)),
     })
 }
 
-fn lead(column: usize, word: &str) -> Result<Lead, VerbError> {
+fn lead(column: usize, word: &str) -> Result<Lead, WordError> {
     match word.to_ascii_lowercase().as_str() {
         "a" => Ok(Lead::A),
         "b" => Ok(Lead::B),
@@ -249,15 +191,6 @@ fn lead(column: usize, word: &str) -> Result<Lead, VerbError> {
         "gnd" => Ok(Lead::Ground),
         _ => Err(unknown(column, word, "A, B, C, GND")),
     }
-}
-
-fn unknown(column: usize, word: &str, allowed: &str) -> VerbError {
-    VerbError { column, message: format!("'{}' is not known; there is: {allowed}", shown(word)) }
-}
-
-/// A word of the user's as an error quotes it.
-fn shown(word: &str) -> String {
-    crate::wire::visible::line(word.as_bytes())
 }
 
 #[cfg(test)]
@@ -300,6 +233,10 @@ mod tests {
             ("write 4000:1 -300", Verb::Write(at(0x4000, 1), Value::Integer16(-300))),
             ("write 1010:1 0x65766173", Verb::Write(at(0x1010, 1), Value::Unsigned32(0x6576_6173))),
             ("read 6100:1", Verb::Read(at(0x6100, 1))),
+            ("fault queue 64", Verb::Fault(Fault::Queue(64))),
+            ("heal", Verb::Heal),
+            ("unplug", Verb::Plug(false)),
+            ("plug", Verb::Plug(true)),
             ("status", Verb::Status),
         ];
         for (line, verb) in table {
@@ -329,6 +266,9 @@ mod tests {
             ("write 6112:1 x", "column 14: 'x' is no value of 6112:01"),
             ("write 6112:1 300", "column 14: '300' is no value of 6112:01"),
             ("write 6112:9 1", "column 7: an AXRTD8CO has no entry 6112:09"),
+            ("fault", "column 6: a fault is missing: lost, doubled"),
+            ("fault queue -1", "column 13: '-1' is not 0 to 4096"),
+            ("heal all", "column 6: 'all' is too much"),
             ("read zzz", "column 6: 'zzz' is no entry of an object dictionary"),
         ];
         for (line, complaint) in table {
@@ -345,7 +285,7 @@ mod tests {
 
         #[test]
         fn any_words_behind_a_verb_are_read_or_refused(
-            verb in "set|open|power cycle|nmt|write|read|process", rest in "[ 0-9a-z:.x-]{0,30}"
+            verb in "set|open|power cycle|nmt|write|read|process|fault lost|fault flash", rest in "[ 0-9a-z:.x-]{0,30}"
         ) {
             let _ = read(&format!("{verb} {rest}"));
         }

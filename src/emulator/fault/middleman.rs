@@ -1,0 +1,490 @@
+//! Who sits on the cable and does to bytes what the faults say: loses, doubles, changes and delays them, and counts.
+//!
+//! Pure: a byte goes in with the moment at which an undisturbed line would deliver it, and comes out when it arrives.
+//! A byte behind a late one waits for it, and then follows at the line's rate, not at once: what stalls is the adapter,
+//! not the wire behind it.
+
+use std::collections::VecDeque;
+
+use super::super::uart::{BAUD, XOFF, XON};
+use super::{Fault, Mishap, Way, When};
+use crate::rng::Rng;
+use crate::time::{Duration, Instant, character_time};
+
+/// What arrives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrival {
+    /// A byte.
+    Byte(u8),
+    /// Something whose stop bit is not where it should be.
+    Unreadable,
+}
+
+/// What the unit suffers behind a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Deed {
+    /// Its microcontroller resets.
+    Reset,
+    /// Its supply fails, and comes back after this time, if at all.
+    PowerCut(Option<Duration>),
+}
+
+/// The cable with what goes wrong on it.
+#[derive(Debug)]
+pub struct Middleman {
+    chance: Rng,
+    /// Faults ever ordered: each gets a chance of its own.
+    ordered: u64,
+    faults: Vec<Ordered>,
+    latency: Duration,
+    queue: usize,
+    plugged: bool,
+    plug_at: Option<Instant>,
+    /// The next XON is lost.
+    loses_xon: bool,
+    /// The last word that the client has heard on it was XOFF.
+    client_is_held: bool,
+    to_unit: Delayed,
+    to_client: Delayed,
+    text: Text,
+}
+
+#[derive(Debug)]
+struct Ordered {
+    fault: Fault,
+    /// How many of what it counts have come.
+    seen: u64,
+    chance: Rng,
+}
+
+/// Bytes on one way.
+#[derive(Debug, Default)]
+struct Delayed {
+    pending: VecDeque<(Instant, Arrival)>,
+    /// When the last one arrives.
+    last: Instant,
+}
+
+/// What stands before the present character on its line, as far as counting records goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Text {
+    Nothing,
+    Record,
+    Other,
+}
+
+/// What happens to a byte.
+struct Fate {
+    copies: u8,
+    flipped: u8,
+    unreadable: bool,
+    late: Duration,
+}
+
+impl Middleman {
+    /// A good cable; `seed` decides what chance decides.
+    pub fn new(seed: u64) -> Self {
+        Middleman {
+            chance: Rng::new(seed).fork("faults"),
+            ordered: 0,
+            faults: Vec::new(),
+            latency: Duration::ZERO,
+            queue: 0,
+            plugged: true,
+            plug_at: None,
+            loses_xon: false,
+            client_is_held: false,
+            to_unit: Delayed::default(),
+            to_client: Delayed::default(),
+            text: Text::Nothing,
+        }
+    }
+
+    /// Orders a fault. Those of flash are not for the cable.
+    pub fn order(&mut self, fault: Fault) {
+        match fault {
+            Fault::Latency(latency) => self.latency = latency,
+            Fault::Queue(bytes) => self.queue = bytes,
+            Fault::Flash { .. } => {}
+            Fault::Line { .. }
+            | Fault::NoXon(_)
+            | Fault::Reset { .. }
+            | Fault::PowerCut { .. }
+            | Fault::Unplug { .. } => {
+                let chance = self.chance.fork(&self.ordered.to_string());
+                self.ordered += 1;
+                self.faults.push(Ordered { fault, seen: 0, chance });
+            }
+        }
+    }
+
+    /// Ends all faults, and plugs the cable in. What is late stays late.
+    pub fn heal(&mut self) {
+        self.faults.clear();
+        self.latency = Duration::ZERO;
+        self.queue = 0;
+        self.loses_xon = false;
+        self.plug(true);
+    }
+
+    /// Plugs the cable in, or out: then what is on its way is lost.
+    pub fn plug(&mut self, plugged: bool) {
+        self.plugged = plugged;
+        self.plug_at = None;
+        if !plugged {
+            self.to_unit.pending.clear();
+            self.to_client.pending.clear();
+            self.client_is_held = false;
+        }
+    }
+
+    /// Whether the cable is in.
+    pub fn is_plugged(&self) -> bool {
+        self.plugged
+    }
+
+    /// Bytes that the adapter takes ahead of the line.
+    pub fn queue(&self) -> usize {
+        self.queue
+    }
+
+    /// Whether bytes may pass by without asking.
+    pub fn is_idle(&self) -> bool {
+        self.faults.is_empty()
+            && self.latency.is_zero()
+            && self.plugged
+            && !self.loses_xon
+            && self.to_unit.pending.is_empty()
+            && self.to_client.pending.is_empty()
+    }
+
+    /// Takes a byte that an undisturbed line would deliver now.
+    pub fn carry(&mut self, now: Instant, way: Way, byte: u8) {
+        if !self.plugged {
+            return;
+        }
+        let mut fate = Fate { copies: 1, flipped: 0, unreadable: false, late: Duration::ZERO };
+        if way == Way::FromUnit && byte == XON && std::mem::take(&mut self.loses_xon) {
+            fate.copies = 0;
+        }
+        let mut pulled = None;
+        for ordered in &mut self.faults {
+            let fault = ordered.fault;
+            match fault {
+                Fault::Line { mishap, way: its_way, when } if its_way == way && ordered.strikes(when) => {
+                    fate.suffer(mishap, &mut ordered.chance);
+                }
+                Fault::NoXon(when) if way == Way::FromUnit && byte == XOFF && ordered.strikes(when) => {
+                    self.loses_xon = true;
+                }
+                Fault::Unplug { way: its_way, byte, out } if its_way == way && ordered.strikes(When::At(byte)) => {
+                    pulled = Some(out);
+                }
+                Fault::Line { .. }
+                | Fault::NoXon(_)
+                | Fault::Unplug { .. }
+                | Fault::Reset { .. }
+                | Fault::PowerCut { .. }
+                | Fault::Flash { .. }
+                | Fault::Latency(_)
+                | Fault::Queue(_) => {}
+            }
+        }
+        self.faults.retain(|ordered| !ordered.is_over());
+        if let Some(out) = pulled {
+            self.plug(false);
+            self.plug_at = out.map(|out| now + out);
+            return;
+        }
+        let arrival = if fate.unreadable { Arrival::Unreadable } else { Arrival::Byte(byte ^ fate.flipped) };
+        let at = now + self.latency + fate.late;
+        let delayed = match way {
+            Way::ToUnit => &mut self.to_unit,
+            Way::FromUnit => &mut self.to_client,
+        };
+        for copy in 0..fate.copies {
+            delayed.push(if copy == 0 { at } else { delayed.last + character_time(BAUD) }, arrival);
+        }
+    }
+
+    /// What reaches the unit by now.
+    pub fn next_to_unit(&mut self, now: Instant) -> Option<Arrival> {
+        self.to_unit.pop(now)
+    }
+
+    /// What reaches the client by now.
+    pub fn next_to_client(&mut self, now: Instant) -> Option<u8> {
+        match self.to_client.pop(now)? {
+            Arrival::Byte(byte) => Some(byte),
+            // Orders of this kind are not taken.
+            Arrival::Unreadable => None,
+        }
+    }
+
+    /// The client has got these bytes.
+    pub fn note_client_heard(&mut self, bytes: &[u8]) {
+        if let Some(&last) = bytes.iter().rev().find(|byte| [XON, XOFF].contains(byte)) {
+            self.client_is_held = last == XOFF;
+        }
+    }
+
+    /// The unit starts anew, or another client has come: nobody is held.
+    pub fn forget_hold(&mut self) {
+        self.client_is_held = false;
+    }
+
+    /// Whether the client has heard XOFF and not yet XON.
+    pub fn client_is_held(&self) -> bool {
+        self.client_is_held
+    }
+
+    /// The loader has got a character. Gives what happens to the unit if a record ends with it: a line that begins
+    /// with S, at its CR or LF.
+    pub fn note_loader_got(&mut self, arrival: Arrival) -> Vec<Deed> {
+        let ends = matches!(arrival, Arrival::Byte(b'\r' | b'\n'));
+        let was = self.text;
+        self.text = match (was, arrival) {
+            _ if ends => Text::Nothing,
+            (Text::Nothing, Arrival::Byte(b'S')) => Text::Record,
+            // Flow control stands before a line without being part of it.
+            (Text::Nothing, Arrival::Byte(XON | XOFF)) => Text::Nothing,
+            (Text::Nothing, _) => Text::Other,
+            (Text::Record | Text::Other, _) => was,
+        };
+        if !(ends && was == Text::Record) {
+            return Vec::new();
+        }
+        let mut deeds = Vec::new();
+        for ordered in &mut self.faults {
+            let fault = ordered.fault;
+            match fault {
+                Fault::Reset { record } if ordered.strikes(When::At(record)) => deeds.push(Deed::Reset),
+                Fault::PowerCut { record, off } if ordered.strikes(When::At(record)) => {
+                    deeds.push(Deed::PowerCut(off));
+                }
+                Fault::Reset { .. }
+                | Fault::PowerCut { .. }
+                | Fault::Line { .. }
+                | Fault::NoXon(_)
+                | Fault::Unplug { .. }
+                | Fault::Flash { .. }
+                | Fault::Latency(_)
+                | Fault::Queue(_) => {}
+            }
+        }
+        self.faults.retain(|ordered| !ordered.is_over());
+        deeds
+    }
+
+    /// No loader runs: the next character it gets begins a line.
+    pub fn note_no_loader(&mut self) {
+        self.text = Text::Nothing;
+    }
+
+    /// When something arrives, or the cable is plugged in again.
+    pub fn deadline(&self) -> Option<Instant> {
+        [self.to_unit.next(), self.to_client.next(), self.plug_at].into_iter().flatten().min()
+    }
+
+    /// Plugs the cable in again if it is time.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        if self.plug_at.is_some_and(|at| at <= now) {
+            self.plug(true);
+        }
+    }
+}
+
+impl Ordered {
+    /// Counts one more; whether the fault strikes it.
+    fn strikes(&mut self, when: When) -> bool {
+        self.seen += 1;
+        match when {
+            When::At(number) => self.seen == number,
+            When::OneIn(number) => self.chance.below(number) == 0,
+        }
+    }
+
+    /// Whether it will never strike again.
+    fn is_over(&self) -> bool {
+        match self.fault {
+            Fault::Line { when: When::At(number), .. } | Fault::NoXon(When::At(number)) => self.seen >= number,
+            Fault::Unplug { byte: number, .. }
+            | Fault::Reset { record: number }
+            | Fault::PowerCut { record: number, .. } => self.seen >= number,
+            Fault::Line { when: When::OneIn(_), .. }
+            | Fault::NoXon(When::OneIn(_))
+            | Fault::Flash { .. }
+            | Fault::Latency(_)
+            | Fault::Queue(_) => false,
+        }
+    }
+}
+
+impl Fate {
+    fn suffer(&mut self, mishap: Mishap, chance: &mut Rng) {
+        match mishap {
+            Mishap::Lost => self.copies = 0,
+            // What is lost cannot be doubled, in whatever order the two were said.
+            Mishap::Doubled => self.copies *= 2,
+            Mishap::Corrupted => self.flipped ^= 1 << chance.below(8),
+            Mishap::Unreadable => self.unreadable = true,
+            Mishap::Late(late) => self.late += late,
+        }
+    }
+}
+
+impl Delayed {
+    fn push(&mut self, at: Instant, arrival: Arrival) {
+        self.last = if self.last > at { self.last + character_time(BAUD) } else { at };
+        self.pending.push_back((self.last, arrival));
+    }
+
+    fn next(&self) -> Option<Instant> {
+        self.pending.front().map(|&(at, _)| at)
+    }
+
+    fn pop(&mut self, now: Instant) -> Option<Arrival> {
+        let &(at, arrival) = self.pending.front()?;
+        if at > now {
+            return None;
+        }
+        self.pending.pop_front();
+        Some(arrival)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Product;
+
+    fn middleman(faults: &[&str]) -> Middleman {
+        let product = Product::named("AXTC4CO").expect("built in");
+        let mut middleman = Middleman::new(1);
+        for fault in faults {
+            middleman.order(Fault::read(fault, product).expect(fault));
+        }
+        middleman
+    }
+
+    /// Sends bytes a millisecond apart and gives what arrives, with its moment in ms.
+    fn carried(middleman: &mut Middleman, way: Way, bytes: &[u8]) -> Vec<(f64, Arrival)> {
+        for (number, &byte) in bytes.iter().enumerate() {
+            middleman.carry(Instant::from_millis(number as u64), way, byte);
+        }
+        let mut found = Vec::new();
+        while let Some(at) = middleman.deadline() {
+            let arrival = match way {
+                Way::ToUnit => middleman.next_to_unit(at),
+                Way::FromUnit => middleman.next_to_client(at).map(Arrival::Byte),
+            };
+            found.push((at.since(Instant::ZERO).as_secs_f64() * 1e3, arrival.expect("due")));
+        }
+        found
+    }
+
+    fn text(carried: &[(f64, Arrival)]) -> String {
+        let character = |&(_, arrival): &(f64, Arrival)| match arrival {
+            Arrival::Byte(byte) => char::from(byte),
+            Arrival::Unreadable => '?',
+        };
+        carried.iter().map(character).collect()
+    }
+
+    #[test]
+    fn a_byte_is_lost_doubled_or_unreadable_on_its_way_only() {
+        let faults = ["lost to-unit at byte 2", "doubled to-unit at byte 3", "unreadable to-unit at byte 4"];
+        let mut cable = middleman(&faults);
+        assert_eq!(text(&carried(&mut cable, Way::FromUnit, b"abcde")), "abcde");
+        assert_eq!(text(&carried(&mut cable, Way::ToUnit, b"abcdeabcde")), "acc?eabcde");
+        assert!(cable.is_idle(), "all has happened");
+    }
+
+    #[test]
+    fn one_bit_of_a_corrupted_byte_is_turned_over() {
+        let arrivals = carried(&mut middleman(&["corrupted from-unit one in 1"]), Way::FromUnit, &[0x55; 64]);
+        let mut bits = [0; 8];
+        for (_, arrival) in arrivals {
+            let Arrival::Byte(byte) = arrival else { panic!("readable") };
+            assert_eq!((byte ^ 0x55).count_ones(), 1);
+            bits[(byte ^ 0x55).trailing_zeros() as usize] += 1;
+        }
+        assert!(bits.iter().all(|&count| count > 0), "any of them: {bits:?}");
+    }
+
+    #[test]
+    fn chance_strikes_as_often_as_it_should_and_the_same_ones_for_a_seed() {
+        let lost = |faults: &[&str]| {
+            let sent: Vec<u8> = (0..20_000u32).map(|number| number as u8).collect();
+            text(&carried(&mut middleman(faults), Way::ToUnit, &sent))
+        };
+        let once = lost(&["lost to-unit one in 100"]);
+        assert!((19_750..19_850).contains(&once.chars().count()), "{}", once.chars().count());
+        assert_eq!(once, lost(&["lost to-unit one in 100"]));
+        assert_eq!(once, lost(&["lost to-unit one in 100", "corrupted from-unit one in 7"]), "one more moves none");
+        assert_ne!(once, lost(&["corrupted from-unit one in 7", "lost to-unit one in 100"]), "each has its own chance");
+    }
+
+    #[test]
+    fn what_follows_a_late_byte_waits_for_it_and_follows_at_the_lines_rate() {
+        let arrivals = carried(&mut middleman(&["late to-unit at byte 2 by 10"]), Way::ToUnit, &[b'x'; 16]);
+        let moments: Vec<f64> = arrivals.iter().map(|&(at, _)| (at * 10.0).round() / 10.0).collect();
+        // Ten wait, one character of 0.087 ms behind the other; the 13th has caught up.
+        assert_eq!(moments[..4], [0.0, 11.0, 11.1, 11.2]);
+        assert_eq!(moments[12..], [12.0, 13.0, 14.0, 15.0], "{moments:?}");
+    }
+
+    #[test]
+    fn latency_delays_all_and_loses_nothing() {
+        for way in [Way::ToUnit, Way::FromUnit] {
+            let arrivals = carried(&mut middleman(&["latency 16"]), way, b"abc");
+            assert_eq!(arrivals.iter().map(|&(at, _)| at).collect::<Vec<_>>(), [16.0, 17.0, 18.0]);
+        }
+    }
+
+    #[test]
+    fn the_xon_behind_a_counted_xoff_is_lost() {
+        let mut cable = middleman(&["no-xon at xoff 2"]);
+        assert_eq!(text(&carried(&mut cable, Way::ToUnit, b"\x13\x11")), "\x13\x11", "the client's own does not count");
+        let said = text(&carried(&mut cable, Way::FromUnit, b"\x13a\x11\x13b\x11c\x13\x11"));
+        assert_eq!(said, "\x13a\x11\x13bc\x13\x11");
+        cable.note_client_heard(b"\x13b");
+        assert!(cable.client_is_held());
+        cable.note_client_heard(b"c");
+        assert!(cable.client_is_held());
+        cable.note_client_heard(b"\x13\x11");
+        assert!(!cable.client_is_held());
+    }
+
+    #[test]
+    fn a_pulled_cable_carries_nothing_on_either_way_until_it_is_in_again() {
+        let mut cable = middleman(&["latency 5", "unplug to-unit at byte 3 for 0.1"]);
+        let at = Instant::from_millis;
+        cable.carry(at(0), Way::FromUnit, b'!');
+        for (ms, byte) in (1..).zip(*b"abcd") {
+            cable.carry(at(ms), Way::ToUnit, byte);
+        }
+        assert_eq!((cable.next_to_unit(at(90)), cable.next_to_client(at(90))), (None, None), "what was on its way");
+        assert_eq!((cable.is_plugged(), cable.deadline()), (false, Some(at(103))));
+        cable.handle_timeout(at(103));
+        cable.carry(at(104), Way::ToUnit, b'e');
+        assert_eq!((cable.is_plugged(), cable.next_to_unit(at(109))), (true, Some(Arrival::Byte(b'e'))));
+        cable.plug(false);
+        assert_eq!(cable.deadline(), None, "nobody plugs it in");
+        cable.heal();
+        assert!(cable.is_plugged() && cable.is_idle());
+    }
+
+    #[test]
+    fn records_are_counted_at_their_line_ends_and_nothing_else_is() {
+        let mut cable = middleman(&["reset at record 2", "power-cut at record 3 for 1", "reset at record 4"]);
+        let mut got = |text: &str| -> Vec<Deed> {
+            text.bytes().flat_map(|byte| cable.note_loader_got(Arrival::Byte(byte))).collect()
+        };
+        assert_eq!(got("m\r\r\nS0030000FC"), [], "no line end yet");
+        assert_eq!(got("\r\n"), [], "the first");
+        assert_eq!(got("no S record\r\x11S3\r"), [Deed::Reset]);
+        assert_eq!(got("S3\n"), [Deed::PowerCut(Some(Duration::from_secs(1)))]);
+        assert_eq!(got("S3\r\nS3\r\n"), [Deed::Reset]);
+    }
+}

@@ -1,0 +1,148 @@
+//! Lines of words that say what is to be done to a unit, read with the column of every word.
+
+use std::fmt;
+
+use crate::time::Duration;
+
+/// What is wrong with a line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WordError {
+    /// Column of the word it is about, from 1.
+    pub column: usize,
+    /// What was found, and what is allowed.
+    pub message: String,
+}
+
+impl fmt::Display for WordError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "column {}: {}", self.column, self.message)
+    }
+}
+
+impl std::error::Error for WordError {}
+
+/// Longest time for which a supply is off, or a cable out, before it comes back by itself: a day.
+pub const LONGEST_OFF_S: f64 = 86_400.0;
+
+/// Words with their columns.
+pub struct Words<'a> {
+    words: Vec<(usize, &'a str)>,
+    next: usize,
+    /// Column behind the last word.
+    end: usize,
+}
+
+impl<'a> Words<'a> {
+    /// The words of a line.
+    pub fn of(line: &'a str) -> Self {
+        let mut words = Vec::new();
+        let mut rest = line;
+        let mut column = 1;
+        while let Some(begin) = rest.find(|c: char| !c.is_whitespace()) {
+            column += rest[..begin].chars().count();
+            rest = &rest[begin..];
+            let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
+            words.push((column, &rest[..end]));
+            column += rest[..end].chars().count();
+            rest = &rest[end..];
+        }
+        Words { words, next: 0, end: column }
+    }
+
+    /// The next word with its column.
+    pub fn take(&mut self) -> Option<(usize, &'a str)> {
+        let word = self.words.get(self.next).copied();
+        self.next += 1;
+        word
+    }
+
+    /// Whether no word is left.
+    pub fn is_over(&self) -> bool {
+        self.next >= self.words.len()
+    }
+
+    /// The next word with its column.
+    ///
+    /// # Errors
+    /// If there is none: `what` is missing, which may be one of `allowed`.
+    pub fn expect(&mut self, what: &str, allowed: &str) -> Result<(usize, &'a str), WordError> {
+        self.take().ok_or_else(|| WordError { column: self.end, message: format!("{what} is missing: {allowed}") })
+    }
+
+    /// The next word, which has to be this one, in any case.
+    ///
+    /// # Errors
+    /// If it is another, or none.
+    pub fn exactly(&mut self, wanted: &str) -> Result<(), WordError> {
+        let (column, word) = self.expect("a word", wanted)?;
+        if word.eq_ignore_ascii_case(wanted) { Ok(()) } else { Err(unknown(column, word, wanted)) }
+    }
+
+    /// A finite number.
+    ///
+    /// # Errors
+    /// If the next word is none; `what` it should have been.
+    pub fn number(&mut self, what: &str) -> Result<f64, WordError> {
+        let (column, word) = self.expect(what, "a number")?;
+        word.parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(|| WordError {
+            column,
+            message: format!("'{}' is not {what}: write a number like 23.5", shown(word)),
+        })
+    }
+
+    /// A whole number of these, decimal or, with 0x before it, hexadecimal; `what` it is.
+    ///
+    /// # Errors
+    /// If the next word is none of them.
+    pub fn whole(&mut self, what: &str, range: std::ops::RangeInclusive<u64>) -> Result<u64, WordError> {
+        let allowed = format!("{} to {}", range.start(), range.end());
+        let (column, word) = self.expect(what, &allowed)?;
+        let hexadecimal = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X"));
+        let number = match hexadecimal {
+            // A sign would be taken as well.
+            Some(digits) if digits.starts_with('+') => None,
+            Some(digits) => u64::from_str_radix(digits, 16).ok(),
+            None => word.parse().ok(),
+        };
+        number
+            .filter(|number| range.contains(number))
+            .ok_or_else(|| WordError { column, message: format!("'{}' is not {allowed}", shown(word)) })
+    }
+
+    /// A time of up to `longest` seconds.
+    ///
+    /// # Errors
+    /// If the next word is none.
+    pub fn seconds(&mut self, longest: f64) -> Result<Duration, WordError> {
+        let column = self.words.get(self.next).map_or(self.end, |&(column, _)| column);
+        let seconds = self.number("a time in seconds")?;
+        if !(0.0..=longest).contains(&seconds) {
+            return Err(WordError { column, message: format!("'{seconds}' is not 0 to {longest} seconds") });
+        }
+        Ok(Duration::from_secs_f64(seconds))
+    }
+
+    /// Makes sure that no word is left.
+    ///
+    /// # Errors
+    /// If one is.
+    pub fn end(&mut self) -> Result<(), WordError> {
+        match self.take() {
+            None => Ok(()),
+            Some((column, word)) => Err(WordError {
+                column,
+                message: format!("'{}' is too much: the line is complete before it", shown(word)),
+            }),
+        }
+    }
+}
+
+/// A word that is none of those there are.
+pub fn unknown(column: usize, word: &str, allowed: &str) -> WordError {
+    WordError { column, message: format!("'{}' is not known; there is: {allowed}", shown(word)) }
+}
+
+/// A word of the user's as an error quotes it.
+pub fn shown(word: &str) -> String {
+    crate::wire::visible::line(word.as_bytes())
+}
