@@ -8,6 +8,7 @@ mod dialects;
 #[cfg(unix)]
 mod eds;
 mod emulator;
+mod faults;
 mod images;
 #[cfg(unix)]
 mod live;
