@@ -100,6 +100,9 @@ pub struct HostedUnit {
     thread: Option<JoinHandle<()>>,
 }
 
+/// Hears what a client opens now that the cable is in again.
+pub type Replugged = Box<dyn FnMut(&Path) + Send>;
+
 /// How a unit is hosted.
 #[derive(Default)]
 pub struct Hosting {
@@ -112,7 +115,7 @@ pub struct Hosting {
     /// Decides what garbage looks like.
     pub seed: u64,
     /// Called from the unit's thread when a cable that was pulled is in again, with what a client opens from then on.
-    pub replugged: Option<Box<dyn FnMut(&Path) + Send>>,
+    pub replugged: Option<Replugged>,
     /// Called once, from the unit's thread, if hosting fails later on.
     pub failed: Option<Box<dyn FnOnce(HostError) + Send>>,
 }
@@ -278,7 +281,7 @@ struct Host<U> {
     line_rate: LineRate,
     power: Power,
     state: Option<State>,
-    replugged: Option<Box<dyn FnMut(&Path) + Send>>,
+    replugged: Option<Replugged>,
     cable_is_in: bool,
     garbage: Rng,
     /// Whether anybody has the port open.
