@@ -100,7 +100,7 @@ pub struct HostedUnit {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Told where the unit is when its cable is plugged in again.
+/// Hears what a client opens now that the cable is in again.
 pub type Replugged = Box<dyn FnMut(&Path) + Send>;
 
 /// How a unit is hosted.

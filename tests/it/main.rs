@@ -8,6 +8,7 @@ mod dialects;
 #[cfg(unix)]
 mod eds;
 mod emulator;
+mod faults;
 mod foreigner;
 #[cfg(unix)]
 mod hostile;

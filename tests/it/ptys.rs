@@ -628,6 +628,56 @@ fn a_state_directory_is_kept_and_belongs_to_one_emulator() {
 }
 
 #[test]
+fn a_fault_on_the_command_line_cuts_an_upload_off_and_the_next_one_saves_the_unit() {
+    let world = World::new();
+    fs::write(world.path("pw"), "AXIO-2010\n").expect("written");
+    let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "2000", "--out", "new.S"];
+    assert_eq!(world.run(&args, b"").code, Some(0));
+    let fault = "power-cut at record 40 for 0.3";
+    let mut emulator = world.start(&["emulate", "axtc4co", "--link", "unit", "--loader", "g2", "--fault", fault]);
+    emulator.wait_out("serial: unit");
+    let load = ["load", "new.S", "--yes", "--password-file", "pw", "--product", "axtc4co", "--port", "unit"];
+    let cut_off = world.run(&load, b"");
+    assert_eq!(cut_off.code, Some(7), "{}{}", cut_off.out, cut_off.err);
+    let saved = world.run(&load, b"");
+    assert_eq!(saved.code, Some(0), "{}{}", saved.out, saved.err);
+    assert!(saved.err.contains("1.2.0") || saved.out.contains("1.2.0"), "{}{}", saved.out, saved.err);
+    emulator.input(b"quit\n");
+    assert_eq!(emulator.wait().code, Some(0));
+}
+
+#[test]
+fn a_pulled_cable_hangs_up_and_comes_back_as_another_port_under_the_same_link() {
+    let world = World::new();
+    let mut emulator = world.start(&["emulate", "axtc4co", "--link", "unit", "--json"]);
+    emulator.wait_out("\"unit\":1");
+    let first = fs::read_link(world.path("unit")).expect("a link");
+    let (_connection, received) = connect(&world.path("unit"), 115_200);
+    emulator.input(b"unplug\nstatus\n");
+    emulator.wait_out("its cable is out");
+    while !matches!(received.recv_timeout(PATIENCE).expect("a hang-up"), Input::Gone(_)) {}
+    assert!(!first.exists(), "the port is gone");
+    emulator.input(b"plug\n");
+    wait_until("the link follows", || fs::read_link(world.path("unit")).is_ok_and(|target| target != first));
+    let ran = world.run(&["identify", "--json", "--port", "unit"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.out.contains("AXTC4CO"), "{}", ran.out);
+    emulator.input(b"quit\n");
+    let ended = emulator.wait();
+    assert_eq!(ended.out.matches("axcon.emulate/1").count(), 2, "{}", ended.out);
+    assert!(fs::symlink_metadata(world.path("unit")).is_err(), "the link goes with the emulator");
+}
+
+#[test]
+fn a_fault_that_is_none_is_refused_with_its_column() {
+    let world = World::new();
+    let ran = world.run(&["emulate", "axtc4co", "--fault", "lost to-unit at bite 5"], b"");
+    assert_eq!(ran.code, Some(2));
+    let complaint = "--fault 'lost to-unit at bite 5': column 17: 'bite' is not known; there is: byte";
+    assert!(ran.err.contains(complaint), "{}", ran.err);
+}
+
+#[test]
 fn an_emulated_link_needs_no_port() {
     let world = World::new();
     let ran = world.run(&["terminal", "--no-record", "--port", "emu:axtc4co"], b"");

@@ -1,6 +1,6 @@
 //! What can go wrong with a unit, its flash and its cable, as a user or a test orders it.
 //!
-//! A [`Fault`] is one order, read from a few words; what it does to the bytes is in `middleman`, what it does to the
+//! A [`Fault`] is one order, read from a few words; what it does to the bytes is in [`Middleman`], what it does to the
 //! unit is done by the stage (`scenario`). Numbers count from 1, and from the moment the fault is ordered. Chance comes
 //! from a seed, a stream of its own for each fault, so one fault more does not move the others.
 //!
