@@ -9,13 +9,13 @@ use std::fmt::Write as _;
 use axcon::canopen::{DataType, Value};
 use axcon::device::Product;
 use axcon::endpoint::Endpoint;
-use axcon::session::{Command, Event, Job, Outcome, Session, UnitState};
+use axcon::session::{Command, Event, Job, Outcome, UnitState};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::diagnostics;
 use axcon::wire::stream::{Reading, Source};
 
-use crate::support::bench::BAUD;
+use crate::support::visit::{HandMade, Visit};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
@@ -252,69 +252,20 @@ impl Endpoint for Foreigner {
     }
 }
 
-/// A console and the foreigner, a byte a time, in virtual time.
-struct Bench {
-    now: Instant,
-    session: Session,
-    foreigner: Foreigner,
-    events: VecDeque<Event>,
-    wire: Vec<u8>,
+impl HandMade for Foreigner {
+    fn says(&mut self) -> &mut VecDeque<(Instant, Vec<u8>)> {
+        &mut self.says
+    }
 }
 
-impl Bench {
-    fn new() -> Self {
-        Bench {
-            now: Instant::from_millis(1),
-            session: Session::new(BAUD),
-            foreigner: Foreigner::new(),
-            events: VecDeque::new(),
-            wire: Vec::new(),
-        }
-    }
-
-    /// Runs a job and gives its outcome with all that was heard on the way.
-    fn ask(&mut self, command: Command) -> (Outcome, Vec<Event>) {
-        self.session.command(self.now, command).expect("taken");
-        let end = self.now + Duration::from_secs(120);
-        let mut heard = Vec::new();
-        while self.now < end {
-            while let Some(event) = self.events.pop_front() {
-                if let Event::Finished(outcome) = event {
-                    return (outcome, heard);
-                }
-                heard.push(event);
-            }
-            self.step();
-        }
-        panic!("no outcome; sent {}", self.wire.escape_ascii());
-    }
-
-    fn step(&mut self) {
-        while let Some(transmit) = self.session.poll_transmit() {
-            self.wire.extend(&transmit.bytes);
-            self.foreigner.handle_bytes(self.now, &transmit.bytes);
-        }
-        while let Some(event) = self.session.poll_event() {
-            self.events.push_back(event);
-        }
-        let due = [self.session.poll_timeout(), self.foreigner.poll_timeout()];
-        let next = due.into_iter().flatten().min().unwrap_or(self.now + Duration::from_secs(1));
-        self.now = next.max(self.now + Duration::from_micros(1));
-        self.foreigner.handle_timeout(self.now);
-        while let Some(at) = self.foreigner.says.iter().position(|(at, _)| *at <= self.now) {
-            let (_, text) = self.foreigner.says.remove(at).expect("it is there");
-            for byte in text {
-                self.session.handle_bytes(self.now, &[byte]);
-            }
-        }
-        self.session.handle_timeout(self.now);
-    }
+fn visit() -> Visit<Foreigner> {
+    Visit::to(Foreigner::new())
 }
 
 #[test]
 fn a_painted_menu_is_read_and_its_loaders_version_is_not_taken() {
-    let mut bench = Bench::new();
-    assert_eq!(bench.ask(Command::Identify).0, Outcome::Identified);
+    let mut bench = visit();
+    assert_eq!(bench.ask(Command::Identify), Outcome::Identified);
     let facts = bench.session.facts();
     assert_eq!(facts.state, UnitState::Application);
     assert_eq!(facts.product.as_ref().map(|known| known.value.as_str()), Some("AXRTD8CO"));
@@ -327,10 +278,10 @@ fn a_painted_menu_is_read_and_its_loaders_version_is_not_taken() {
 #[test]
 fn single_keys_are_given_without_enter_and_both_sources_are_told_apart() {
     for (source, keys) in [(Source::FieldValue, "tf250\r"), (Source::ProcessValue, "tp250\r")] {
-        let mut bench = Bench::new();
+        let mut bench = visit();
         bench.ask(Command::Identify);
         bench.wire.clear();
-        let (outcome, heard) = bench.ask(Command::StreamOn { source, period: Duration::from_millis(250) });
+        let (outcome, heard) = bench.ask_and_listen(Command::StreamOn { source, period: Duration::from_millis(250) });
         assert_eq!(outcome, Outcome::StreamRuns { was_on: false });
         assert_eq!(String::from_utf8_lossy(&bench.wire), keys);
         let row = heard.iter().rev().find_map(|event| match event {
@@ -340,19 +291,19 @@ fn single_keys_are_given_without_enter_and_both_sources_are_told_apart() {
         let row = row.expect("a row");
         assert_eq!((row.source, row.readings.len()), (source, 8));
         assert_eq!(row.readings[2..5], [Reading::Short, Reading::Open, Reading::Disabled]);
-        assert_eq!(bench.ask(Command::StreamOff).0, Outcome::Done(Job::StreamOff));
+        assert_eq!(bench.ask(Command::StreamOff), Outcome::Done(Job::StreamOff));
     }
 }
 
 #[test]
 fn a_repainted_dictionary_is_read_to_its_end_while_rows_run_through_it() {
-    let mut bench = Bench::new();
+    let mut bench = visit();
     bench.ask(Command::Identify);
     bench.ask(Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(200) });
-    let (outcome, _) = bench.ask(Command::ReadDictionary);
+    let outcome = bench.ask(Command::ReadDictionary);
     let Outcome::DictionaryRead(reading) = outcome else { panic!("{outcome:?}") };
     assert!(reading.complete);
-    assert_eq!(bench.foreigner.state, State::Menu, "the view has been left");
+    assert_eq!(bench.unit.state, State::Menu, "the view has been left");
     for (at, object, entry) in product().dictionary.entries() {
         let read = reading.entries.iter().find(|read| read.at == at);
         let read = read.unwrap_or_else(|| panic!("{at} {} {} is missing", object.name, entry.name));
@@ -367,21 +318,21 @@ fn a_repainted_dictionary_is_read_to_its_end_while_rows_run_through_it() {
 
 #[test]
 fn a_view_that_is_refused_says_why() {
-    let mut bench = Bench::new();
-    bench.foreigner.operational = true;
+    let mut bench = visit();
+    bench.unit.operational = true;
     bench.ask(Command::Identify);
-    let (outcome, _) = bench.ask(Command::ReadDictionary);
+    let outcome = bench.ask(Command::ReadDictionary);
     let Outcome::Refused { reason, .. } = outcome else { panic!("{outcome:?}") };
     assert!(reason.contains("only in pre-operational mode"), "{reason}");
 }
 
 #[test]
 fn repainted_diagnostics_are_pages_and_are_stopped() {
-    let mut bench = Bench::new();
+    let mut bench = visit();
     bench.ask(Command::Identify);
-    let (outcome, heard) = bench.ask(Command::Diagnostics { pages: Some(3) });
+    let (outcome, heard) = bench.ask_and_listen(Command::Diagnostics { pages: Some(3) });
     assert_eq!(outcome, Outcome::Done(Job::Diagnostics));
-    assert!(!bench.foreigner.pages, "and no more come");
+    assert!(!bench.unit.pages, "and no more come");
     let pages: Vec<_> = heard
         .iter()
         .filter_map(|event| match event {
@@ -396,18 +347,18 @@ fn repainted_diagnostics_are_pages_and_are_stopped() {
 
 #[test]
 fn defaults_are_restored_where_the_question_offers_yes_and_never_guessed_where_it_does_not() {
-    let mut bench = Bench::new();
+    let mut bench = visit();
     bench.ask(Command::Identify);
-    assert_eq!(bench.ask(Command::RestoreDefaults).0, Outcome::Done(Job::RestoreDefaults));
-    assert_eq!(bench.foreigner.restored, 1);
+    assert_eq!(bench.ask(Command::RestoreDefaults), Outcome::Done(Job::RestoreDefaults));
+    assert_eq!(bench.unit.restored, 1);
 
-    bench.foreigner.asks_strangely = true;
+    bench.unit.asks_strangely = true;
     bench.wire.clear();
-    let (outcome, _) = bench.ask(Command::RestoreDefaults);
+    let outcome = bench.ask(Command::RestoreDefaults);
     let Outcome::NoAnswer { awaited, heard: Some(heard), .. } = outcome else { panic!("{outcome:?}") };
     assert_eq!(awaited, "the question for Yes");
     let said = String::from_utf8(bench.session.record().bytes(heard)).expect("ASCII");
     assert!(said.contains("magic word"), "the question is shown: {said:?}");
     assert_eq!(bench.wire, b"d\r", "and left with Enter");
-    assert_eq!((bench.foreigner.restored, bench.foreigner.state), (1, State::Menu));
+    assert_eq!((bench.unit.restored, bench.unit.state), (1, State::Menu));
 }

@@ -6,12 +6,13 @@ use std::collections::VecDeque;
 
 use axcon::endpoint::Endpoint;
 use axcon::secret::Secret;
-use axcon::session::{Command, Event, LoadReport, Outcome, Session, UnitNow, UnitState, Verdict};
+use axcon::session::{Command, LoadReport, Outcome, UnitNow, UnitState, Verdict};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::stream::Source;
 
-use crate::support::bench::{BAUD, order, small_image};
+use crate::support::bench::{order, small_image};
+use crate::support::visit::{HandMade, Visit};
 
 /// What the stranger is doing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -180,78 +181,32 @@ impl Endpoint for Stranger {
     }
 }
 
-/// A console and the stranger, a byte a time, in virtual time.
-struct Bench {
-    now: Instant,
-    session: Session,
-    stranger: Stranger,
-    events: VecDeque<Event>,
-    wire: Vec<u8>,
+impl HandMade for Stranger {
+    fn says(&mut self) -> &mut VecDeque<(Instant, Vec<u8>)> {
+        &mut self.says
+    }
 }
 
-impl Bench {
-    fn new() -> Self {
-        Bench {
-            now: Instant::from_millis(1),
-            session: Session::new(BAUD),
-            stranger: Stranger::new(),
-            events: VecDeque::new(),
-            wire: Vec::new(),
-        }
-    }
+fn visit() -> Visit<Stranger> {
+    Visit::to(Stranger::new())
+}
 
-    fn ask(&mut self, command: Command) -> Outcome {
-        self.session.command(self.now, command).expect("taken");
-        let end = self.now + Duration::from_secs(120);
-        while self.now < end {
-            while let Some(event) = self.events.pop_front() {
-                if let Event::Finished(outcome) = event {
-                    return outcome;
-                }
-            }
-            self.step();
-        }
-        panic!("no outcome; sent {}", self.wire.escape_ascii());
+fn load(bench: &mut Visit<Stranger>, password: &str) -> LoadReport {
+    let mut order = order(small_image("AXTC4CO", "1.2.0"));
+    order.password = Secret::new(password.as_bytes().to_vec());
+    match bench.ask(Command::Load(Box::new(order))) {
+        Outcome::Loaded(report) => *report,
+        other => panic!("{other:?}"),
     }
+}
 
-    fn load(&mut self, password: &str) -> LoadReport {
-        let mut order = order(small_image("AXTC4CO", "1.2.0"));
-        order.password = Secret::new(password.as_bytes().to_vec());
-        match self.ask(Command::Load(Box::new(order))) {
-            Outcome::Loaded(report) => *report,
-            other => panic!("{other:?}"),
-        }
-    }
-
-    fn step(&mut self) {
-        while let Some(transmit) = self.session.poll_transmit() {
-            self.wire.extend(&transmit.bytes);
-            self.stranger.handle_bytes(self.now, &transmit.bytes);
-        }
-        while let Some(event) = self.session.poll_event() {
-            self.events.push_back(event);
-        }
-        let due = [self.session.poll_timeout(), self.stranger.poll_timeout()];
-        let next = due.into_iter().flatten().min().unwrap_or(self.now + Duration::from_secs(1));
-        self.now = next.max(self.now + Duration::from_micros(1));
-        self.stranger.handle_timeout(self.now);
-        while let Some(at) = self.stranger.says.iter().position(|(at, _)| *at <= self.now) {
-            let (_, text) = self.stranger.says.remove(at).expect("it is there");
-            for byte in text {
-                self.session.handle_bytes(self.now, &[byte]);
-            }
-        }
-        self.session.handle_timeout(self.now);
-    }
-
-    fn record(&self) -> String {
-        self.session.record().entries().map(|entry| String::from_utf8_lossy(&entry.bytes).into_owned()).collect()
-    }
+fn record(bench: &Visit<Stranger>) -> String {
+    bench.session.record().entries().map(|entry| String::from_utf8_lossy(&entry.bytes).into_owned()).collect()
 }
 
 #[test]
 fn a_stranger_is_identified_by_what_it_says_wherever_it_says_it() {
-    let mut bench = Bench::new();
+    let mut bench = visit();
     assert_eq!(bench.ask(Command::Identify), Outcome::Identified);
     let facts = bench.session.facts();
     assert_eq!(facts.state, UnitState::Application);
@@ -264,7 +219,7 @@ fn a_stranger_is_identified_by_what_it_says_wherever_it_says_it() {
 
 #[test]
 fn a_strangers_prompts_are_answered_by_what_they_offer() {
-    let mut bench = Bench::new();
+    let mut bench = visit();
     bench.ask(Command::Identify);
     bench.wire.clear();
     let outcome = bench.ask(Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(250) });
@@ -274,33 +229,33 @@ fn a_strangers_prompts_are_answered_by_what_they_offer() {
 
 #[test]
 fn a_stranger_with_another_loader_is_uploaded_to() {
-    let mut bench = Bench::new();
-    let report = bench.load("Geheim-1");
+    let mut bench = visit();
+    let report = load(&mut bench, "Geheim-1");
     assert_eq!((report.verdict, report.unit), (Verdict::Done, UnitNow::Application), "{report:?}");
     assert_eq!(report.version_before, Some(Version::new(2, 10, 7)));
-    assert_eq!(bench.stranger.strays, 0, "no record for the menu");
+    assert_eq!(bench.unit.strays, 0, "no record for the menu");
     // It echoed the password.
-    assert!(!bench.record().contains("Geheim"), "{}", bench.record());
+    assert!(!record(&bench).contains("Geheim"), "{}", record(&bench));
 }
 
 #[test]
 fn a_stranger_that_runs_something_else_afterwards_is_not_called_done() {
-    let mut bench = Bench::new();
-    bench.stranger.next = "1.1.9";
-    let report = bench.load("Geheim-1");
+    let mut bench = visit();
+    bench.unit.next = "1.1.9";
+    let report = load(&mut bench, "Geheim-1");
     assert_eq!((report.verdict, report.unit), (Verdict::WrongApplication, UnitNow::Application), "{report:?}");
     assert_eq!(report.version_after, Some(Version::new(1, 1, 9)));
 }
 
 #[test]
 fn a_strangers_error_stops_the_upload_and_its_denial_is_understood() {
-    let mut bench = Bench::new();
-    let report = bench.load("geheim-1");
+    let mut bench = visit();
+    let report = load(&mut bench, "geheim-1");
     assert_eq!((report.verdict, report.unit), (Verdict::UnitRefused, UnitNow::Application), "{report:?}");
-    bench.stranger.fails_at = Some(40);
-    let report = bench.load("Geheim-1");
+    bench.unit.fails_at = Some(40);
+    let report = load(&mut bench, "Geheim-1");
     assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
     assert!((40..=42).contains(&report.records), "{}", report.records);
-    let report = bench.load("Geheim-1");
+    let report = load(&mut bench, "Geheim-1");
     assert_eq!(report.verdict, Verdict::Done, "from where it was left: {report:?}");
 }

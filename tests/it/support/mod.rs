@@ -9,3 +9,4 @@ pub mod screen;
 pub mod server;
 #[cfg(unix)]
 pub mod shell;
+pub mod visit;
