@@ -30,6 +30,8 @@ pub mod device;
 
 pub mod session;
 
+pub mod dump;
+
 pub mod emulator;
 
 pub mod host;

@@ -18,14 +18,18 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("telnet", &[]),
     ("device", &["canopen", "image", "time", "version", "wire"]),
     ("session", &["canopen", "device", "endpoint", "image", "record", "secret", "time", "version", "wire"]),
+    ("dump", &["canopen", "device", "session", "wire"]),
     ("emulator", &["canopen", "device", "endpoint", "image", "rng", "time", "version", "wire"]),
     ("host", &["canopen", "device", "emulator", "endpoint", "image", "record", "rng", "telnet", "time", "version"]),
-    ("tui", &["canopen", "device", "endpoint", "image", "record", "secret", "session", "time", "version", "wire"]),
+    (
+        "tui",
+        &["canopen", "device", "dump", "endpoint", "image", "record", "secret", "session", "time", "version", "wire"],
+    ),
     (
         "cli",
         &[
-            "canopen", "device", "emulator", "endpoint", "host", "image", "record", "secret", "session", "telnet",
-            "time", "tui", "version", "wire",
+            "canopen", "device", "dump", "emulator", "endpoint", "host", "image", "record", "secret", "session",
+            "telnet", "time", "tui", "version", "wire",
         ],
     ),
 ];

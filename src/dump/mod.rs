@@ -1,0 +1,241 @@
+//! A unit's object dictionary with what it means: names, units, the factory's values, what differs.
+//!
+//! A session reads what the unit shows ([`DictionaryReading`]); here it is set beside what the product's manual says.
+//! [`difference`] compares two of them, [`text`] writes them for people and spreadsheets, and JSON is what is read again.
+
+mod difference;
+mod text;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+pub use difference::{Difference, differences};
+
+use crate::canopen::{DataType, ObjectAddress, Value};
+use crate::device::dictionary::{Access, Entry, Object};
+use crate::device::{Product, eds};
+use crate::session::{DictionaryReading, Facts};
+use crate::wire::visible;
+
+/// What a dump says it is.
+const SCHEMA: &str = "axcon.dictionary/1";
+
+/// An object dictionary as read from a unit, or as the factory makes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Dump {
+    schema: String,
+    /// The product, where known.
+    pub product: Option<String>,
+    /// The software's version, where known; a factory's dump has none.
+    pub version: Option<String>,
+    /// Whether the unit showed all of it.
+    pub complete: bool,
+    /// Lines of the view in which no entry was recognised.
+    pub unrecognised_lines: u64,
+    /// In the unit's order.
+    pub entries: Vec<DumpEntry>,
+    /// What the manual has and the unit did not show.
+    pub missing: Vec<Missing>,
+}
+
+/// One entry.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DumpEntry {
+    /// Four hexadecimal digits.
+    pub index: String,
+    /// Sub-index.
+    pub subindex: u8,
+    /// Object and entry as the manual names them; empty if it has no such entry.
+    pub name: String,
+    /// The value, where the unit shows one that fits the entry's type.
+    pub value: Option<serde_json::Number>,
+    /// What the unit printed behind index and sub-index.
+    pub text: String,
+    /// The factory's value on this node, where it has one.
+    pub default: Option<serde_json::Number>,
+    /// Whether this parameter is not what the factory made it.
+    pub deviates: bool,
+    /// Physical unit.
+    pub unit: Option<String>,
+    /// What the value stands for.
+    pub meaning: Option<String>,
+    /// Bits, and not a number of something: people read these in hexadecimal digits.
+    #[serde(skip)]
+    bits: bool,
+}
+
+/// An entry that was not shown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Missing {
+    /// Four hexadecimal digits.
+    pub index: String,
+    /// Sub-index.
+    pub subindex: u8,
+}
+
+/// Why a text is no dump.
+#[derive(Debug, thiserror::Error)]
+pub enum DumpError {
+    /// It is no JSON, or not that of a dump.
+    #[error("{name}:{}:{}: this is no dump: {source}", source.line(), source.column())]
+    Syntax {
+        /// What it was read from.
+        name: String,
+        /// Where and what.
+        source: serde_json::Error,
+    },
+    /// It is another kind of document.
+    #[error("'{name}' has the schema '{found}', not '{SCHEMA}'")]
+    Schema {
+        /// What it was read from.
+        name: String,
+        /// The schema it names.
+        found: String,
+    },
+}
+
+impl Dump {
+    /// What a unit showed, with what the manual says of it.
+    pub fn of(reading: &DictionaryReading, product: Option<&Product>, facts: &Facts) -> Self {
+        let node_id = facts.node_id.as_ref().map_or(127, |known| known.value);
+        let entries = reading.entries.iter().map(|read| {
+            let object = product.and_then(|product| product.dictionary.object(read.at.index));
+            let entry = object.and_then(|object| object.entry(read.at.sub));
+            let default = entry.and_then(|entry| entry.default).map(|default| default.on_node(node_id));
+            DumpEntry {
+                index: format!("{:04X}", read.at.index),
+                subindex: read.at.sub,
+                name: object.zip(entry).map_or_else(String::new, |(object, entry)| name(object, entry)),
+                value: read.value.and_then(number),
+                text: visible::line(read.text.as_bytes()),
+                default: default.and_then(number),
+                deviates: entry.is_some_and(|entry| deviates(read.at, entry, read.value, default)),
+                unit: entry.and_then(|entry| entry.unit.clone()),
+                meaning: entry.zip(read.value).and_then(|(entry, value)| entry.meaning(value)).map(str::to_owned),
+                bits: entry.is_some_and(|entry| entry.data_type == DataType::Unsigned32 && entry.unit.is_none()),
+            }
+        });
+        let missing = product.into_iter().flat_map(|product| product.dictionary.entries()).filter_map(|(at, _, _)| {
+            let there = reading.entries.iter().any(|read| read.at == at);
+            (!there).then(|| Missing { index: format!("{:04X}", at.index), subindex: at.sub })
+        });
+        Dump {
+            schema: SCHEMA.to_owned(),
+            product: facts.product.as_ref().map(|known| known.value.clone()),
+            version: facts.version.as_ref().map(|known| known.value.to_string()),
+            complete: reading.complete,
+            unrecognised_lines: reading.unrecognised_lines,
+            entries: entries.collect(),
+            missing: missing.collect(),
+        }
+    }
+
+    /// The factory's values as a dump.
+    pub fn factory(product: &Product) -> Self {
+        let entries = product.dictionary.entries().filter(|(_, _, entry)| entry.access == Access::ReadWrite);
+        let entries = entries.filter_map(|(at, object, entry)| {
+            let default = entry.default?.on_node(product.can.node_id);
+            Some(DumpEntry {
+                index: format!("{:04X}", at.index),
+                subindex: at.sub,
+                name: name(object, entry),
+                value: number(default),
+                text: default.to_string(),
+                default: number(default),
+                deviates: false,
+                unit: entry.unit.clone(),
+                meaning: entry.meaning(default).map(str::to_owned),
+                bits: false,
+            })
+        });
+        Dump {
+            schema: SCHEMA.to_owned(),
+            product: Some(product.name.clone()),
+            version: None,
+            complete: true,
+            unrecognised_lines: 0,
+            entries: entries.collect(),
+            missing: Vec::new(),
+        }
+    }
+
+    /// Reads a dump back that [`Dump::json`] has written; `name` stands in errors.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn parse(name: &str, text: &str) -> Result<Self, DumpError> {
+        let dump: Dump =
+            serde_json::from_str(text).map_err(|source| DumpError::Syntax { name: name.to_owned(), source })?;
+        if dump.schema != SCHEMA {
+            let found = visible::line(dump.schema.as_bytes());
+            return Err(DumpError::Schema { name: name.to_owned(), found });
+        }
+        Ok(dump)
+    }
+
+    /// All of it in one line of JSON.
+    pub fn json(&self) -> String {
+        // Strings, numbers and lists of them: there is nothing JSON could refuse.
+        serde_json::to_string(self).unwrap_or_default() + "\n"
+    }
+
+    /// How many parameters are not what the factory made them.
+    pub fn deviations(&self) -> usize {
+        self.entries.iter().filter(|entry| entry.deviates).count()
+    }
+}
+
+impl DumpEntry {
+    /// The value as a number; `-` where there is none.
+    pub fn number(&self) -> String {
+        self.value.as_ref().map_or_else(|| "-".to_owned(), ToString::to_string)
+    }
+
+    /// The value for a person: bits in hexadecimal digits.
+    pub fn shown(&self) -> String {
+        let bits = self.value.as_ref().filter(|_| self.bits).and_then(serde_json::Number::as_u64);
+        bits.map_or_else(|| self.number(), |bits| format!("0x{bits:08X}"))
+    }
+
+    /// Where it lies; `None` in a dump that somebody has edited badly.
+    pub fn at(&self) -> Option<ObjectAddress> {
+        let index = u16::from_str_radix(&self.index, 16).ok()?;
+        Some(ObjectAddress { index, sub: self.subindex })
+    }
+}
+
+/// The entry's name with its object's, which tells sub-indices of the same name apart.
+pub fn name(object: &Object, entry: &Entry) -> String {
+    if object.entries.len() == 1 { object.name.clone() } else { format!("{}, {}", object.name, entry.name) }
+}
+
+/// Whether a parameter is not what the factory made it. Measurements and what is a unit's own are no deviations.
+fn deviates(at: ObjectAddress, entry: &Entry, value: Option<Value>, default: Option<Value>) -> bool {
+    let parameter = entry.access == Access::ReadWrite && !matches!(at.index, 0x1003 | 0x1010 | 0x1011);
+    let differs = value.zip(default).is_some_and(|(value, default)| match (value, default) {
+        // The unit prints as many digits as it likes.
+        (Value::Real32(value), Value::Real32(default)) => (value - default).abs() > default.abs().max(1.0) * 1e-3,
+        _ => value != default,
+    });
+    parameter && differs
+}
+
+fn number(value: Value) -> Option<serde_json::Number> {
+    match (value, value.as_integer()) {
+        // The shortest decimal that is this value: 0.1, not 0.10000000149.
+        (Value::Real32(real), _) => serde_json::Number::from_f64(real.to_string().parse().ok()?),
+        (_, integer) => integer.map(serde_json::Number::from),
+    }
+}
+
+/// The reading as a device configuration file (DCF) for this product.
+pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Facts) -> String {
+    let values = reading.entries.iter().filter_map(|read| Some((read.at, read.value?))).collect::<BTreeMap<_, _>>();
+    let configuration = eds::Configuration {
+        node_id: facts.node_id.as_ref().map_or(product.can.node_id, |known| known.value),
+        kbps: facts.can_kbps.as_ref().map_or(product.can.kbps, |known| known.value),
+        values,
+    };
+    eds::write_configuration(product, &configuration)
+}

@@ -1,0 +1,54 @@
+//! Dumps as text.
+
+use super::{Dump, DumpEntry};
+
+impl Dump {
+    /// For people: a line for each entry, `*` before what differs from the factory's, and what is missing.
+    pub fn table(&self) -> String {
+        let mut text = String::new();
+        let deviations = self.deviations();
+        for entry in &self.entries {
+            let DumpEntry { index, subindex, name, unit, meaning, .. } = entry;
+            let value = entry.shown();
+            let unit = unit.as_deref().map(|unit| format!(" {unit}")).unwrap_or_default();
+            let meaning = meaning.as_deref().map(|meaning| format!("  {meaning}")).unwrap_or_default();
+            let mark = if entry.deviates { "*" } else { " " };
+            let factory = entry.default.as_ref().filter(|_| entry.deviates);
+            let factory = factory.map(|default| format!("  (factory {default})")).unwrap_or_default();
+            text.push_str(&format!("{mark} {index}:{subindex:02X}  {name:<58} {value:>14}{unit}{meaning}{factory}\n"));
+        }
+        text.push_str(&format!("{} entries, {deviations} differ from the factory's (*)\n", self.entries.len()));
+        if !self.missing.is_empty() {
+            let list: Vec<String> = self.missing.iter().map(|at| format!("{}:{:02X}", at.index, at.subindex)).collect();
+            text.push_str(&format!("not shown by the unit: {}\n", list.join(", ")));
+        }
+        text
+    }
+
+    /// For spreadsheets, with a heading.
+    pub fn csv(&self) -> String {
+        let mut text = String::from("index,subindex,name,value,unit,meaning,default,deviates,text\n");
+        for entry in &self.entries {
+            let number =
+                |number: &Option<serde_json::Number>| number.as_ref().map(ToString::to_string).unwrap_or_default();
+            let fields = [
+                entry.index.clone(),
+                entry.subindex.to_string(),
+                quoted(&entry.name),
+                number(&entry.value),
+                quoted(entry.unit.as_deref().unwrap_or_default()),
+                quoted(entry.meaning.as_deref().unwrap_or_default()),
+                number(&entry.default),
+                u8::from(entry.deviates).to_string(),
+                quoted(&entry.text),
+            ];
+            text.push_str(&fields.join(","));
+            text.push('\n');
+        }
+        text
+    }
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
