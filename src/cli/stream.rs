@@ -282,9 +282,7 @@ fn leave_as_found(talk: &mut Talk, was_on: bool, found: Option<Found>, output: &
 /// Says so if the line cannot carry the rate.
 fn warn_of_rate(talk: &Talk, source: Source, period: Duration, baud: u32, output: &mut Output) {
     let Some(layout) = layout(talk) else { return };
-    let format = layout.format(source);
-    let width = format.widths.first().copied().unwrap_or_default();
-    let characters = (width + 1) * layout.channels.len() + 1;
+    let characters = layout.row_characters(source);
     let asked = characters as f64 / period.as_secs_f64();
     let carries = f64::from(baud) / f64::from(BITS_PER_CHARACTER);
     if asked > carries {
@@ -340,15 +338,14 @@ impl Sink {
             Format::Raw => text.extend_from_slice(raw),
             Format::Csv => {
                 if !self.header_written {
-                    text.extend_from_slice(format!("time,source,{}\n", channels.join(",")).as_bytes());
+                    text.extend_from_slice(Row::csv_heading(channels).as_bytes());
                 }
-                let values: Vec<String> = row.readings.iter().map(|reading| csv_value(row.source, *reading)).collect();
-                text.extend_from_slice(format!("{time},{},{}", name(row.source), values.join(",")).as_bytes());
+                text.extend_from_slice(row.csv(&time).trim_end().as_bytes());
             }
             Format::Jsonl => {
                 let values = channels.iter().zip(&row.readings);
                 let values = values.map(|(channel, reading)| json_value(channel, row.source, *reading)).collect();
-                let object = RowObject { schema: "axcon.stream/1", time, source: name(row.source), values };
+                let object = RowObject { schema: "axcon.stream/1", time, source: row.source.short(), values };
                 serde_json::to_writer(&mut text, &object).map_err(|error| CliError::new(Kind::Failed, error))?;
             }
         }
@@ -380,38 +377,13 @@ fn channels_of(row: &Row) -> &'static [String] {
         .unwrap_or_default()
 }
 
-fn name(source: Source) -> &'static str {
-    match source {
-        Source::FieldValue => "fv",
-        Source::ProcessValue => "pv",
-    }
-}
-
-fn csv_value(source: Source, reading: Reading) -> String {
-    match reading {
-        Reading::Value(value) if source == Source::ProcessValue => format!("{value:.0}"),
-        Reading::Value(value) => format!("{value:.3}"),
-        Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => state(reading).to_owned(),
-    }
-}
-
 fn json_value(channel: &str, source: Source, reading: Reading) -> ValueObject<'_> {
     let value = match reading {
         Reading::Value(value) if source == Source::ProcessValue => Some(serde_json::Number::from(value as i64)),
         Reading::Value(value) => serde_json::Number::from_f64(value),
         Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => None,
     };
-    ValueObject { channel, value, state: state(reading) }
-}
-
-fn state(reading: Reading) -> &'static str {
-    match reading {
-        Reading::Value(_) => "ok",
-        Reading::Disabled => "disabled",
-        Reading::Open => "open",
-        Reading::Short => "short",
-        Reading::Error => "error",
-    }
+    ValueObject { channel, value, state: reading.state() }
 }
 
 fn seconds(seconds: f64) -> Result<Duration, CliError> {

@@ -113,7 +113,7 @@ impl Dump {
                 deviates: entry.is_some_and(|entry| deviates(read.at, entry, read.value, default)),
                 unit: entry.and_then(|entry| entry.unit.clone()),
                 meaning: entry.zip(read.value).and_then(|(entry, value)| entry.meaning(value)).map(str::to_owned),
-                bits: entry.is_some_and(|entry| entry.data_type == DataType::Unsigned32 && entry.unit.is_none()),
+                bits: entry.is_some_and(is_bits),
             }
         });
         let missing = product.into_iter().flat_map(|product| product.dictionary.entries()).filter_map(|(at, _, _)| {
@@ -194,8 +194,20 @@ impl DumpEntry {
 
     /// The value for a person: bits in hexadecimal digits.
     pub fn shown(&self) -> String {
-        let bits = self.value.as_ref().filter(|_| self.bits).and_then(serde_json::Number::as_u64);
-        bits.map_or_else(|| self.number(), |bits| format!("0x{bits:08X}"))
+        self.person(self.value.as_ref())
+    }
+
+    /// The factory's value for a person; `-` where there is none.
+    pub fn shown_default(&self) -> String {
+        self.person(self.default.as_ref())
+    }
+
+    fn person(&self, value: Option<&serde_json::Number>) -> String {
+        match value.map(|value| (value, value.as_u64())) {
+            None => "-".to_owned(),
+            Some((_, Some(bits))) if self.bits => format!("0x{bits:08X}"),
+            Some((value, _)) => value.to_string(),
+        }
     }
 
     /// Where it lies; `None` in a dump that somebody has edited badly.
@@ -208,6 +220,19 @@ impl DumpEntry {
 /// The entry's name with its object's, which tells sub-indices of the same name apart.
 pub fn name(object: &Object, entry: &Entry) -> String {
     if object.entries.len() == 1 { object.name.clone() } else { format!("{}, {}", object.name, entry.name) }
+}
+
+/// A value of an entry for a person: bits in hexadecimal digits.
+pub fn shown(entry: &Entry, value: Value) -> String {
+    match value.as_integer() {
+        Some(bits) if is_bits(entry) => format!("0x{bits:08X}"),
+        _ => value.to_string(),
+    }
+}
+
+/// Whether an entry holds bits and not a number of something.
+fn is_bits(entry: &Entry) -> bool {
+    entry.data_type == DataType::Unsigned32 && entry.unit.is_none()
 }
 
 /// Whether a parameter is not what the factory made it. Measurements and what is a unit's own are no deviations.

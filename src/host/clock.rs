@@ -59,6 +59,12 @@ pub fn day_before(time_of_day: Duration, earlier: Duration) -> Duration {
     Duration::from_nanos(u64::try_from(nanos).unwrap_or_default())
 }
 
+/// A moment in milliseconds since 1970 as local date and time, to the second.
+pub fn local_text(unix_millis: i64) -> String {
+    let moment = Timestamp::from_millisecond(unix_millis).unwrap_or(Timestamp::UNIX_EPOCH);
+    moment.to_zoned(TimeZone::system()).strftime("%Y-%m-%d %H:%M:%S").to_string()
+}
+
 /// A moment of the file system as local date and time, to the minute.
 pub fn local_date_and_time(moment: SystemTime) -> Option<String> {
     let timestamp = Timestamp::try_from(moment).ok()?;

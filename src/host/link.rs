@@ -209,7 +209,7 @@ pub struct Connection {
     // Closed in this order: first our side, then the unit that hangs on the other.
     lines: Lines,
     #[cfg(unix)]
-    unit: Option<super::unit::HostedUnit>,
+    unit: Option<(super::unit::HostedUnit, &'static Product)>,
     outgoing: Option<SyncSender<Vec<u8>>>,
     port: String,
     settings: String,
@@ -331,7 +331,7 @@ impl Connection {
         let unit = HostedUnit::start(unit, hosting).map_err(|error| failed(error.into()))?;
         let (lines, outgoing) = serial::open(unit.serial(), options, clock, inputs)?;
         let mut connection = Connection::new(spec, options, lines, outgoing, Some("emulator".into()));
-        connection.unit = Some(unit);
+        connection.unit = Some((unit, product));
         Ok(connection)
     }
 
@@ -412,7 +412,31 @@ impl Connection {
     /// The emulated unit at the other end, if it lives in this process.
     #[cfg(unix)]
     pub fn unit(&self) -> Option<&super::unit::HostedUnit> {
-        self.unit.as_ref()
+        self.unit.as_ref().map(|(unit, _)| unit)
+    }
+
+    /// Has something done to the emulated unit in this process, in the words of `axcon emulate`; `answered` hears what
+    /// came of it, perhaps from another thread.
+    #[cfg(unix)]
+    pub fn order(&self, line: &str, answered: impl FnOnce(Result<Option<String>, String>) + Send + 'static) {
+        use crate::emulator::scenario::Verb;
+
+        let Some((unit, product)) = &self.unit else {
+            return answered(Err("there is no emulated unit at the other end".into()));
+        };
+        match Verb::read(line, product) {
+            Err(error) => answered(Err(format!("column {}: {}", error.column, error.message))),
+            // An order that is not taken is never answered: what waits is a person, who sees that.
+            Ok(verb) => {
+                unit.order(verb, answered);
+            }
+        }
+    }
+
+    /// The same where emulated units are not hosted.
+    #[cfg(not(unix))]
+    pub fn order(&self, _line: &str, answered: impl FnOnce(Result<Option<String>, String>) + Send + 'static) {
+        answered(Err("this system has no pseudo-terminals for emulated units".into()));
     }
 }
 

@@ -8,6 +8,7 @@ pub mod address;
 pub mod clock;
 pub mod comeback;
 pub mod journal;
+pub mod library;
 pub mod link;
 pub mod network;
 pub mod ports;

@@ -67,7 +67,7 @@ struct Limits {
 const LIMITS: Limits = Limits { bytes: 200_000_000, files: 200, part_bytes: 20_000_000 };
 
 /// Ending of a recording's name; nothing else in the directory is ever deleted.
-const ENDING: &str = ".cast";
+pub(super) const ENDING: &str = ".cast";
 
 impl Recorder {
     /// Starts recording a connection. Never fails: see [`take_warning`](Recorder::take_warning).

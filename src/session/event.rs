@@ -42,6 +42,9 @@ pub enum Command {
         /// How many.
         pages: Option<u32>,
     },
+    /// In a recording: understand all that goes by, as it goes by. A dictionary that was walked through is told of by
+    /// [`Outcome::DictionaryRead`] as often as that happened.
+    Overhear,
     /// Upload new software.
     Load(Box<LoadOrder>),
     /// End the running job as soon as that is safe, and say what the unit is now.
@@ -89,6 +92,8 @@ pub enum Job {
     ReadDictionary,
     /// [`Command::Diagnostics`].
     Diagnostics,
+    /// [`Command::Overhear`].
+    Overhear,
     /// [`Command::Load`].
     Load,
 }
@@ -105,6 +110,9 @@ pub enum Refusal {
     /// The password is empty or holds a control character, which would end it early.
     #[error("the password is empty or holds a control character")]
     Password,
+    /// There is somebody to ask.
+    #[error("only a recording is listened to; a unit is asked")]
+    Live,
     /// The session listens to a recording.
     #[error("this is a recording: nothing can be sent to the unit")]
     ReadOnly,

@@ -175,6 +175,8 @@ impl Session {
             Command::Diagnostics { pages } if self.passive => {
                 (Job::Diagnostics, Box::new(overheard::Diagnostics::new(pages)))
             }
+            Command::Overhear if self.passive => (Job::Overhear, Box::new(overheard::Everything::new())),
+            Command::Overhear => return Err(Refusal::Live),
             Command::Keys(_)
             | Command::Bytes(_)
             | Command::Identify

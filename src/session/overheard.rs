@@ -148,3 +148,45 @@ impl Work for Diagnostics {
         self.page.due()
     }
 }
+
+/// Everything that goes by: dictionaries that were walked through, pages that came.
+pub(super) struct Everything {
+    dictionary: Dictionary,
+    diagnostics: Diagnostics,
+}
+
+impl Everything {
+    pub(super) fn new() -> Self {
+        Everything { dictionary: Dictionary::default(), diagnostics: Diagnostics::new(None) }
+    }
+}
+
+impl Work for Everything {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Cancel | Signal::LinkLost => return Some(Outcome::Cancelled(Job::Overhear)),
+            Signal::Over => {
+                let page = self.diagnostics.page.complete(desk);
+                page.map(|page| self.diagnostics.page(page, desk));
+                let is_there = self.dictionary.collector.count() > 0;
+                let read = is_there.then(|| self.dictionary.handle(signal, desk)).flatten();
+                return Some(read.unwrap_or(Outcome::Done(Job::Overhear)));
+            }
+            _ => {}
+        }
+        self.dictionary.handle(signal, desk);
+        if !desk.understood {
+            self.diagnostics.handle(signal, desk);
+        }
+        // A walk that has seen everything need not wait for the recording's end.
+        if matches!(signal, Signal::Heard(_, Message::MenuKey(_))) && self.dictionary.collector.has_all() {
+            let read = self.dictionary.collector.take(true);
+            desk.events.push_back(Event::Finished(Outcome::DictionaryRead(Box::new(read))));
+        }
+        None
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.diagnostics.deadline()
+    }
+}

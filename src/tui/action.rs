@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::input::Playback;
 use super::popup::Question;
 use super::screens::ScreenId;
 use crate::secret::Secret;
@@ -28,7 +29,7 @@ pub enum Action {
     Ask(Question),
     /// Ask the session.
     Command(Command),
-    /// Open the unit's view sub-menu (it halts scanning and CAN) and watch it.
+    /// Open the unit's view sub-menu (it halts scanning and CAN) and watch it on the terminal.
     ViewDictionary,
     /// Start the upload of the image on the load screen.
     StartLoad {
@@ -41,6 +42,24 @@ pub enum Action {
     DismissReport,
     /// Start minimum and maximum anew.
     RestartExtremes,
+    /// Mark this moment in chart and recording.
+    Mark,
+    /// Show only what has these words, or go to the newest line that has.
+    Find(String),
+    /// Write the stream to a new file from now on, the rows kept first.
+    ExportStream(PathBuf),
+    /// No more rows to the file.
+    EndExport,
+    /// Write the object dictionary to a new file, in the format its name says.
+    ExportDictionary(PathBuf),
+    /// Compare the object dictionary with a saved dump.
+    Compare(PathBuf),
+    /// List the recordings.
+    ListRecordings,
+    /// Play a recording differently.
+    Play(Playback),
+    /// Have something done to the emulated unit.
+    Order(String),
     /// Leave the program.
     Quit,
     /// Leave the unit's view sub-menu first, then the program.

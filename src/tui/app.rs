@@ -3,7 +3,7 @@
 //! One way through: an input changes the session or a screen, the session's news are folded into the view, what it
 //! wants sent becomes effects, and the picture is drawn from the view when the loop around finds it worth drawing.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ratatui::Frame;
 use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind};
@@ -14,20 +14,27 @@ use super::frame;
 use super::input::{Effect, Failure, Input, LinkInfo};
 use super::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd};
 use super::popup::{self, Answer, Popup, Question};
+use super::screens::bench::{self, Bench};
 use super::screens::connect::Connect;
+use super::screens::diagnostics::Diagnostics;
+use super::screens::dictionary::Dictionary;
 use super::screens::help::Help;
 use super::screens::load::Load;
 use super::screens::overview::Overview;
+use super::screens::recordings::Recordings;
+use super::screens::stream::Stream;
 use super::screens::terminal::{Meaning, Terminal};
 use super::screens::{Scene, ScreenId};
 use super::scrollback::Scrollback;
 use super::theme::Theme;
-use super::view::{Link, LinkState, Tone, View};
-use super::widgets::lines;
+use super::view::{Export, Link, LinkState, Tone, View};
+use super::widgets::{format, lines};
+use crate::dump::{self, Dump};
 use crate::endpoint::Endpoint;
 use crate::record::Record;
 use crate::session::{Command, Event, Facts, Job, LoadOrder, Outcome, Session, UnitNow};
 use crate::time::{Duration, Instant};
+use crate::wire::stream::Row;
 
 /// How often the picture moves while an upload runs, so that its times go on when the unit is silent.
 const UPLOAD_TICK: Duration = Duration::from_millis(500);
@@ -67,6 +74,11 @@ pub struct App {
     overview: Overview,
     terminal: Terminal,
     load: Load,
+    dictionary: Dictionary,
+    stream: Stream,
+    diagnostics: Diagnostics,
+    recordings: Recordings,
+    bench: Bench,
 }
 
 impl App {
@@ -90,13 +102,18 @@ impl App {
             overview: Overview::default(),
             terminal: Terminal::default(),
             load: Load::new(options.directory.clone()),
+            dictionary: Dictionary::default(),
+            stream: Stream::default(),
+            diagnostics: Diagnostics::default(),
+            recordings: Recordings::default(),
+            bench: Bench::default(),
             options,
         }
     }
 
     /// The first effects: the ports are listed, the given link is opened.
     pub fn start(&mut self) -> Vec<Effect> {
-        let mut effects = vec![Effect::ListPorts];
+        let mut effects = vec![Effect::ListPorts, Effect::ListRecordings];
         if let Some(link) = self.options.link.clone() {
             self.perform(Action::Open(link), &mut effects);
         }
@@ -136,6 +153,21 @@ impl App {
             }
             Input::ImageChecked(facts) => {
                 self.load.checked(facts);
+                self.dirty = true;
+            }
+            Input::FileWritten { path, result } => self.file_written(&path, result),
+            Input::FileRead { path, text } => self.file_read(&path, text),
+            Input::RecordingsListed(found) => {
+                self.recordings.listed(found);
+                self.dirty = true;
+            }
+            Input::Playing(playing) => {
+                self.dirty |= self.view.playing != Some(playing);
+                self.view.playing = Some(playing);
+            }
+            Input::PlayedAnew(info) => self.played_anew(now, info),
+            Input::Ordered { line, answer } => {
+                self.bench.answered(&line, answer);
                 self.dirty = true;
             }
             Input::Signal => effects.push(Effect::Quit),
@@ -208,7 +240,13 @@ impl App {
             _ if self.help.is_some() => frame::help_keys(theme),
             ScreenId::Terminal => frame::terminal_keys(theme, self.front.bindings(), self.terminal.is_after_prefix()),
             ScreenId::Load => frame::keys(theme, self.load.footer(&self.view)),
-            ScreenId::Connect | ScreenId::Overview => frame::keys(theme, self.front.bindings()),
+            ScreenId::Connect
+            | ScreenId::Overview
+            | ScreenId::Dictionary
+            | ScreenId::Stream
+            | ScreenId::Diagnostics
+            | ScreenId::Recordings
+            | ScreenId::Bench => frame::keys(theme, self.front.bindings()),
         };
         lines::draw(frame, row(area.height - 1), [keys]);
         if let Some(popup) = &self.popup {
@@ -233,6 +271,11 @@ impl App {
             ScreenId::Overview => self.overview.draw(scene, area, frame),
             ScreenId::Terminal => self.terminal.draw(scene, area, frame),
             ScreenId::Load => self.load.draw(scene, area, frame),
+            ScreenId::Dictionary => self.dictionary.draw(scene, area, frame),
+            ScreenId::Stream => self.stream.draw(scene, area, frame),
+            ScreenId::Diagnostics => self.diagnostics.draw(scene, area, frame),
+            ScreenId::Recordings => self.recordings.draw(scene, area, frame),
+            ScreenId::Bench => self.bench.draw(scene, area, frame),
         }
     }
 
@@ -270,6 +313,7 @@ impl App {
                     self.popup = None;
                     self.perform(action, effects);
                 }
+                Answer::Meanwhile(action) => self.perform(action, effects),
             }
             return;
         }
@@ -346,6 +390,22 @@ impl App {
             | Cmd::Hex
             | Cmd::Times
             | Cmd::Restart
+            | Cmd::Left
+            | Cmd::Right
+            | Cmd::Zoom
+            | Cmd::Pause
+            | Cmd::Mark
+            | Cmd::Export
+            | Cmd::Find
+            | Cmd::FindNext
+            | Cmd::Only
+            | Cmd::Compare
+            | Cmd::Faster
+            | Cmd::Slower
+            | Cmd::OpenWire
+            | Cmd::ShortWire
+            | Cmd::Repair
+            | Cmd::Power
             | Cmd::Prefix => self.screen(cmd, effects),
         }
     }
@@ -358,6 +418,14 @@ impl App {
             ScreenId::Overview => self.overview.on(cmd, self.view.stream.channels.len()),
             ScreenId::Terminal => self.terminal.on(cmd, &self.scrollback, record, page),
             ScreenId::Load => self.load.on(cmd, &self.view, page),
+            ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
+            ScreenId::Stream => self.stream.on(cmd, &self.view),
+            ScreenId::Diagnostics => {
+                let found = &self.view.diagnostics;
+                self.diagnostics.on(cmd, found.lines.len().max(found.found.len()), page)
+            }
+            ScreenId::Recordings => self.recordings.on(cmd, &self.view),
+            ScreenId::Bench => self.bench.on(cmd, &self.view),
         };
         if let Some(action) = action {
             self.perform(action, effects);
@@ -383,12 +451,12 @@ impl App {
                 self.perform(Action::Command(Command::StreamOff), effects);
             }
             MenuCmd::Stream => self.ask(Question::stream()),
+            MenuCmd::Diagnostics if self.view.job == Some(Job::Diagnostics) => {
+                self.perform(Action::Command(Command::Cancel), effects);
+            }
             MenuCmd::Diagnostics => {
-                if self.command(Command::Keys(b"s".to_vec())) {
-                    self.front = ScreenId::Terminal;
-                    self.terminal.follow();
-                    self.view.tell(Tone::Quiet, "S is sent. The unit prints its diagnostics here; S again stops it.");
-                }
+                self.front = ScreenId::Diagnostics;
+                self.perform(Action::Command(Command::Diagnostics { pages: None }), effects);
             }
             MenuCmd::Load => {}
         }
@@ -399,10 +467,14 @@ impl App {
         match action {
             Action::Go(screen) => {
                 self.front = screen;
-                if screen == ScreenId::Load
-                    && let Some(action) = self.load.entered()
-                {
-                    self.perform(action, effects);
+                match screen {
+                    ScreenId::Load => {
+                        if let Some(action) = self.load.entered() {
+                            self.perform(action, effects);
+                        }
+                    }
+                    ScreenId::Recordings => effects.push(Effect::ListRecordings),
+                    _ => {}
                 }
             }
             Action::Open(_) if self.view.job.is_some() => self.ask(Question::Disconnect),
@@ -424,8 +496,10 @@ impl App {
             }
             Action::Ask(question) => self.ask(question),
             Action::Command(command) => {
-                if self.can_send() {
-                    self.command(command);
+                let reads = matches!(command, Command::ReadDictionary);
+                if self.can_send() && self.command(command) && reads {
+                    self.view.entries_read = 0;
+                    self.front = ScreenId::Dictionary;
                 }
             }
             Action::ViewDictionary => {
@@ -449,6 +523,22 @@ impl App {
             }
             Action::DismissReport => self.view.load.report = None,
             Action::RestartExtremes => self.view.restart_extremes(),
+            Action::Mark => self.mark(effects),
+            Action::Find(words) => match self.front {
+                ScreenId::Terminal => self.terminal.find(words, &self.scrollback),
+                _ => self.dictionary.find(&words),
+            },
+            Action::ExportStream(path) => self.export_stream(path, effects),
+            Action::EndExport => self.end_export(None),
+            Action::ExportDictionary(path) => self.export_dictionary(path, effects),
+            Action::Compare(path) => effects.push(Effect::ReadFile(path)),
+            Action::ListRecordings => effects.push(Effect::ListRecordings),
+            Action::Play(playback) => effects.push(Effect::Play(playback)),
+            Action::Order(line) if bench::emulated(&self.view).is_some() => {
+                self.bench.ordered(self.now, line.clone());
+                effects.push(Effect::Order(line));
+            }
+            Action::Order(_) => {}
             Action::Quit => effects.push(Effect::Quit),
             Action::LeaveViewAndQuit => {
                 self.command(Command::Keys(b"x".to_vec()));
@@ -469,6 +559,7 @@ impl App {
             Command::RestoreDefaults => Some(Job::RestoreDefaults),
             Command::ReadDictionary => Some(Job::ReadDictionary),
             Command::Diagnostics { .. } => Some(Job::Diagnostics),
+            Command::Overhear => Some(Job::Overhear),
             Command::Load(_) => Some(Job::Load),
         };
         let leaves_view = matches!(&command, Command::Keys(keys) if keys.iter().any(|key| b"xX".contains(key)));
@@ -534,7 +625,18 @@ impl App {
             return;
         }
         self.popup = None;
+        let read_only = info.read_only;
         self.scrollback.begin(now, format!("connected to {}", super::visible::text(&info.link)));
+        self.begin_session(info);
+        // Who has chosen a recording wants to steer it.
+        self.front = if self.front == ScreenId::Recordings { self.front } else { ScreenId::Overview };
+        if !read_only {
+            self.command(Command::Identify);
+        }
+    }
+
+    /// A session on the link that has just been opened.
+    fn begin_session(&mut self, info: LinkInfo) {
         let session = if info.read_only { Session::of_recording } else { Session::new };
         self.session = Some(session(info.baud));
         self.start_of_day = info.start_of_day;
@@ -542,11 +644,129 @@ impl App {
             name: Some(info.link),
             baud: info.baud,
             recording: info.recording,
+            start_millis: info.start_millis,
             state: LinkState::Open { read_only: info.read_only },
         });
-        self.front = ScreenId::Overview;
-        if !info.read_only {
-            self.command(Command::Identify);
+        self.dictionary.begin_link();
+        self.stream.begin_link();
+        self.bench.begin_link();
+        if info.read_only {
+            // What goes by in a recording is understood as it goes by; nothing is sent for it.
+            self.command(Command::Overhear);
+            self.view.job = None;
+        }
+    }
+
+    /// The recording is played from its beginning again: nothing of it has happened yet.
+    fn played_anew(&mut self, now: Instant, info: LinkInfo) {
+        self.dirty = true;
+        if matches!(self.view.link.state, LinkState::Open { read_only: true }) {
+            let playing = self.view.playing;
+            self.scrollback.begin(now, "from the beginning".into());
+            self.begin_session(info);
+            self.view.playing = playing;
+        }
+    }
+
+    fn mark(&mut self, effects: &mut Vec<Effect>) {
+        self.view.mark(self.now);
+        let text = format!("mark {}", self.view.stream.marks.len());
+        self.scrollback.note(self.now, text.clone());
+        self.view.tell(Tone::Quiet, format!("{text} is set, in the chart and in the recording."));
+        effects.push(Effect::Mark(text));
+    }
+
+    fn export_stream(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
+        let (stream, start) = (&self.view.stream, self.view.link.start_millis);
+        let channels: Vec<String> = stream.channels.iter().map(|channel| channel.name.clone()).collect();
+        if channels.is_empty() {
+            return self.view.tell(Tone::Bad, "There are no rows yet: T switches the stream on.");
+        }
+        let mut text = Row::csv_heading(&channels);
+        let mut rows = 0;
+        for (at, row) in stream.kept_rows() {
+            text.push_str(&row.csv(&format::utc(start, at)));
+            rows += 1;
+        }
+        effects.push(Effect::CreateFile { path: path.clone(), bytes: text.into_bytes() });
+        self.view.stream.export = Some(Export { path, rows, channels });
+    }
+
+    /// A row for the file that rows are written to.
+    fn export_row(&mut self, at: Instant, row: &Row, effects: &mut Vec<Effect>) {
+        let start = self.view.link.start_millis;
+        let Some(export) = &mut self.view.stream.export else { return };
+        if export.channels.len() != row.readings.len() {
+            return self.end_export(Some("the stream has other channels now"));
+        }
+        export.rows += 1;
+        let bytes = row.csv(&format::utc(start, at)).into_bytes();
+        match effects.last_mut() {
+            // Rows that came together are written together.
+            Some(Effect::AppendFile { path, bytes: before }) if *path == export.path => before.extend(bytes),
+            _ => effects.push(Effect::AppendFile { path: export.path.clone(), bytes }),
+        }
+    }
+
+    fn end_export(&mut self, why: Option<&str>) {
+        let Some(export) = self.view.stream.export.take() else { return };
+        let path = export.path.display();
+        let text = match why {
+            None => format!("{} rows are in {path}.", format::grouped(export.rows)),
+            Some(why) => format!("{path} ends after {} rows: {why}.", format::grouped(export.rows)),
+        };
+        self.view.tell(if why.is_none() { Tone::Good } else { Tone::Bad }, text);
+    }
+
+    fn export_dictionary(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
+        let Some(read) = &self.view.dictionary else {
+            return self.view.tell(Tone::Bad, "Nothing has been read yet: V reads the object dictionary.");
+        };
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
+        let text = match (ending.as_str(), self.view.product()) {
+            ("json", _) => read.dump.json(),
+            ("csv", _) => read.dump.csv(),
+            ("txt", _) => read.dump.table(),
+            ("dcf", Some(product)) => dump::configuration(&read.reading, product, &self.view.facts),
+            ("dcf", None) => {
+                return self.view.tell(Tone::Bad, "A DCF needs to know the product; .json keeps everything.");
+            }
+            _ => return self.view.tell(Tone::Bad, "Not written: the name has to end in .json, .csv, .dcf or .txt."),
+        };
+        effects.push(Effect::CreateFile { path, bytes: text.into_bytes() });
+    }
+
+    fn file_written(&mut self, path: &Path, result: Result<(), String>) {
+        self.dirty = true;
+        let shown = path.display();
+        let is_export = self.view.stream.export.as_ref().is_some_and(|export| export.path == path);
+        match result {
+            Ok(()) if is_export => {}
+            Ok(()) => self.view.tell(Tone::Good, format!("{shown} is written.")),
+            Err(why) => {
+                if is_export {
+                    self.view.stream.export = None;
+                }
+                self.view.tell(Tone::Bad, format!("{shown} is not written: {why}."));
+            }
+        }
+    }
+
+    fn file_read(&mut self, path: &Path, text: Result<String, String>) {
+        self.dirty = true;
+        let name = path.display().to_string();
+        let dump = text.and_then(|text| Dump::parse(&name, &text).map_err(|error| error.to_string()));
+        match dump {
+            Err(why) => self.view.tell(Tone::Bad, format!("Not compared: {why}.")),
+            Ok(_) if self.view.dictionary.is_none() => {
+                self.view.tell(Tone::Bad, "Nothing to compare it with yet: V reads the unit's object dictionary.");
+            }
+            Ok(dump) => {
+                let short = path.file_name().map_or(name.clone(), |name| name.to_string_lossy().into_owned());
+                self.dictionary.compare(short, dump);
+                self.view
+                    .tell(Tone::Quiet, format!("Compared with {name}: ≠ marks what differs, O chooses what is shown."));
+            }
         }
     }
 
@@ -616,6 +836,9 @@ impl App {
             let facts = self.session.as_ref().map_or(&self.no_facts, Session::facts);
             self.view.fold(self.now, &event, facts);
             self.dirty = true;
+            if let Event::Row { at, row, .. } = &event {
+                self.export_row(*at, row, effects);
+            }
             if let (Event::Finished(Outcome::Loaded(report)), Some(link)) = (&event, &self.view.link.name)
                 && report.unit == UnitNow::Application
             {

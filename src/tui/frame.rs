@@ -6,6 +6,7 @@ use ratatui::text::{Line, Span};
 
 use super::keymap::{Binding, EVERYWHERE, MENU};
 use super::screens::ScreenId;
+use super::screens::bench::emulated;
 use super::theme::Theme;
 use super::view::{LinkState, Tone, View};
 use super::visible;
@@ -20,6 +21,8 @@ const ABOVE: u16 = 2;
 const BELOW: u16 = 3;
 /// What stands before the recording's name.
 const RECORDING: &str = "rec ";
+/// What is being done takes no more than this.
+const ACTIVITY_COLUMNS: usize = 24;
 /// With fewer columns than this the recording's name says nothing.
 const LEAST_RECORDING: usize = 20;
 
@@ -83,30 +86,31 @@ pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
 /// The tabs; on the right what is being done, or else where the recording goes.
 pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) -> Line<'static> {
     let mut line = Line::raw(" ");
-    for (number, screen) in (1..).zip(ScreenId::ALL) {
-        let text = format!(" {number} {} ", screen.title());
+    let all = |title: fn(ScreenId) -> &'static str| ScreenId::ALL.map(|id| format::width(title(id)) + 5).iter().sum();
+    let needed: usize = all(ScreenId::title);
+    let title = if needed + ACTIVITY_COLUMNS <= columns { ScreenId::title } else { ScreenId::short_title };
+    // Only an emulated unit has a bench.
+    let shown =
+        ScreenId::ALL.into_iter().filter(|&id| id != ScreenId::Bench || front == Some(id) || emulated(view).is_some());
+    for (number, screen) in (1..).zip(shown) {
+        let text = format!(" {number} {} ", title(screen));
         line.push_span(match front == Some(screen) {
             true => Span::styled(text, theme.bar()),
             false => Span::raw(text),
         });
-        line.push_span(Span::raw(" "));
+        if needed + ACTIVITY_COLUMNS <= columns {
+            line.push_span(Span::raw(" "));
+        }
     }
     if front.is_none() {
         line.push_span(Span::styled(" Help ", theme.bar()));
     }
-    let activity = match view.job {
-        None if view.load.held_since.is_some() => "held by XOFF",
-        None => "",
-        Some(Job::Identify) => "asking the unit",
-        Some(Job::StreamOn | Job::StreamOff) => "setting the stream",
-        Some(Job::RestoreDefaults) => "restoring defaults",
-        Some(Job::ReadDictionary) => "reading the dictionary",
-        Some(Job::Diagnostics) => "reading diagnostics",
-        Some(Job::Load) => "loading",
-    };
+    let activity = activity(view);
     let room = columns.saturating_sub(line.width() + 1);
     let right = match &view.link.recording {
-        _ if !activity.is_empty() => Span::styled(activity, theme.warning()),
+        _ if !activity.is_empty() && format::width(activity) <= room => Span::styled(activity, theme.warning()),
+        // It stands where the latest word stands else.
+        _ if !activity.is_empty() => Span::raw(""),
         Some(path) if room > LEAST_RECORDING => {
             let path = format::keep_end(&visible::text(path), room - RECORDING.len());
             Span::styled(format!("{RECORDING}{path}"), theme.quiet())
@@ -116,6 +120,20 @@ pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) 
     line.push_span(Span::raw(" ".repeat(room.saturating_sub(right.width()))));
     line.push_span(right);
     line
+}
+
+/// What is being done.
+fn activity(view: &View) -> &'static str {
+    match view.job {
+        None if view.load.held_since.is_some() => "held by XOFF",
+        None | Some(Job::Overhear) => "",
+        Some(Job::Identify) => "asking the unit",
+        Some(Job::StreamOn | Job::StreamOff) => "setting the stream",
+        Some(Job::RestoreDefaults) => "restoring defaults",
+        Some(Job::ReadDictionary) => "reading the dictionary",
+        Some(Job::Diagnostics) => "reading diagnostics",
+        Some(Job::Load) => "loading",
+    }
 }
 
 /// The lost link, for the top of every screen.
@@ -130,13 +148,19 @@ pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
 
 /// The latest word, on the rule that closes the screen.
 pub fn notice(view: &View, theme: Theme, columns: usize) -> Line<'static> {
-    let Some(notice) = &view.notice else { return Line::styled("─".repeat(columns), theme.quiet()) };
-    let style = match notice.tone {
-        Tone::Quiet => theme.strong(),
-        Tone::Good => theme.good(),
-        Tone::Bad => theme.bad(),
+    let (text, style) = match &view.notice {
+        None if activity(view).is_empty() => return Line::styled("─".repeat(columns), theme.quiet()),
+        None => (format!("{} ...", activity(view)), theme.warning()),
+        Some(notice) => {
+            let style = match notice.tone {
+                Tone::Quiet => theme.strong(),
+                Tone::Good => theme.good(),
+                Tone::Bad => theme.bad(),
+            };
+            (visible::text(&notice.text), style)
+        }
     };
-    let text = format!(" {} ", format::keep_start(&visible::text(&notice.text), columns.saturating_sub(6)));
+    let text = format!(" {} ", format::keep_start(&text, columns.saturating_sub(6)));
     let rest = columns.saturating_sub(2 + format::width(&text));
     Line::from(vec![
         Span::styled("──", theme.quiet()),
@@ -172,7 +196,7 @@ pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> 
     for binding in bindings.iter().filter(|binding| is_letter(binding)) {
         line.spans.extend(hint(theme, binding));
     }
-    line.push_span(Span::styled("1-4", theme.key()));
+    line.push_span(Span::styled("1-9", theme.key()));
     line.push_span(Span::raw(" screen  "));
     line.spans.extend(hints(theme, &[EVERYWHERE]));
     line
@@ -181,7 +205,7 @@ pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> 
 /// The keys of the help page.
 pub fn help_keys(theme: Theme) -> Line<'static> {
     let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
-    for (key, meaning) in [("↑↓", "scroll"), ("1-4", "screen"), ("any other key", "back")] {
+    for (key, meaning) in [("↑↓", "scroll"), ("1-9", "screen"), ("any other key", "back")] {
         line.push_span(Span::styled(key, theme.key()));
         line.push_span(Span::raw(format!(" {meaning}  ")));
     }

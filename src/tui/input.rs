@@ -11,6 +11,9 @@ use crate::image::{CheckedImage, Report, Severity};
 use crate::time::Duration;
 use crate::version::Version;
 
+/// Largest text file that is read: a dump of the largest product has a tenth of it.
+pub const LARGEST_TEXT: u64 = 4 << 20;
+
 /// What can happen.
 #[derive(Debug)]
 pub enum Input {
@@ -45,6 +48,33 @@ pub enum Input {
     },
     /// Answer to [`Effect::CheckImage`].
     ImageChecked(Box<ImageFacts>),
+    /// Answer to [`Effect::CreateFile`] and, where it fails, to [`Effect::AppendFile`].
+    FileWritten {
+        /// Which file.
+        path: PathBuf,
+        /// Why it could not be written.
+        result: Result<(), String>,
+    },
+    /// Answer to [`Effect::ReadFile`].
+    FileRead {
+        /// Which file.
+        path: PathBuf,
+        /// What is in it, or why it cannot be read.
+        text: Result<String, String>,
+    },
+    /// Answer to [`Effect::ListRecordings`]: newest first.
+    RecordingsListed(Result<Vec<RecordingEntry>, String>),
+    /// How the recording is played now.
+    Playing(Playing),
+    /// The recording begins anew: what it showed so far has not happened yet.
+    PlayedAnew(LinkInfo),
+    /// Answer to [`Effect::Order`].
+    Ordered {
+        /// The order.
+        line: String,
+        /// What the unit had to say, or why it refused.
+        answer: Result<Option<String>, String>,
+    },
     /// The system wants the program to end: leave without asking.
     Signal,
 }
@@ -66,6 +96,32 @@ pub enum Effect {
     ListFiles(PathBuf),
     /// Read and check an image file. Answered by [`Input::ImageChecked`], also when the file cannot be read.
     CheckImage(PathBuf),
+    /// Write a new file. One that is there already is left alone, and that is an error. Answered by
+    /// [`Input::FileWritten`].
+    CreateFile {
+        /// Which.
+        path: PathBuf,
+        /// What is in it.
+        bytes: Vec<u8>,
+    },
+    /// Write more behind a file that [`Effect::CreateFile`] has made.
+    AppendFile {
+        /// Which.
+        path: PathBuf,
+        /// What follows.
+        bytes: Vec<u8>,
+    },
+    /// Read a text file of at most [`LARGEST_TEXT`] bytes. Answered by [`Input::FileRead`].
+    ReadFile(PathBuf),
+    /// Put a remark in the recording.
+    Mark(String),
+    /// List the recordings. Answered by [`Input::RecordingsListed`].
+    ListRecordings,
+    /// Play the recording differently. Answered by [`Input::Playing`] whenever it has moved.
+    Play(Playback),
+    /// Have the emulated unit at the other end do something, in the words `axcon emulate` takes. Answered by
+    /// [`Input::Ordered`].
+    Order(String),
     /// Note that an upload begins on a link, before the loader is entered: a loader does not say which product it is of.
     UploadBegins {
         /// The link.
@@ -108,6 +164,58 @@ pub struct LinkInfo {
     pub recording: Option<String>,
     /// Local time of day at [`Instant::ZERO`](crate::time::Instant::ZERO): another one in a recording.
     pub start_of_day: Duration,
+    /// The same moment in milliseconds since 1970, UTC.
+    pub start_millis: i64,
+}
+
+/// One recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordingEntry {
+    /// What plays it: `replay:FILE`.
+    pub link: String,
+    /// When it began, local date and time.
+    pub begun: String,
+    /// The link it was made of, as the user named it then.
+    pub port: String,
+    /// Which part of a long session it is.
+    pub part: u32,
+    /// How long it is, where its end can be read.
+    pub length: Option<Duration>,
+    /// Bytes of the file.
+    pub bytes: u64,
+}
+
+/// What can be done to a recording that is played.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Playback {
+    /// Go on at this pace.
+    Pace(Pace),
+    /// Go to this place.
+    Seek(Duration),
+    /// Begin anew at this pace.
+    Again(Pace),
+}
+
+/// How a recording is played.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Playing {
+    /// How far it has come.
+    pub position: Duration,
+    /// How long it is, once its end has been seen.
+    pub length: Option<Duration>,
+    /// How fast.
+    pub pace: Pace,
+}
+
+/// How fast a recording is played.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// It stands.
+    Paused,
+    /// So many times as fast as it was made.
+    Times(u32),
+    /// As fast as it can be read.
+    AtOnce,
 }
 
 /// Something that did not work outside.

@@ -52,6 +52,38 @@ pub enum Cmd {
     Times,
     /// Start minimum and maximum anew.
     Restart,
+    /// Left, or earlier.
+    Left,
+    /// Right, or later.
+    Right,
+    /// More or less of it.
+    Zoom,
+    /// Hold, or go on.
+    Pause,
+    /// Remember this moment.
+    Mark,
+    /// Write it to a file.
+    Export,
+    /// Look for words.
+    Find,
+    /// The next one further up.
+    FindNext,
+    /// Only some of it.
+    Only,
+    /// Compare with a file.
+    Compare,
+    /// Play faster.
+    Faster,
+    /// Play slower.
+    Slower,
+    /// Break a sensor's wire.
+    OpenWire,
+    /// Short a sensor.
+    ShortWire,
+    /// Make a sensor's wires whole.
+    Repair,
+    /// Pull the power for a moment.
+    Power,
     /// The next key is for the console.
     Prefix,
 }
@@ -145,6 +177,11 @@ pub const EVERYWHERE: &[Binding] = &[
     go(&[Press::Plain(KeyCode::Char('2'))], ScreenId::Overview, "values, faults and identity"),
     go(&[Press::Plain(KeyCode::Char('3'))], ScreenId::Terminal, "what goes over the line, as it comes"),
     go(&[Press::Plain(KeyCode::Char('4'))], ScreenId::Load, "files and upload"),
+    go(&[Press::Plain(KeyCode::Char('5'))], ScreenId::Dictionary, "object dictionary with what it means"),
+    go(&[Press::Plain(KeyCode::Char('6'))], ScreenId::Stream, "table and curves of the stream"),
+    go(&[Press::Plain(KeyCode::Char('7'))], ScreenId::Diagnostics, "the unit's own pages"),
+    go(&[Press::Plain(KeyCode::Char('8'))], ScreenId::Recordings, "what was recorded, and playing it"),
+    go(&[Press::Plain(KeyCode::Char('9'))], ScreenId::Bench, "sensors and power of an emulated unit"),
     Binding {
         keys: &[Press::Plain(KeyCode::Char('c'))],
         cmd: Cmd::Reconnect,
@@ -183,12 +220,15 @@ impl Press {
     pub fn name(self) -> String {
         match self {
             Press::Ctrl(character) => format!("Ctrl-{}", character.to_ascii_uppercase()),
+            Press::Plain(KeyCode::Char(' ')) => "Space".into(),
             Press::Plain(KeyCode::Char(character)) => character.to_ascii_uppercase().to_string(),
             Press::Plain(KeyCode::F(number)) => format!("F{number}"),
             Press::Plain(KeyCode::Up) => "↑".into(),
             Press::Plain(KeyCode::Down) => "↓".into(),
             Press::Plain(KeyCode::PageUp) => "PgUp".into(),
             Press::Plain(KeyCode::PageDown) => "PgDn".into(),
+            Press::Plain(KeyCode::Left) => "←".into(),
+            Press::Plain(KeyCode::Right) => "→".into(),
             Press::Plain(KeyCode::BackTab) => "Shift-Tab".into(),
             Press::Plain(code) => code.to_string(),
         }

@@ -15,12 +15,16 @@ pub mod run;
 mod screens;
 mod scrollback;
 mod theme;
+mod trend;
 mod view;
 mod visible;
 mod widgets;
 
 pub use app::{App, Options};
-pub use input::{Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, PortEntry};
+pub use input::{
+    Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_TEXT, LinkInfo, Pace, Playback, Playing,
+    PortEntry, RecordingEntry,
+};
 
 #[cfg(test)]
 mod pictures;

@@ -10,9 +10,19 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
-use super::{App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, PortEntry};
+use super::{
+    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, Pace, Playback, Playing,
+    PortEntry, RecordingEntry,
+};
+use crate::canopen::{ObjectAddress, Value};
+use crate::device::Product;
+use crate::device::dictionary::{Entry, Object};
+use crate::dump::Dump;
 use crate::endpoint::Transmit;
-use crate::session::{Event, Facts, LoadReport, Outcome, Phase, Progress, UnitNow, Verdict};
+use crate::record::Span;
+use crate::session::{
+    DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, Verdict,
+};
 use crate::time::{Duration, Instant};
 use crate::version::Version;
 
@@ -91,6 +101,7 @@ impl Stage {
             read_only: false,
             recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
             start_of_day: NOON,
+            start_millis: 1_769_860_800_000,
         }));
     }
 
@@ -99,6 +110,43 @@ impl Stage {
             text: "cannot read from /dev/ttyUSB0: the port has gone".into(),
             hints: vec!["Plug the adapter in again.".into()],
         }))
+    }
+
+    /// On the dictionary screen, the unit's read: two channels set differently, one entry not shown.
+    fn with_dictionary(size: (u16, u16)) -> Self {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter);
+        let reading = |(at, object, entry): (ObjectAddress, &Object, &Entry)| {
+            let value = match (at.index, at.sub) {
+                (0x6110, 2) => Some(Value::Unsigned16(2)),
+                (0x6112, 4) => Some(Value::Unsigned8(0)),
+                _ => entry.default.map(|default| default.on_node(127)),
+            };
+            let text = format!("{} = {}", object.name, value.map_or_else(|| "?".to_owned(), |value| value.to_string()));
+            ReadEntry { at, value, text, span: Span::default(), known: true }
+        };
+        let entries = axtc4co().dictionary.entries().filter(|(at, _, _)| *at != ObjectAddress::new(0x5010, 0));
+        let reading =
+            DictionaryReading { entries: entries.map(reading).collect(), complete: true, unrecognised_lines: 3 };
+        stage.fold(Event::Finished(Outcome::DictionaryRead(Box::new(reading))));
+        stage
+    }
+
+    /// On the screen of recordings, two there.
+    fn with_recordings(mut self) -> Self {
+        let entry = |begun: &str, port: &str, part, length| RecordingEntry {
+            link: format!("replay:/home/user/{begun}.cast"),
+            begun: begun.into(),
+            port: port.into(),
+            part,
+            length,
+            bytes: 1_234_567,
+        };
+        self.keys("8").input(Input::RecordingsListed(Ok(vec![
+            entry("2026-01-31 11:00:00", "/dev/ttyUSB0", 1, Some(Duration::from_secs(300))),
+            entry("2026-01-30 09:15:00", "rfc2217://terminal-server-in-hall-4:4001", 2, None),
+        ])));
+        self
     }
 
     /// On the load screen, the folder read.
@@ -206,6 +254,10 @@ impl Stage {
     fn shows(&self, text: &str) -> bool {
         self.picture().contains(text)
     }
+}
+
+fn axtc4co() -> &'static Product {
+    Product::named("AXTC4CO").expect("built in")
 }
 
 fn good_image() -> ImageFacts {
@@ -444,6 +496,145 @@ pictures! {
         stage.fold(Event::Progress(progress())).lost();
         stage
     };
+    dictionary_of_no_unit: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.keys("5");
+        stage
+    };
+    dictionary_of_the_manual: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("5/filter").press(KeyCode::Enter);
+        stage
+    };
+    dictionary_being_read: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter).fold(Event::EntriesRead(118));
+        stage
+    };
+    dictionary_read: Stage::with_dictionary;
+    dictionary_deviations: |size| {
+        let mut stage = Stage::with_dictionary(size);
+        stage.keys("o").press(KeyCode::Down);
+        stage
+    };
+    dictionary_compared: |size| {
+        let mut stage = Stage::with_dictionary(size);
+        stage.keys("wyesterday.json").press(KeyCode::Enter);
+        let text = Ok(Dump::factory(axtc4co()).json());
+        stage.input(Input::FileRead { path: "yesterday.json".into(), text });
+        stage
+    };
+    dictionary_finding: |size| {
+        let mut stage = Stage::with_dictionary(size);
+        stage.keys("/sensor type");
+        stage
+    };
+    dictionary_finds_nothing: |size| {
+        let mut stage = Stage::with_dictionary(size);
+        stage.keys("/xyzzy").press(KeyCode::Enter);
+        stage
+    };
+    dictionary_link_lost: |size| {
+        let mut stage = Stage::with_dictionary(size);
+        stage.lost();
+        stage
+    };
+    stream_off: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("6");
+        stage
+    };
+    stream_running: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6").press(KeyCode::Down);
+        stage
+    };
+    stream_held_at_a_gap: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6k").press(KeyCode::Down).press(KeyCode::Down).press(KeyCode::Down);
+        (0..36).for_each(|_| {
+            stage.press(KeyCode::Left);
+        });
+        stage
+    };
+    stream_export_question: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6e");
+        stage
+    };
+    stream_exporting: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6e").press(KeyCode::Enter).bytes(b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n");
+        stage
+    };
+    stream_link_lost: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6").lost();
+        stage
+    };
+    diagnostics_none: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("7");
+        stage
+    };
+    diagnostics_running: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("s").wait(2000);
+        for supply in ["23.91", "24.10", "24.02"] {
+            let page = format!(
+                "Diagnostics   up 0:00:12\r\n Supply Voltage: {supply} V\r\n Cold Junction: 24.5 C\r\n\
+                 \x20TC1  100.123 C   raw   3991 uV   status 0x00\r\n TC2  180.002 C   raw   7310 uV   status 0x00\r\n\
+                 \x20Active Errors: 0\r\n"
+            );
+            stage.bytes(page.as_bytes()).wait(1000);
+        }
+        stage
+    };
+    recordings_none: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.keys("8").input(Input::RecordingsListed(Ok(Vec::new())));
+        stage
+    };
+    recordings_cannot_list: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.keys("8").input(Input::RecordingsListed(Err("cannot read '/home/x': permission denied".into())));
+        stage
+    };
+    recordings_listed: |size| Stage::with_ports(size).with_recordings();
+    recordings_playing: |size| {
+        let mut stage = Stage::with_ports(size).with_recordings();
+        stage.press(KeyCode::Enter);
+        stage.input(Input::LinkOpened(LinkInfo {
+            link: "replay:/home/user/20260131T110000Z-ttyUSB0-7.cast".into(),
+            baud: 115_200,
+            read_only: true,
+            recording: None,
+            start_of_day: NOON,
+            start_millis: 1_769_860_800_000,
+        }));
+        let (position, length) = (Duration::from_secs(75), Some(Duration::from_secs(300)));
+        stage.bytes(BANNER).input(Input::Playing(Playing { position, length, pace: Pace::Times(10) }));
+        stage
+    };
+    bench_of_a_real_unit: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("9");
+        stage
+    };
+    bench_in_use: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("emu:axtc4co");
+        stage.bytes(BANNER).bytes(MENU).wait(3000).keys("9");
+        stage.press(KeyCode::Right).press(KeyCode::Down).keys("oh/fault nonsense").press(KeyCode::Enter);
+        for (line, answer) in [
+            ("set 1 temperature 30.0", Ok(None)),
+            ("open 2", Ok(None)),
+            ("short 2", Err("this input cannot be shorted".to_owned())),
+        ] {
+            stage.input(Input::Ordered { line: line.into(), answer });
+        }
+        stage
+    };
     help_on_overview: |size| {
         let mut stage = Stage::connected(size);
         stage.press(KeyCode::F(1));
@@ -468,7 +659,25 @@ fn a_small_terminal_gets_one_clear_message() {
 
 #[test]
 fn every_screen_survives_every_size() {
-    let scenes: [fn() -> Stage; 9] = [
+    let scenes: [fn() -> Stage; 14] = [
+        || Stage::with_dictionary(SMALL),
+        || {
+            let mut stage = Stage::streaming(SMALL);
+            stage.keys("6").press(KeyCode::Left);
+            stage
+        },
+        || {
+            let mut stage = Stage::connected(SMALL);
+            stage.keys("s").wait(2000).bytes(b"Supply: 24 V\r\nCurrent: 1 A\r\n").wait(1000);
+            stage
+        },
+        || Stage::with_ports(SMALL).with_recordings(),
+        || {
+            let mut stage = Stage::with_ports(SMALL);
+            stage.press(KeyCode::Enter).opened("emu:axrtd8co");
+            stage.keys("9o");
+            stage
+        },
         || Stage::with_ports(SMALL),
         || Stage::streaming(SMALL),
         || Stage::connected(SMALL).picking(),
@@ -542,7 +751,7 @@ fn connecting_asks_the_unit_who_it_is() {
 fn the_link_given_at_the_start_is_opened_at_once() {
     let mut app =
         App::new(Options { link: Some("emu:axtc4co".into()), directory: "/".into(), colour: true, size: SMALL });
-    assert_eq!(app.start(), [Effect::ListPorts, Effect::OpenLink("emu:axtc4co".into())]);
+    assert_eq!(app.start(), [Effect::ListPorts, Effect::ListRecordings, Effect::OpenLink("emu:axtc4co".into())]);
 }
 
 #[test]
@@ -565,17 +774,81 @@ fn a_lost_link_is_opened_again_by_c_and_the_terminal_keeps_its_lines() {
 }
 
 #[test]
+fn a_recording_is_steered_by_its_keys() {
+    let mut stage = Stage::with_ports(SMALL).with_recordings();
+    stage.keys(" +").press(KeyCode::Left);
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::OpenLink("replay:/home/user/2026-01-31 11:00:00.cast".into())]);
+    stage.input(Input::LinkOpened(LinkInfo {
+        link: "replay:x".into(),
+        baud: 115_200,
+        read_only: true,
+        recording: None,
+        start_of_day: NOON,
+        start_millis: 0,
+    }));
+    let seconds = Duration::from_secs;
+    let plays = |stage: &mut Stage, position, pace| {
+        stage.input(Input::Playing(Playing { position: seconds(position), length: Some(seconds(100)), pace }));
+        stage.asked();
+    };
+    plays(&mut stage, 50, Pace::Times(5));
+    for (key, wanted) in [
+        (KeyCode::Char(' '), Playback::Pace(Pace::Paused)),
+        (KeyCode::Char('+'), Playback::Pace(Pace::Times(10))),
+        (KeyCode::Char('-'), Playback::Pace(Pace::Times(2))),
+        (KeyCode::Left, Playback::Seek(seconds(40))),
+        (KeyCode::Right, Playback::Seek(seconds(60))),
+        (KeyCode::Home, Playback::Seek(seconds(0))),
+        (KeyCode::End, Playback::Seek(seconds(100))),
+    ] {
+        stage.press(key);
+        assert_eq!(stage.asked(), [Effect::Play(wanted)]);
+    }
+    plays(&mut stage, 50, Pace::Paused);
+    stage.keys(" ");
+    assert_eq!(stage.asked(), [Effect::Play(Playback::Pace(Pace::Times(5)))], "as fast as before the pause");
+    plays(&mut stage, 100, Pace::AtOnce);
+    plays(&mut stage, 100, Pace::Paused);
+    stage.keys(" ");
+    assert_eq!(stage.asked(), [Effect::Play(Playback::Again(Pace::Times(1)))], "from the beginning");
+}
+
+#[test]
+fn only_an_emulated_unit_is_given_orders() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("9");
+    stage.asked();
+    stage.keys("ohp").press(KeyCode::Right).press(KeyCode::Enter);
+    assert_eq!(stage.asked(), []);
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("EMU:AXTC4CO");
+    stage.keys("9").asked();
+    stage.press(KeyCode::Down).press(KeyCode::Enter).keys("x").press(KeyCode::Enter);
+    assert!(stage.shows("A number of degrees"), "{}", stage.picture());
+    stage.press(KeyCode::Backspace).keys("451.5").press(KeyCode::Enter);
+    stage.input(Input::Ordered { line: "set 2 temperature 451.5".into(), answer: Ok(None) });
+    stage.press(KeyCode::Left).keys("p");
+    let order = |line: &str| Effect::Order(line.into());
+    assert_eq!(
+        stage.asked(),
+        [order("set 2 temperature 451.5"), order("set 2 temperature 441.5"), order("power cycle 1")]
+    );
+}
+
+#[test]
 fn menu_keys_do_what_the_manual_says_in_either_case() {
     let mut stage = Stage::connected(SMALL);
     stage.sent();
-    stage.keys("S");
+    stage.keys("S").wait(2000);
     assert_eq!(stage.sent(), b"s");
-    assert!(stage.shows("S again stops it"), "the terminal screen shows what the unit prints");
+    assert!(stage.shows("Waiting for the unit's first page"), "{}", stage.picture());
     let mut stage = Stage::connected(SMALL);
     stage.sent();
     stage.keys("v");
     assert_eq!(stage.sent(), b"", "V halts scanning: it is asked first");
-    stage.press(KeyCode::Enter);
+    stage.keys("t");
     assert_eq!(stage.sent(), b"v");
     assert!(stage.shows("halted by V"));
     stage.keys("x");
@@ -586,7 +859,7 @@ fn menu_keys_do_what_the_manual_says_in_either_case() {
 #[test]
 fn leaving_with_the_view_open_offers_to_close_it() {
     let mut stage = Stage::connected(SMALL);
-    stage.keys("v").press(KeyCode::Enter).prefix().keys("2q");
+    stage.keys("vt").prefix().keys("2q");
     stage.asked();
     stage.press(KeyCode::Enter);
     let effects = stage.asked();

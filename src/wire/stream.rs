@@ -108,6 +108,12 @@ impl Layout {
         [Source::FieldValue, Source::ProcessValue].into_iter().find_map(|source| self.parse_as(source, line))
     }
 
+    /// Characters of a row on the line, its line end included.
+    pub fn row_characters(&self, source: Source) -> usize {
+        let width = self.format(source).widths.first().copied().unwrap_or_default();
+        (width + 1) * self.channels.len() + 1
+    }
+
     /// Field format of a source.
     pub fn format(&self, source: Source) -> &FieldFormat {
         match source {
@@ -131,6 +137,59 @@ impl Layout {
                 .collect::<Option<Vec<_>>>()
         })?;
         Some(Row { source, readings })
+    }
+}
+
+impl Source {
+    /// As files and options name it: `fv`, `pv`.
+    pub const fn short(self) -> &'static str {
+        match self {
+            Source::FieldValue => "fv",
+            Source::ProcessValue => "pv",
+        }
+    }
+}
+
+impl Reading {
+    /// The number, where there is one.
+    pub const fn value(self) -> Option<f64> {
+        match self {
+            Reading::Value(value) => Some(value),
+            Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => None,
+        }
+    }
+
+    /// As files name it: `ok` or why there is no number.
+    pub const fn state(self) -> &'static str {
+        match self {
+            Reading::Value(_) => "ok",
+            Reading::Disabled => "disabled",
+            Reading::Open => "open",
+            Reading::Short => "short",
+            Reading::Error => "error",
+        }
+    }
+}
+
+impl Row {
+    /// The heading of the rows as CSV.
+    pub fn csv_heading(channels: &[String]) -> String {
+        format!("time,source,{}\n", channels.join(","))
+    }
+
+    /// The row as a line of CSV: `2026-01-31T12:00:00.123Z,fv,23.500,open`.
+    pub fn csv(&self, time: &str) -> String {
+        let mut line = format!("{time},{}", self.source.short());
+        for &reading in &self.readings {
+            line.push(',');
+            match (reading, self.source) {
+                (Reading::Value(value), Source::FieldValue) => line.push_str(&format!("{value:.3}")),
+                (Reading::Value(value), Source::ProcessValue) => line.push_str(&format!("{value:.0}")),
+                _ => line.push_str(reading.state()),
+            }
+        }
+        line.push('\n');
+        line
     }
 }
 

@@ -1,7 +1,9 @@
 //! The console on the screen against an emulated unit, in virtual time: keys in, pictures out.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
+use axcon::canopen::{ObjectAddress, Value};
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
 use axcon::emulator::knob::Knob;
@@ -26,6 +28,10 @@ struct Desk {
     unit: Plugged<Unit>,
     to_app: Line,
     over: bool,
+    /// Files the console has written.
+    files: BTreeMap<PathBuf, Vec<u8>>,
+    /// Remarks it has put in the recording.
+    marks: Vec<String>,
 }
 
 impl Desk {
@@ -49,6 +55,8 @@ impl Desk {
             unit: Plugged::new(unit, Line::new(character_time(BAUD), latency)),
             to_app: Line::new(Duration::ZERO, latency),
             over: false,
+            files: BTreeMap::new(),
+            marks: Vec::new(),
         };
         let effects = desk.app.start();
         desk.perform(effects);
@@ -71,6 +79,7 @@ impl Desk {
                         read_only: false,
                         recording: None,
                         start_of_day: Duration::ZERO,
+                        start_millis: 0,
                     }));
                 }
                 Effect::Transmit(transmit) => self.unit.send(self.now, &transmit.bytes),
@@ -84,7 +93,26 @@ impl Desk {
                     self.input(Input::ImageChecked(Box::new(ImageFacts::of_report(path, &report))));
                 }
                 Effect::Quit => self.over = true,
-                Effect::CloseLink | Effect::ListPorts | Effect::UploadBegins { .. } | Effect::UploadEnds { .. } => {}
+                Effect::CreateFile { path, bytes } => {
+                    let is_new = self.files.insert(path.clone(), bytes).is_none();
+                    let result = if is_new { Ok(()) } else { Err("it is there already".to_owned()) };
+                    self.input(Input::FileWritten { path, result });
+                }
+                Effect::AppendFile { path, bytes } => {
+                    self.files.get_mut(&path).expect("created before").extend(bytes);
+                }
+                Effect::ReadFile(path) => {
+                    let text = self.files.get(&path).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+                    self.input(Input::FileRead { path, text: text.ok_or_else(|| "no such file".to_owned()) });
+                }
+                Effect::Mark(text) => self.marks.push(text),
+                Effect::CloseLink
+                | Effect::ListPorts
+                | Effect::ListRecordings
+                | Effect::Play(_)
+                | Effect::Order(_)
+                | Effect::UploadBegins { .. }
+                | Effect::UploadEnds { .. } => {}
             }
         }
     }
@@ -131,7 +159,11 @@ impl Desk {
     }
 
     fn press(&mut self, code: KeyCode) -> &mut Self {
-        self.input(Input::Terminal(Event::Key(KeyEvent::new(code, KeyModifiers::NONE))));
+        self.key(code, KeyModifiers::NONE)
+    }
+
+    fn key(&mut self, code: KeyCode, modifiers: KeyModifiers) -> &mut Self {
+        self.input(Input::Terminal(Event::Key(KeyEvent::new(code, modifiers))));
         self.run(Duration::from_millis(50))
     }
 
@@ -180,6 +212,122 @@ fn t_brings_values_and_a_broken_wire_is_a_fault_with_its_time() {
     desk.unit.unit_mut().power_on(now);
     desk.run(Duration::from_secs(5)).keys("t");
     desk.wait_for("The stream is off.");
+}
+
+#[test]
+fn the_dictionary_is_read_searched_compared_and_written_down() {
+    let mut desk = Desk::new();
+    desk.keys("5");
+    assert!(desk.picture().contains("the manual's; V reads the unit's"), "{}", desk.picture());
+    desk.keys("v").press(KeyCode::Enter);
+    desk.wait_for("so far");
+    desk.wait_for("0 not as factory");
+    desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("before.json").press(KeyCode::Enter);
+    assert!(desk.picture().contains("before.json is written"), "{}", desk.picture());
+    desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("before.json").press(KeyCode::Enter);
+    assert!(desk.picture().contains("it is there already"), "an older file is left alone: {}", desk.picture());
+
+    // Somebody switches a channel off, and the next reading says so.
+    let now = desk.now;
+    let (at, value) = (ObjectAddress::new(0x6112, 2), Value::Unsigned8(0));
+    desk.unit.unit_mut().write_object(now, at, &value.encode()).expect("written");
+    desk.keys("v").press(KeyCode::Enter);
+    desk.wait_for("1 not as factory");
+    desk.keys("o");
+    let picture = desk.picture();
+    assert!(picture.contains("only those") && picture.contains("* 6112:02"), "{picture}");
+    assert!(picture.contains("not as the factory made it"), "the pane explains it: {picture}");
+    desk.keys("wbefore.json").press(KeyCode::Enter);
+    let picture = desk.picture();
+    assert!(picture.contains("in before.json") && picture.contains("≠ 6112:02"), "{picture}");
+    desk.press(KeyCode::Esc).keys("/operating mode");
+    assert!(desk.picture().contains("with 'operating mode'"), "{}", desk.picture());
+    desk.press(KeyCode::Esc).keys("ex.pdf").press(KeyCode::Enter);
+    assert!(desk.picture().contains("the name has to end in"), "{}", desk.picture());
+    for (name, holds) in [("a.csv", "6112,2,"), ("a.dcf", "[6112sub2]"), ("a.txt", "* 6112:02")] {
+        desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys(name).press(KeyCode::Enter);
+        let text = String::from_utf8_lossy(&desk.files[Path::new(name)]).into_owned();
+        assert!(text.contains(holds), "{name}: {text}");
+    }
+}
+
+#[test]
+fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
+    let mut desk = Desk::new();
+    desk.keys("6t200").press(KeyCode::Enter);
+    desk.wait_for("every 200 ms");
+    desk.run(Duration::from_secs(30)).press(KeyCode::Down);
+    assert!(desk.picture().contains("Curve of TC1") && desk.picture().contains("1 minute, follows"));
+    desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("rows.csv").press(KeyCode::Enter);
+    desk.run(Duration::from_secs(10)).keys("k");
+    assert_eq!(desk.marks, ["mark 1"]);
+    desk.press(KeyCode::Left).press(KeyCode::Left);
+    let held = desk.picture();
+    assert!(held.contains("held, End follows again"), "{held}");
+    let chart =
+        |picture: &str| picture.lines().skip_while(|line| !line.contains("Curve of")).collect::<Vec<_>>().join("\n");
+    desk.run(Duration::from_secs(5));
+    assert_eq!(chart(&desk.picture()), chart(&held), "a held picture stands still");
+    desk.press(KeyCode::End).keys("e");
+    assert!(desk.picture().contains("rows are in rows.csv"), "{}", desk.picture());
+    let text = String::from_utf8(desk.files[Path::new("rows.csv")].clone()).expect("text");
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "time,source,CJ,TC1,TC2,TC3,TC4");
+    // 30 s before, 15 s behind its beginning.
+    assert!((215..235).contains(&lines.len()), "{} lines", lines.len());
+    assert!(lines[1..].iter().all(|line| line.contains("Z,fv,") && line.split(',').count() == 7), "{text}");
+    assert!(lines[1..].windows(2).all(|pair| pair[0] < pair[1]), "in the order of time");
+    let rows = lines.len();
+    desk.run(Duration::from_secs(5));
+    assert_eq!(desk.files[Path::new("rows.csv")].split(|&byte| byte == b'\n').count(), rows + 1, "it has ended");
+}
+
+#[test]
+fn a_period_the_line_cannot_carry_is_named_before_it_is_set() {
+    let mut desk = Desk::new();
+    desk.keys("t3");
+    assert!(desk.picture().contains("the line carries one every 4 ms"), "{}", desk.picture());
+    desk.press(KeyCode::Backspace).keys("4");
+    assert!(!desk.picture().contains("the line carries"), "{}", desk.picture());
+}
+
+#[test]
+fn diagnostics_stand_beside_their_numbers_until_s_stops_them() {
+    let mut desk = Desk::new();
+    desk.keys("s");
+    desk.wait_for("Supply Voltage");
+    let picture = desk.wait_for("page 3");
+    assert!(picture.contains("Numbers on it") && picture.contains("S stops"), "{picture}");
+    desk.keys("s");
+    let picture = desk.wait_for("The diagnostics are off.");
+    assert!(picture.contains("stopped"), "{picture}");
+    desk.keys("2");
+    assert!(desk.picture().contains("Supply Voltage"), "the overview has them too: {}", desk.picture());
+}
+
+#[test]
+fn words_are_found_in_the_terminal_one_place_after_the_other() {
+    let mut desk = Desk::new();
+    desk.keys("3");
+    for _ in 0..5 {
+        desk.keys("m").run(Duration::from_secs(2));
+    }
+    let prefix = |desk: &mut Desk, key: char| {
+        desk.key(KeyCode::Char('5'), KeyModifiers::CONTROL).press(KeyCode::Char(key));
+    };
+    prefix(&mut desk, '/');
+    desk.keys("main menu");
+    let newest = desk.picture();
+    assert!(newest.contains("'main menu'"), "{newest}");
+    desk.press(KeyCode::Enter);
+    prefix(&mut desk, 'n');
+    assert!(desk.picture().contains("stopped"), "{}", desk.picture());
+    assert_ne!(desk.picture(), newest);
+    prefix(&mut desk, '/');
+    desk.keys("xyzzy");
+    assert!(desk.picture().contains("is nowhere"), "{}", desk.picture());
+    desk.press(KeyCode::Esc);
+    assert!(desk.picture().contains("follows"), "{}", desk.picture());
 }
 
 #[test]

@@ -130,6 +130,7 @@ fn no_picture_of_the_console_holds_what_a_terminal_obeys() {
                     read_only: false,
                     recording: Some("\x1b]0;x\x07".into()),
                     start_of_day: Duration::ZERO,
+                    start_millis: 0,
                 };
                 app.handle(now, Input::LinkOpened(info));
             }

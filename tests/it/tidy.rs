@@ -34,8 +34,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// The one file of the console on the screen that may touch the system.
-const TUI_LOOP: &str = "src/tui/run.rs";
+/// The one part of the console on the screen that may touch the system.
+const TUI_LOOP: &str = "src/tui/run";
 
 /// Names that bring in the system's clock, threads, files, environment, or an order that changes from run to run.
 const BANNED_IN_THE_PURE_PART: &[&str] = &[
@@ -64,7 +64,7 @@ fn arrows_point_downward() {
             arrows.get(module.as_str()).unwrap_or_else(|| panic!("{module} has no place in the list of arrows"));
         for (number, line) in code_lines(&text) {
             for used in crate_paths(line) {
-                let is_loop = path.ends_with(TUI_LOOP) && used == "host";
+                let is_loop = path.starts_with(TUI_LOOP) && used == "host";
                 if used != module && !is_loop && arrows.contains_key(used.as_str()) && !allowed.contains(&used.as_str())
                 {
                     reversed.push(format!("{}:{number}: {module} -> {used}", path.display()));
@@ -80,7 +80,7 @@ fn the_pure_part_touches_no_system() {
     let mut found = Vec::new();
     for (path, text) in sources() {
         let Some(module) = module_of(&path) else { continue };
-        if matches!(module.as_str(), "host" | "cli") || path.ends_with(TUI_LOOP) {
+        if matches!(module.as_str(), "host" | "cli") || path.starts_with(TUI_LOOP) {
             continue;
         }
         for (number, line) in code_lines(&text) {

@@ -5,7 +5,8 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Clear};
 
-use super::{Popup, Question, consequence};
+use super::{Popup, Purpose, Question, consequence};
+use crate::time::BITS_PER_CHARACTER;
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
 use crate::tui::visible;
@@ -47,8 +48,12 @@ pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Fr
         rows.push(line);
     }
     let height = (rows.len() as u16 + 4).min(area.height);
-    let window =
-        Rect { x: area.x + (area.width - columns) / 2, y: area.y + (area.height - height) / 2, width: columns, height };
+    let y = match popup {
+        // What is found has to stay in sight.
+        Popup::Asking(Question::Find(_)) => area.bottom() - height,
+        Popup::Asking(_) | Popup::Waiting(_) | Popup::Failed { .. } => area.y + (area.height - height) / 2,
+    };
+    let window = Rect { x: area.x + (area.width - columns) / 2, y, width: columns, height };
     let style = match popup {
         Popup::Failed { .. } => theme.bad(),
         Popup::Asking(_) | Popup::Waiting(_) => theme.heading(),
@@ -85,17 +90,60 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             },
             vec![("Enter", "connect"), ("Esc", "back")],
         ),
-        Question::Image { typed: field, directory } => (
-            "Image file",
-            {
+        Question::File { purpose, typed: field, directory } => {
+            let (title, text, key) = match purpose {
+                Purpose::Image => ("Image file", "A path, absolute or from this folder:", "check it"),
+                Purpose::ExportStream => (
+                    "Write rows to a CSV file",
+                    "A new file; the rows that are kept go first, then all that come until E ends it.",
+                    "begin",
+                ),
+                Purpose::ExportDictionary => (
+                    "Write the object dictionary to a file",
+                    "A new file. Its ending says how: .json (to compare with later), .csv, .dcf, .txt.",
+                    "write",
+                ),
+                Purpose::Compare => (
+                    "Compare with a dump",
+                    "A dump as JSON, as E here or 'axcon dictionary dump --format json' writes it.",
+                    "compare",
+                ),
+            };
+            let mut rows = paragraphs(&[text], columns);
+            if *purpose == Purpose::Image {
                 let directory = visible::text(&directory.to_string_lossy());
-                let mut rows = paragraphs(&["A path, absolute or from this folder:"], columns);
                 rows.push(Line::styled(format::keep_end(&directory, columns), theme.quiet()));
+            }
+            rows.push(Line::default());
+            rows.push(typed(theme, "", field.text(), columns));
+            (title, rows, vec![("Enter", key), ("Ctrl-U", "clear"), ("Esc", "back")])
+        }
+        Question::Find(field) => {
+            ("Find", vec![typed(theme, "", field.text(), columns)], vec![("Enter", "keep"), ("Esc", "show everything")])
+        }
+        Question::Temperature { input, typed: field, complaint } => (
+            "Temperature of the sensor",
+            {
+                let label = format!("Input {input}, in °C");
+                let mut rows = paragraphs(&[&label], columns);
+                rows.push(Line::default());
+                rows.push(typed(theme, "", field.text(), columns));
+                rows.extend(complain(theme, *complaint));
+                rows
+            },
+            vec![("Enter", "set"), ("Esc", "back")],
+        ),
+        Question::Order(field) => (
+            "Order to the emulated unit",
+            {
+                let text = "As on the input of 'axcon emulate': set 1 temperature 451, open 2, fault loss 0.01, heal, \
+                            nmt start, write 6112:1 0, power off, status ...";
+                let mut rows = paragraphs(&[text], columns);
                 rows.push(Line::default());
                 rows.push(typed(theme, "", field.text(), columns));
                 rows
             },
-            vec![("Enter", "check it"), ("Esc", "back")],
+            vec![("Enter", "do it"), ("Esc", "back")],
         ),
         Question::Stream { source, millis, complaint, .. } => (
             "Switch the data stream on",
@@ -115,6 +163,10 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                     &["The unit stores this: the stream comes back after every power cycle until T switches it off."],
                     columns,
                 ));
+                if let Some(text) = too_fast(view, *source, millis.text()) {
+                    rows.push(Line::default());
+                    rows.extend(format::wrap(&text, columns).into_iter().map(|row| Line::styled(row, theme.warning())));
+                }
                 rows.extend(complain(theme, *complaint));
                 rows
             },
@@ -124,13 +176,14 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             "View the object dictionary",
             paragraphs(
                 &[
-                    "While its view sub-menu is open, the unit halts temperature scanning and CAN.",
-                    "It prints one object after the other on the terminal screen: Enter shows the next, X leaves the \
-                     sub-menu. The unit has to be pre-operational.",
+                    "While the object dictionary is viewed, the unit halts temperature scanning and CAN. It has to be \
+                     pre-operational.",
+                    "axcon reads all of it, which takes some seconds, and leaves the view again; or look at it \
+                     yourself on the terminal: Enter shows the next object, X leaves.",
                 ],
                 columns,
             ),
-            vec![("Enter", "open it"), ("Esc", "back")],
+            vec![("Enter", "read all of it"), ("T", "on the terminal"), ("Esc", "back")],
         ),
         Question::Defaults { typed: field, complaint } => (
             "Restore the default object dictionary",
@@ -227,6 +280,19 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
         rows.push(Line::default());
     }
     (title.to_owned(), rows, hints)
+}
+
+/// Says so if the line cannot carry a row so often.
+fn too_fast(view: &View, source: Source, millis: &str) -> Option<String> {
+    let period = millis.parse::<f64>().ok().filter(|&millis| millis > 0.0)? / 1000.0;
+    let characters = view.product()?.stream.row_characters(source) as f64;
+    let carries = f64::from(view.link.baud) / f64::from(BITS_PER_CHARACTER);
+    let least = (characters / carries * 1000.0).ceil();
+    (characters / period > carries).then(|| {
+        format!(
+            "A row has {characters} characters: the line carries one every {least} ms, the unit will leave rows out."
+        )
+    })
 }
 
 /// What the running job leaves behind when it is dropped.

@@ -12,8 +12,9 @@ use super::action::Action;
 use super::input::{Failure, ImageFacts};
 use super::view::View;
 use super::widgets::field::{PasswordField, TextField};
+use super::widgets::format;
 use crate::session::{Command, Phase};
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
 
 pub use draw::draw;
@@ -39,13 +40,28 @@ pub enum Popup {
 pub enum Question {
     /// A link by name.
     Link(TextField),
-    /// An image file by name, in a folder.
-    Image {
+    /// A file by name, in a folder.
+    File {
+        /// What it is for.
+        purpose: Purpose,
         /// What has been typed; relative to the folder.
         typed: TextField,
-        /// The folder.
+        /// The folder; empty for the one the program was started in.
         directory: PathBuf,
     },
+    /// Words to look for; every letter looks.
+    Find(TextField),
+    /// The temperature of an emulated unit's sensor.
+    Temperature {
+        /// Which input, from 1.
+        input: usize,
+        /// What has been typed.
+        typed: TextField,
+        /// What is wrong with it.
+        complaint: Option<&'static str>,
+    },
+    /// An order to an emulated unit.
+    Order(TextField),
     /// What the stream shall send.
     Stream {
         /// Field or process value.
@@ -57,7 +73,7 @@ pub enum Question {
         /// What is wrong with it.
         complaint: Option<&'static str>,
     },
-    /// Shall the unit's view sub-menu be opened?
+    /// Shall the object dictionary be read, or its view be opened on the terminal?
     View,
     /// Shall the defaults be restored?
     Defaults {
@@ -94,6 +110,19 @@ pub enum Question {
     QuitViewing,
 }
 
+/// What a file is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// An image to load.
+    Image,
+    /// Rows of the stream go there.
+    ExportStream,
+    /// The object dictionary goes there.
+    ExportDictionary,
+    /// A dump to compare with.
+    Compare,
+}
+
 /// What a key did to a popup.
 #[derive(Debug)]
 pub enum Answer {
@@ -103,6 +132,8 @@ pub enum Answer {
     Close,
     /// It goes, and this is wanted.
     Act(Action),
+    /// It stays, and this is wanted.
+    Meanwhile(Action),
 }
 
 /// Shortest repetition time of the stream (errata E-105).
@@ -144,7 +175,35 @@ impl Question {
 
     /// Asks for an image.
     pub fn image(directory: &Path) -> Question {
-        Question::Image { typed: TextField::default(), directory: directory.to_path_buf() }
+        Question::File { purpose: Purpose::Image, typed: TextField::default(), directory: directory.to_path_buf() }
+    }
+
+    /// Asks for another file, and suggests a name for a new one.
+    pub fn file(purpose: Purpose, view: &View) -> Question {
+        let typed = match purpose {
+            Purpose::Image | Purpose::Compare => TextField::default(),
+            Purpose::ExportStream => TextField::new(suggested(view, "stream", view.stream.newest, "csv")),
+            Purpose::ExportDictionary => {
+                let at = view.dictionary.as_ref().map(|read| read.at);
+                TextField::new(suggested(view, "dictionary", at, "json"))
+            }
+        };
+        Question::File { purpose, typed, directory: PathBuf::new() }
+    }
+
+    /// Asks for words to look for, those of the last time given.
+    pub fn find(words: &str) -> Question {
+        Question::Find(TextField::new(words))
+    }
+
+    /// Asks for the temperature of an emulated unit's sensor.
+    pub fn temperature(input: usize) -> Question {
+        Question::Temperature { input, typed: TextField::default(), complaint: None }
+    }
+
+    /// Asks for an order to an emulated unit.
+    pub fn order() -> Question {
+        Question::Order(TextField::default())
     }
 
     /// Asks what the stream shall send.
@@ -168,20 +227,36 @@ impl Question {
     fn on(&mut self, key: KeyEvent) -> Answer {
         let with_ctrl = key.modifiers.contains(KeyModifiers::CONTROL);
         match key.code {
-            KeyCode::Esc => Answer::Close,
-            KeyCode::Char('c') if with_ctrl => Answer::Close,
+            KeyCode::Esc => self.leave(),
+            KeyCode::Char('c') if with_ctrl => self.leave(),
             KeyCode::Char('u') if with_ctrl => {
                 self.clear();
-                Answer::Stay
+                self.changed()
             }
             KeyCode::Enter => self.accept(),
             KeyCode::Backspace => {
                 self.pop();
-                Answer::Stay
+                self.changed()
             }
             KeyCode::Char(character) if !with_ctrl && !key.modifiers.contains(KeyModifiers::ALT) => {
                 self.typed(character)
             }
+            _ => Answer::Stay,
+        }
+    }
+
+    /// Esc. Who has looked for something and leaves wants to see everything again.
+    fn leave(&self) -> Answer {
+        match self {
+            Question::Find(_) => Answer::Act(Action::Find(String::new())),
+            _ => Answer::Close,
+        }
+    }
+
+    /// The field has changed.
+    fn changed(&self) -> Answer {
+        match self {
+            Question::Find(field) => Answer::Meanwhile(Action::Find(field.text().to_owned())),
             _ => Answer::Stay,
         }
     }
@@ -191,10 +266,28 @@ impl Question {
         match self {
             Question::Link(field) if field.text().trim().is_empty() => Answer::Stay,
             Question::Link(field) => Answer::Act(Action::Open(field.text().trim().to_owned())),
-            Question::Image { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
-            Question::Image { typed, directory } => {
-                Answer::Act(Action::CheckImage(directory.join(typed.text().trim())))
+            Question::File { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
+            Question::File { purpose, typed, directory } => {
+                let path = directory.join(typed.text().trim());
+                Answer::Act(match purpose {
+                    Purpose::Image => Action::CheckImage(path),
+                    Purpose::ExportStream => Action::ExportStream(path),
+                    Purpose::ExportDictionary => Action::ExportDictionary(path),
+                    Purpose::Compare => Action::Compare(path),
+                })
             }
+            Question::Find(_) => Answer::Close,
+            Question::Temperature { input, typed, complaint } => match typed.text().trim().parse::<f64>() {
+                Ok(value) if value.is_finite() => {
+                    Answer::Act(Action::Order(format!("set {input} temperature {value}")))
+                }
+                _ => {
+                    *complaint = Some("A number of degrees, e.g. 451.5.");
+                    Answer::Stay
+                }
+            },
+            Question::Order(field) if field.text().trim().is_empty() => Answer::Stay,
+            Question::Order(field) => Answer::Act(Action::Order(field.text().trim().to_owned())),
             Question::Stream { source, millis, complaint, .. } => match millis.text().parse() {
                 Ok(number @ SHORTEST_PERIOD_MS..=LONGEST_PERIOD_MS) => {
                     let period = Duration::from_millis(number);
@@ -205,7 +298,7 @@ impl Question {
                     Answer::Stay
                 }
             },
-            Question::View => Answer::Act(Action::ViewDictionary),
+            Question::View => Answer::Act(Action::Command(Command::ReadDictionary)),
             Question::Defaults { typed, .. } if typed.text() == YES => {
                 Answer::Act(Action::Command(Command::RestoreDefaults))
             }
@@ -238,8 +331,16 @@ impl Question {
 
     fn typed(&mut self, character: char) -> Answer {
         match self {
-            Question::Link(field) | Question::Image { typed: field, .. } => field.push(character),
-            Question::Defaults { typed: field, complaint } | Question::Label { typed: field, complaint, .. } => {
+            Question::Link(field) | Question::File { typed: field, .. } | Question::Order(field) => {
+                field.push(character);
+            }
+            Question::Find(field) => {
+                field.push(character);
+                return self.changed();
+            }
+            Question::Defaults { typed: field, complaint }
+            | Question::Label { typed: field, complaint, .. }
+            | Question::Temperature { typed: field, complaint, .. } => {
                 *complaint = None;
                 field.push(character);
             }
@@ -255,6 +356,7 @@ impl Question {
             },
             Question::Password { field, .. } => field.push(character),
             Question::QuitViewing if character.eq_ignore_ascii_case(&'q') => return Answer::Act(Action::Quit),
+            Question::View if character.eq_ignore_ascii_case(&'t') => return Answer::Act(Action::ViewDictionary),
             Question::View
             | Question::CancelLoad
             | Question::Paste(_)
@@ -299,7 +401,10 @@ impl Question {
                 Some(millis)
             }
             Question::Link(field)
-            | Question::Image { typed: field, .. }
+            | Question::File { typed: field, .. }
+            | Question::Find(field)
+            | Question::Order(field)
+            | Question::Temperature { typed: field, .. }
             | Question::Defaults { typed: field, .. }
             | Question::Label { typed: field, .. } => Some(field),
             Question::Password { .. }
@@ -311,6 +416,14 @@ impl Question {
             | Question::QuitViewing => None,
         }
     }
+}
+
+/// A name for a new file: `axtc4co-stream-20260131T120000Z.csv`.
+fn suggested(view: &View, what: &str, at: Option<Instant>, extension: &str) -> String {
+    let product = view.product().map_or("unit".to_owned(), |product| product.name.to_lowercase());
+    let time = format::utc(view.link.start_millis, at.unwrap_or_default());
+    let time: String = time.split('.').next().unwrap_or_default().chars().filter(|c| !"-:".contains(*c)).collect();
+    format!("{product}-{what}-{time}Z.{extension}")
 }
 
 /// What cancelling the upload in this phase leaves behind.

@@ -2,10 +2,15 @@
 //!
 //! A screen holds its own cursor and scroll positions and nothing else; what is known lies in the view.
 
+pub mod bench;
 pub mod connect;
+pub mod diagnostics;
+pub mod dictionary;
 pub mod help;
 pub mod load;
 pub mod overview;
+pub mod recordings;
+pub mod stream;
 pub mod terminal;
 
 use super::keymap::Binding;
@@ -26,6 +31,16 @@ pub enum ScreenId {
     Terminal,
     /// Files, plan, progress, verdict.
     Load,
+    /// The object dictionary.
+    Dictionary,
+    /// Table and curves of the stream.
+    Stream,
+    /// The unit's diagnostics.
+    Diagnostics,
+    /// What was recorded.
+    Recordings,
+    /// Sensors and power of an emulated unit.
+    Bench,
 }
 
 /// What a screen draws from.
@@ -47,7 +62,17 @@ pub struct Scene<'a> {
 
 impl ScreenId {
     /// All of them, in the order of their keys.
-    pub const ALL: [ScreenId; 4] = [ScreenId::Connect, ScreenId::Overview, ScreenId::Terminal, ScreenId::Load];
+    pub const ALL: [ScreenId; 9] = [
+        ScreenId::Connect,
+        ScreenId::Overview,
+        ScreenId::Terminal,
+        ScreenId::Load,
+        ScreenId::Dictionary,
+        ScreenId::Stream,
+        ScreenId::Diagnostics,
+        ScreenId::Recordings,
+        ScreenId::Bench,
+    ];
 
     /// Name on the tab.
     pub const fn title(self) -> &'static str {
@@ -56,6 +81,26 @@ impl ScreenId {
             ScreenId::Overview => overview::TITLE,
             ScreenId::Terminal => terminal::TITLE,
             ScreenId::Load => load::TITLE,
+            ScreenId::Dictionary => dictionary::TITLE,
+            ScreenId::Stream => stream::TITLE,
+            ScreenId::Diagnostics => diagnostics::TITLE,
+            ScreenId::Recordings => recordings::TITLE,
+            ScreenId::Bench => bench::TITLE,
+        }
+    }
+
+    /// A shorter name, where all tabs have to fit in 80 columns.
+    pub const fn short_title(self) -> &'static str {
+        match self {
+            ScreenId::Connect => "Link",
+            ScreenId::Overview => "Unit",
+            ScreenId::Terminal => "Term",
+            ScreenId::Load => "Load",
+            ScreenId::Dictionary => "Dict",
+            ScreenId::Stream => stream::TITLE,
+            ScreenId::Diagnostics => "Diag",
+            ScreenId::Recordings => "Rec",
+            ScreenId::Bench => bench::TITLE,
         }
     }
 
@@ -66,6 +111,11 @@ impl ScreenId {
             ScreenId::Overview => overview::BINDINGS,
             ScreenId::Terminal => terminal::BINDINGS,
             ScreenId::Load => load::BINDINGS,
+            ScreenId::Dictionary => dictionary::BINDINGS,
+            ScreenId::Stream => stream::BINDINGS,
+            ScreenId::Diagnostics => diagnostics::BINDINGS,
+            ScreenId::Recordings => recordings::BINDINGS,
+            ScreenId::Bench => bench::BINDINGS,
         }
     }
 

@@ -3,17 +3,16 @@
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
-use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
 
 use super::{Scene, terminal};
 use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::view::{Channel, Fault, FaultKind};
+use crate::tui::view::{Channel, Fault, FaultKind, View};
 use crate::tui::visible;
+use crate::tui::widgets::chart::{self, Curve};
 use crate::tui::widgets::spark::sparkline;
 use crate::tui::widgets::{format, lines};
 use crate::wire::stream::{Reading, Source};
@@ -114,10 +113,7 @@ impl Overview {
         let mut shown = vec![lines::rule(theme, columns, "Values", &remark)];
         let heads = format!("    {:<8}{:>13}   {:<15}{:>11}{:>11}  Trend", "Channel", "Value", "State", "Min", "Max");
         shown.push(Line::styled(heads, theme.quiet()));
-        let decimals = scene.view.product().map_or_else(
-            || if source == Source::FieldValue { 3 } else { 0 },
-            |product| product.stream.format(source).decimals,
-        );
+        let decimals = decimals(scene.view, source);
         let room = usize::from(columns).saturating_sub(TABLE_COLUMNS + 2);
         for (number, channel) in stream.channels.iter().enumerate() {
             shown.push(value_row(scene, channel, number == self.cursor, source, decimals, room));
@@ -137,6 +133,14 @@ impl Overview {
         }
         shown
     }
+}
+
+/// Digits behind the point, as the product prints them.
+pub fn decimals(view: &View, source: Source) -> usize {
+    view.product().map_or_else(
+        || if source == Source::FieldValue { 3 } else { 0 },
+        |product| product.stream.format(source).decimals,
+    )
 }
 
 fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
@@ -185,8 +189,30 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         line.spans.extend(lines::labelled(theme, right_label, right_value).spans);
         shown.push(line);
     }
+    shown.extend(diagnosed(scene, columns));
     shown.push(Line::default());
     shown
+}
+
+/// What the unit's diagnostics say beside the channels: supply, cold junction, active errors.
+fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
+    let view = scene.view;
+    let at = view.diagnostics.at?;
+    let of_channel = |label: &str| view.stream.channels.iter().any(|channel| label.starts_with(channel.name.as_str()));
+    let known = view.product().map(|product| product.stream.channels.as_slice()).unwrap_or_default();
+    let said =
+        view.diagnostics.found.iter().filter(|found| {
+            !of_channel(&found.label) && !known.iter().any(|name| found.label.starts_with(name.as_str()))
+        });
+    let said = said.filter_map(|found| {
+        let unit = found.unit.as_deref().map(|unit| format!(" {}", visible::text(unit))).unwrap_or_default();
+        Some(format!("{} {}{unit}", visible::text(&found.label), found.value?))
+    });
+    let said: Vec<String> = said.collect();
+    let room = usize::from(columns).saturating_sub(lines::LABEL_COLUMNS + 13);
+    let text = format::keep_start(&said.join(", "), room);
+    let time = format::time_of_day(scene.start_of_day, at);
+    (!said.is_empty()).then(|| lines::labelled(scene.theme, "Diagnosed", Span::raw(format!("{text} ({time})"))))
 }
 
 /// A fact and where it comes from: `127 (menu)`.
@@ -205,7 +231,7 @@ fn known<T>(fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -> Span<'stati
 }
 
 /// What to do to see values.
-fn without_values(scene: Scene) -> Vec<&'static str> {
+pub fn without_values(scene: Scene) -> Vec<&'static str> {
     if scene.view.link.name.is_none() {
         return vec!["Not connected. Press 1 to choose a port or an emulated unit."];
     }
@@ -247,7 +273,7 @@ fn value_row(
     };
     let span = LEAST_SPAN[usize::from(source == Source::ProcessValue)];
     let newest = channel.history.len().saturating_sub(room);
-    let values: Vec<_> = channel.history.range(newest..).map(|&(_, value)| value).collect();
+    let values: Vec<_> = channel.history.range(newest..).map(|&(_, reading)| reading.value()).collect();
     let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, channel.name);
     let is_old = scene.view.stream.late || scene.view.facts.stream.is_none();
     let value_style = if is_old { theme.quiet() } else { theme.strong() };
@@ -315,43 +341,9 @@ fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
 fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
     let (heading, canvas) = lines::split(area, 1);
     let theme = scene.theme;
-    let known: Vec<(Instant, f64)> =
-        channel.history.iter().filter_map(|&(at, value)| value.map(|value| (at, value))).collect();
     lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Trend of {}", channel.name), "")]);
-    let (Some(&(first, _)), Some(&(last, _))) = (known.first(), known.last()) else {
-        lines::draw(frame, canvas, [Line::styled("  No value yet.", theme.quiet())]);
-        return;
-    };
-    let points: Vec<(f64, f64)> = known.iter().map(|&(at, value)| (at.since(first).as_secs_f64(), value)).collect();
-    // One curve for each stretch without a gap: nothing is drawn where nothing was measured.
-    let place = |&(at, value): &(Instant, Option<f64>)| value.map(|value| (at.since(first).as_secs_f64(), value));
-    let history: Vec<_> = channel.history.iter().map(place).collect();
-    let stretches: Vec<Vec<(f64, f64)>> = history
-        .split(Option::is_none)
-        .map(|stretch| stretch.iter().flatten().copied().collect())
-        .filter(|stretch: &Vec<_>| !stretch.is_empty())
-        .collect();
-    let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.1), h.max(p.1)));
-    let spare = (1.0 - (high - low)).max((high - low) * 0.1) / 2.0;
-    let bounds = [low - spare, high + spare];
-    let label = |value: f64| format!("{value:>9.1}");
-    let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
-    let curve = |points| {
-        Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(theme.curve()).data(points)
-    };
-    let chart = Chart::new(stretches.iter().map(|stretch| curve(stretch)).collect())
-        .x_axis(
-            Axis::default()
-                .bounds([0.0, last.since(first).as_secs_f64().max(1.0)])
-                .labels([time(first), time(last)])
-                .style(theme.quiet()),
-        )
-        .y_axis(
-            Axis::default()
-                .bounds(bounds)
-                .labels([label(bounds[0]), label((bounds[0] + bounds[1]) / 2.0), label(bounds[1])])
-                .style(theme.quiet()),
-        );
+    let samples = channel.history.iter().map(|&(at, reading)| (at, reading.value())).collect();
+    let curve = Curve { samples, window: None, cursor: None, marks: Vec::new() };
     let (canvas, _) = lines::split(canvas, canvas.height.saturating_sub(1));
-    frame.render_widget(chart, canvas);
+    chart::draw(theme, scene.start_of_day, &curve, canvas, frame);
 }

@@ -13,6 +13,7 @@ use super::Scene;
 use crate::record::{Direction, Record};
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::popup::Question;
 use crate::tui::scrollback::{Origin, Scrollback, TextLine};
 use crate::tui::theme::Theme;
 use crate::tui::visible;
@@ -47,6 +48,18 @@ pub const BINDINGS: &[Binding] = &[
         short: "when",
         long: "with or without times",
     },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('/'))],
+        cmd: Cmd::Find,
+        short: "find",
+        long: "look for words in the lines, newest first",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('n'))],
+        cmd: Cmd::FindNext,
+        short: "next",
+        long: "the next place further up that has them",
+    },
 ];
 
 /// Bytes in a row of the hex view.
@@ -58,6 +71,10 @@ pub struct Terminal {
     mode: Mode,
     with_times: bool,
     after_prefix: bool,
+    /// What is looked for, in lower case; empty for nothing.
+    words: String,
+    /// Number of the line where it was found.
+    found: Option<u64>,
 }
 
 /// What is shown, and from where. Without a position the newest is followed.
@@ -134,6 +151,32 @@ impl Terminal {
         };
     }
 
+    /// Goes to the newest line that has these words; nothing is looked for without any.
+    pub fn find(&mut self, words: String, scrollback: &Scrollback) {
+        self.words = words.to_lowercase();
+        self.found = None;
+        if self.words.is_empty() {
+            return self.follow();
+        }
+        self.go_to_match(scrollback.end(), scrollback);
+    }
+
+    /// Whether words are looked for and no line has them.
+    fn finds_nothing(&self) -> bool {
+        !self.words.is_empty() && self.found.is_none()
+    }
+
+    /// Goes to the newest line before line number `before` that has the words; if there is none, nothing moves.
+    fn go_to_match(&mut self, before: u64, scrollback: &Scrollback) {
+        let older = usize::try_from(before.saturating_sub(scrollback.start())).unwrap_or(usize::MAX);
+        let place = scrollback.lines().take(older).rposition(|line| line.text.to_lowercase().contains(&self.words));
+        if let (Some(place), false) = (place, self.words.is_empty()) {
+            let number = scrollback.start() + place as u64;
+            self.found = Some(number);
+            self.mode = Mode::Text((number + 1 < scrollback.end()).then_some(number + 1));
+        }
+    }
+
     /// What a command does here; `page` is the height of the picture.
     pub fn on(&mut self, cmd: Cmd, scrollback: &Scrollback, record: &Record, page: usize) -> Option<Action> {
         let page = page.saturating_sub(2).max(1);
@@ -151,6 +194,11 @@ impl Terminal {
                 }
             }
             Cmd::Times => self.with_times = !self.with_times,
+            Cmd::Find => return Some(Action::Ask(Question::find(&self.words))),
+            Cmd::FindNext => {
+                let before = self.found.unwrap_or(scrollback.end());
+                self.go_to_match(before, scrollback);
+            }
             _ => {}
         }
         None
@@ -166,10 +214,15 @@ impl Terminal {
         let place = if following { "follows" } else { "stopped, End follows again" };
         let received = format::grouped(scene.record.received());
         let sent = format::grouped(scene.record.sent());
-        let remark = format!("{received} bytes received, {sent} sent, {place}");
+        let found = match (self.words.is_empty(), self.finds_nothing()) {
+            (true, _) => String::new(),
+            (false, true) => format!("'{}' is nowhere, ", visible::text(&self.words)),
+            (false, false) => format!("'{}', ", visible::text(&self.words)),
+        };
+        let remark = format!("{found}{received} bytes received, {sent} sent, {place}");
         lines::draw(frame, heading, [lines::rule(scene.theme, area.width, name, &remark)]);
         let rows = match self.mode {
-            Mode::Text(place) => text_rows(scene, body, place, self.with_times),
+            Mode::Text(place) => text_rows(scene, body, place, self.with_times, &self.words),
             Mode::Hex(place) => hex_rows(scene, body, place, self.with_times),
         };
         if rows.is_empty() {
@@ -203,18 +256,21 @@ impl Terminal {
 
 /// The newest lines that fit, for a place beside other things.
 pub fn newest_lines(scene: Scene, area: Rect) -> Vec<Line<'static>> {
-    text_rows(scene, area, None, false)
+    text_rows(scene, area, None, false, "")
 }
 
 /// Lines ending at a place, as many as fit, long ones broken.
-fn text_rows(scene: Scene, area: Rect, place: Option<u64>, with_times: bool) -> Vec<Line<'static>> {
+fn text_rows(scene: Scene, area: Rect, place: Option<u64>, with_times: bool, words: &str) -> Vec<Line<'static>> {
     let scrollback = scene.scrollback;
     let room = usize::from(area.height);
     let end = place.map_or(usize::MAX, |end| end.saturating_sub(scrollback.start()) as usize);
     let shown = end.min(scrollback.lines().len()).max(1).min(scrollback.lines().len());
     let mut rows: Vec<Line> = Vec::new();
     for line in scrollback.lines().take(shown).rev() {
-        let broken = text_line(scene, line, usize::from(area.width), with_times);
+        let mut broken = text_line(scene, line, usize::from(area.width), with_times);
+        if !words.is_empty() && line.text.to_lowercase().contains(words) {
+            broken = broken.into_iter().map(|row| row.patch_style(scene.theme.bar())).collect();
+        }
         rows.extend(broken.into_iter().rev());
         if rows.len() >= room {
             break;

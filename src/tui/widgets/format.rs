@@ -1,5 +1,6 @@
 //! Numbers, times and names as a person reads them.
 
+use jiff::Timestamp;
 use ratatui::text::Span;
 
 use crate::time::{Duration, Instant};
@@ -49,6 +50,12 @@ pub fn time_of_day(start: Duration, at: Instant) -> String {
 /// The same with milliseconds.
 pub fn time_of_day_millis(start: Duration, at: Instant) -> String {
     format!("{}.{:03}", time_of_day(start, at), (start + at.since_start()).subsec_millis())
+}
+
+/// Date and time in UTC as data is written, `2026-01-31T12:00:00.123Z`; `start_millis` is the start of time since 1970.
+pub fn utc(start_millis: i64, at: Instant) -> String {
+    let moment = Timestamp::from_millisecond(start_millis).and_then(|start| start.checked_add(at.since_start()));
+    moment.unwrap_or(Timestamp::UNIX_EPOCH).strftime("%Y-%m-%dT%H:%M:%S%.3fZ").to_string()
 }
 
 /// Columns a text takes.

@@ -1,5 +1,6 @@
 //! Small pieces of the picture that more than one screen uses.
 
+pub mod chart;
 pub mod field;
 pub mod format;
 pub mod lines;

@@ -5,34 +5,37 @@
 //! loop without an input or a due timer. Files, ports and folders are looked at in threads of their own, and a network
 //! link is dialled in one, so that a slow disk or a silent host does not hold the keys.
 
+mod files;
+mod player;
+
 use std::collections::VecDeque;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
 use std::thread;
 
 use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
 
-use super::{App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, PortEntry};
+use player::{Player, Step};
+
+use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Options, Playback};
 use crate::host;
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::{self, Connection, LinkError, LinkSpec};
-use crate::host::ports;
 use crate::host::recorder::{Plan, Recorder};
 use crate::host::replay::{Recording, RecordingError};
 use crate::host::signal::Signals;
 use crate::host::socket::Dialled;
 use crate::host::terminal::{self, Screen};
-use crate::record::{Direction, Ending, Piece};
 use crate::time::{Duration, Instant};
 
 /// Least time between two pictures that no key asked for: thirty a second.
 const FRAME: Duration = Duration::from_millis(33);
 /// Longest wait: bounds the arithmetic, nothing else.
 const LONGEST_WAIT: Duration = Duration::from_secs(3600);
-/// Entries of a folder that are shown at most.
-const MOST_ENTRIES: usize = 10_000;
+/// Pieces of a recording between two looks at the keyboard.
+const PIECES: usize = 64;
 
 /// What the loop cannot know itself: how the command line names links, and what helps when they fail.
 pub struct World {
@@ -98,7 +101,7 @@ pub fn run(world: World) -> io::Result<End> {
         dial: 0,
         comeback: None,
         retry: None,
-        replay: None,
+        player: None,
         skew: Duration::ZERO,
         recorder: Recorder::nothing(),
         left: VecDeque::new(),
@@ -128,27 +131,18 @@ struct Console {
     /// The last dial, by number: whatever an earlier one brings is not wanted any more.
     dial: u64,
     /// A recording that is being played.
-    replay: Option<Replay>,
-    /// By how much the console's time is ahead of the clock: recordings pass faster than they were made.
+    player: Option<Player>,
+    /// By how much the console's time is ahead of the clock: a recording's time passes in no time.
     skew: Duration,
     recorder: Recorder,
     /// Inputs taken from the channel while a link was closed.
     left: VecDeque<host::Input>,
 }
 
-/// A recording that is being played.
-struct Replay {
-    recording: Recording,
-    begun: Instant,
-}
-
-/// Pieces of a recording between two looks at the keyboard.
-const PIECES: usize = 64;
-
 impl Console {
-    /// The console's time. Never runs backward.
+    /// The console's time: the clock's, or that of the recording that is played. Never runs backward.
     fn now(&self) -> Instant {
-        self.clock.now() + self.skew
+        self.player.as_ref().map_or_else(|| self.clock.now() + self.skew, Player::now)
     }
 
     fn serve(&mut self, screen: &mut Screen) -> io::Result<End> {
@@ -158,25 +152,24 @@ impl Console {
             return Ok(End::Quit);
         }
         loop {
-            let now = self.now();
+            // Of the clock, also while a recording has a time of its own.
+            let now = self.clock.now();
             if self.app.is_dirty() && now >= next_frame {
                 screen.terminal.draw(|frame| self.app.draw(frame))?;
                 self.app.drawn();
                 next_frame = now + FRAME;
             }
             // A flood of inputs must not keep a timer from expiring.
-            if self.app.poll_timeout().is_some_and(|due| due <= now) && self.handle(Input::Timeout) {
+            if self.timer_at().is_some_and(|due| due <= now) && self.handle(Input::Timeout) {
                 return Ok(End::Quit);
             }
             if self.retry.is_some_and(|due| due <= now) {
                 self.look_for_link();
             }
-            if self.replay.is_some() {
-                self.play();
-            }
+            self.play();
             let due = self.app.is_dirty().then_some(next_frame);
-            let at_once = self.replay.as_ref().map(|_| now);
-            let wake = [due, self.retry, at_once, self.app.poll_timeout()].into_iter().flatten().min();
+            let played = self.player.as_ref().and_then(|player| player.wake_at(now));
+            let wake = [due, self.retry, played, self.timer_at()].into_iter().flatten().min();
             let wake = wake.unwrap_or(Instant::NEVER);
             let Some(input) = self.next_input(wake) else { continue };
             let leaves = match input {
@@ -223,7 +216,13 @@ impl Console {
             return Some(input);
         }
         // An error is the time that is over: the channel cannot be closed, since this struct holds a sender.
-        self.inputs.recv_timeout(wake.since(self.now()).min(LONGEST_WAIT)).ok()
+        self.inputs.recv_timeout(wake.since(self.clock.now()).min(LONGEST_WAIT)).ok()
+    }
+
+    /// When the app's timer expires, by the clock. While a recording is played it expires in the recording's time.
+    fn timer_at(&self) -> Option<Instant> {
+        let due = self.app.poll_timeout().filter(|_| self.player.is_none())?;
+        Some(Instant::ZERO + due.since_start().saturating_sub(self.skew))
     }
 
     /// Tells the app, and does what it wants. Gives `true` when that is to end.
@@ -256,8 +255,25 @@ impl Console {
                         leaves |= self.lose_link(Failure { text, hints: Vec::new() });
                     }
                 }
-                Effect::ListPorts => self.ask(|| Input::PortsListed(list_ports())),
-                Effect::ListFiles(directory) => self.ask(move || list_files(&directory)),
+                Effect::ListPorts => self.ask(|| Input::PortsListed(files::ports())),
+                Effect::ListFiles(directory) => self.ask(move || files::folder(&directory)),
+                Effect::ListRecordings => self.ask(|| Input::RecordingsListed(files::recordings())),
+                Effect::ReadFile(path) => self.ask(move || {
+                    let text = files::text(&path);
+                    Input::FileRead { path, text }
+                }),
+                Effect::CreateFile { path, bytes } => {
+                    let result = files::create(&path, &bytes);
+                    leaves |= self.handle(Input::FileWritten { path, result });
+                }
+                Effect::AppendFile { path, bytes } => {
+                    if let Err(why) = files::append(&path, &bytes) {
+                        leaves |= self.handle(Input::FileWritten { path, result: Err(why) });
+                    }
+                }
+                Effect::Mark(text) => self.recorder.mark(self.now(), &text),
+                Effect::Play(playback) => self.steer(playback),
+                Effect::Order(line) => self.order(line),
                 Effect::CheckImage(path) => {
                     let check = self.world.check;
                     self.ask(move || Input::ImageChecked(Box::new(check(path))));
@@ -277,7 +293,12 @@ impl Console {
         let spec = name.parse::<LinkSpec>();
         if let Ok(LinkSpec::Replay(path)) = &spec {
             return match Recording::open(path) {
-                Ok(recording) => self.begin_replay(name, recording),
+                Ok(recording) => {
+                    let player = Player::begin(name, path.clone(), recording, self.now());
+                    let info = player.link_info(self.world.baud);
+                    self.player = Some(player);
+                    Input::LinkOpened(info)
+                }
                 Err(error) => Input::LinkFailed((self.world.unreadable)(error)),
             };
         }
@@ -330,60 +351,80 @@ impl Console {
             read_only: false,
             recording,
             start_of_day,
+            start_millis: self.clock.wall(Instant::ZERO).as_millisecond()
+                - i64::try_from(self.skew.as_millis()).unwrap_or_default(),
         })
     }
 
-    fn begin_replay(&mut self, name: &str, recording: Recording) -> Input {
-        let begun = self.now();
-        let time_of_day = host::clock::time_of_day(recording.header().unix_millis);
-        self.replay = Some(Replay { recording, begun });
-        Input::LinkOpened(LinkInfo {
-            link: name.to_owned(),
-            baud: self.world.baud,
-            read_only: true,
-            recording: None,
-            start_of_day: host::clock::day_before(time_of_day, begun.since_start()),
-        })
-    }
-
-    /// Plays the next pieces of a recording: as fast as they can be read, each at its own time.
+    /// Plays what is due of a recording.
     fn play(&mut self) {
         for _ in 0..PIECES {
-            let Some(replay) = &mut self.replay else { return };
-            let begun = replay.begun;
-            let input = match replay.recording.next() {
-                Ok(Some(Piece::Header(_))) => continue,
-                Ok(Some(Piece::Bytes { at, direction: Direction::FromUnit, bytes })) => (at, Input::Bytes(bytes)),
-                Ok(Some(Piece::Bytes { at, direction: Direction::ToUnit, bytes })) => (at, Input::Sent(bytes)),
-                Ok(Some(Piece::Mark { at, text })) => (at, Input::Mark(text)),
-                Ok(None) => {
-                    let cut = replay.recording.ending() == Some(Ending::CutShort);
-                    let text = "The recording ends in the middle of a line: whoever wrote it was killed.".to_owned();
-                    let failure = cut.then(|| Failure { text, hints: Vec::new() });
-                    self.replay = None;
-                    self.handle(Input::RecordingOver(failure));
-                    return;
+            let (clock, unreadable) = (self.clock.now(), self.world.unreadable);
+            let Some(player) = &mut self.player else { return };
+            let step = player.step(clock, unreadable);
+            match step {
+                Step::Nothing => return,
+                Step::To(moment) => self.pass_time_to(moment),
+                Step::Piece(moment, input) => {
+                    self.pass_time_to(moment);
+                    self.handle(input);
                 }
+                Step::Over(failure) => {
+                    self.handle(Input::RecordingOver(failure));
+                }
+            }
+            let Some(player) = &self.player else { return };
+            self.handle(Input::Playing(player.playing()));
+        }
+    }
+
+    /// Lets the recording's time pass, with the timers that expire meanwhile.
+    fn pass_time_to(&mut self, moment: Instant) {
+        while let Some(due) = self.app.poll_timeout().filter(|due| *due <= moment && *due > self.now()) {
+            if let Some(player) = &mut self.player {
+                player.set_now(due);
+            }
+            self.handle(Input::Timeout);
+        }
+        if let Some(player) = &mut self.player {
+            player.set_now(moment);
+        }
+    }
+
+    /// Plays the recording differently.
+    fn steer(&mut self, playback: Playback) {
+        let clock = self.clock.now();
+        let Some(player) = &mut self.player else { return };
+        if player.is_behind(playback) {
+            match Recording::open(player.path()) {
+                Ok(recording) => player.begin_again(recording),
                 Err(error) => {
-                    self.replay = None;
                     let failure = (self.world.unreadable)(error);
                     self.handle(Input::RecordingOver(Some(failure)));
                     return;
                 }
-            };
-            let (at, input) = input;
-            let then = begun + at.since_start();
-            while let Some(due) = self.app.poll_timeout().filter(|due| *due <= then && *due > self.now()) {
-                self.pass_time_to(due);
-                self.handle(Input::Timeout);
             }
-            self.pass_time_to(then);
-            self.handle(input);
+            let info = player.link_info(self.world.baud);
+            self.handle(Input::PlayedAnew(info));
+        }
+        if let Some(player) = &mut self.player {
+            player.steer(clock, playback);
+            let playing = player.playing();
+            self.handle(Input::Playing(playing));
         }
     }
 
-    fn pass_time_to(&mut self, then: Instant) {
-        self.skew += then.since(self.now());
+    /// Has the emulated unit do something.
+    fn order(&mut self, line: String) {
+        let (answer, sender) = (self.answer.clone(), self.sender.clone());
+        let Some(link) = &self.link else { return };
+        let text = line.clone();
+        link.order(&text, move |answered| {
+            if answer.send(Input::Ordered { line, answer: answered }).is_ok() {
+                // A full channel wakes the loop by itself.
+                let _ = sender.try_send(host::Input::Wake);
+            }
+        });
     }
 
     fn lose_link(&mut self, failure: Failure) -> bool {
@@ -396,7 +437,7 @@ impl Console {
         if comeback.is_some() {
             self.recorder = recorder;
             self.recorder.mark(self.now(), "link lost");
-            self.retry = Some(self.now() + Comeback::RETRY);
+            self.retry = Some(self.clock.now() + Comeback::RETRY);
         }
         self.comeback = comeback;
         self.handle(Input::LinkGone(failure))
@@ -406,7 +447,7 @@ impl Console {
     fn look_for_link(&mut self) {
         let Some(comeback) = &self.comeback else { return self.retry = None };
         let Some(connection) = comeback.open(self.clock, self.sender.clone()) else {
-            self.retry = Some(self.now() + Comeback::RETRY);
+            self.retry = Some(self.clock.now() + Comeback::RETRY);
             return;
         };
         self.retry = None;
@@ -419,7 +460,10 @@ impl Console {
     /// Closes the link; what it has put on the channel and nobody has taken is forgotten.
     fn close_link(&mut self) {
         self.dial += 1;
-        self.replay = None;
+        // The console's time goes on from where the recording's stands.
+        let now = self.now();
+        self.player = None;
+        self.skew += now.since(self.now());
         self.comeback = None;
         self.retry = None;
         if self.link.take().is_some() {
@@ -458,56 +502,4 @@ fn suspend(screen: &mut Screen) -> io::Result<()> {
 #[cfg(not(unix))]
 fn suspend(_screen: &mut Screen) -> io::Result<()> {
     Ok(())
-}
-
-fn list_ports() -> Result<Vec<PortEntry>, String> {
-    let ports = ports::list().map_err(|error| format!("the serial ports cannot be listed: {error}"))?;
-    Ok(ports
-        .into_iter()
-        .map(|port| PortEntry {
-            busy_by: ports::holder(Path::new(&port.path)).map(|holder| holder.to_string()),
-            description: describe(&port),
-            link: port.path,
-        })
-        .collect())
-}
-
-/// `USB, FTDI FT232R USB UART, 0403:6001, serial number AX12345, ftdi_sio`.
-fn describe(port: &ports::Port) -> String {
-    let mut parts = vec![match port.kind {
-        ports::Kind::Usb => "USB".to_owned(),
-        ports::Kind::Native => "built in".to_owned(),
-        ports::Kind::Pty => "pseudo-terminal".to_owned(),
-        ports::Kind::Bluetooth => "Bluetooth".to_owned(),
-    }];
-    if let Some(usb) = &port.usb {
-        let words: Vec<&str> = [usb.manufacturer.as_deref(), usb.product.as_deref()].into_iter().flatten().collect();
-        parts.extend((!words.is_empty()).then(|| words.join(" ")));
-        parts.push(format!("{:04x}:{:04x}", usb.vid, usb.pid));
-        parts.extend(usb.serial_number.as_ref().map(|number| format!("serial number {number}")));
-    }
-    parts.extend(port.driver.clone());
-    parts.join(", ")
-}
-
-fn list_files(directory: &Path) -> Input {
-    let directory = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
-    let entries = std::fs::read_dir(&directory).map_err(|error| error.to_string()).map(|entries| {
-        entries
-            .flatten()
-            .take(MOST_ENTRIES)
-            .filter_map(|entry| {
-                // Behind a link, what it leads to.
-                let metadata = std::fs::metadata(entry.path()).ok()?;
-                let kind = if metadata.is_dir() { FileKind::Folder } else { FileKind::File };
-                Some(FileEntry {
-                    name: entry.file_name().to_string_lossy().into_owned(),
-                    kind,
-                    bytes: if kind == FileKind::File { metadata.len() } else { 0 },
-                    modified: metadata.modified().ok().and_then(host::clock::local_date_and_time),
-                })
-            })
-            .collect()
-    });
-    Input::FilesListed { directory, entries }
 }

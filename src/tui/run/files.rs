@@ -1,0 +1,108 @@
+//! What the console asks of files, folders and ports; each is done in a thread of its own.
+
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use super::super::{FileEntry, FileKind, Input, LARGEST_TEXT, PortEntry, RecordingEntry};
+use crate::host::{self, library, ports, recorder};
+
+/// Entries of a folder that are shown at most.
+const MOST_ENTRIES: usize = 10_000;
+
+/// The serial ports.
+pub(super) fn ports() -> Result<Vec<PortEntry>, String> {
+    let ports = ports::list().map_err(|error| format!("the serial ports cannot be listed: {error}"))?;
+    Ok(ports
+        .into_iter()
+        .map(|port| PortEntry {
+            busy_by: ports::holder(Path::new(&port.path)).map(|holder| holder.to_string()),
+            description: describe(&port),
+            link: port.path,
+        })
+        .collect())
+}
+
+/// `USB, FTDI FT232R USB UART, 0403:6001, serial number AX12345, ftdi_sio`.
+fn describe(port: &ports::Port) -> String {
+    let mut parts = vec![match port.kind {
+        ports::Kind::Usb => "USB".to_owned(),
+        ports::Kind::Native => "built in".to_owned(),
+        ports::Kind::Pty => "pseudo-terminal".to_owned(),
+        ports::Kind::Bluetooth => "Bluetooth".to_owned(),
+    }];
+    if let Some(usb) = &port.usb {
+        let words: Vec<&str> = [usb.manufacturer.as_deref(), usb.product.as_deref()].into_iter().flatten().collect();
+        parts.extend((!words.is_empty()).then(|| words.join(" ")));
+        parts.push(format!("{:04x}:{:04x}", usb.vid, usb.pid));
+        parts.extend(usb.serial_number.as_ref().map(|number| format!("serial number {number}")));
+    }
+    parts.extend(port.driver.clone());
+    parts.join(", ")
+}
+
+/// A folder.
+pub(super) fn folder(directory: &Path) -> Input {
+    let directory = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
+    let entries = fs::read_dir(&directory).map_err(|error| error.to_string()).map(|entries| {
+        entries
+            .flatten()
+            .take(MOST_ENTRIES)
+            .filter_map(|entry| {
+                // Behind a link, what it leads to.
+                let metadata = fs::metadata(entry.path()).ok()?;
+                let kind = if metadata.is_dir() { FileKind::Folder } else { FileKind::File };
+                Some(FileEntry {
+                    name: entry.file_name().to_string_lossy().into_owned(),
+                    kind,
+                    bytes: if kind == FileKind::File { metadata.len() } else { 0 },
+                    modified: metadata.modified().ok().and_then(host::clock::local_date_and_time),
+                })
+            })
+            .collect()
+    });
+    Input::FilesListed { directory, entries }
+}
+
+/// The recordings.
+pub(super) fn recordings() -> Result<Vec<RecordingEntry>, String> {
+    let folder = recorder::folder().ok_or("this system does not say where programs keep their state")?;
+    let listed = library::list(&folder).map_err(|error| format!("cannot read '{}': {error}", folder.display()))?;
+    let entry = |listed: library::Listed| RecordingEntry {
+        link: format!("replay:{}", listed.path.display()),
+        begun: host::clock::local_text(listed.header.unix_millis),
+        port: listed.header.port,
+        part: listed.header.part,
+        length: listed.length,
+        bytes: listed.bytes,
+    };
+    Ok(listed.into_iter().map(entry).collect())
+}
+
+/// Writes a file that is not there yet.
+pub(super) fn create(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    let written = File::options().write(true).create_new(true).open(path).and_then(|mut file| file.write_all(bytes));
+    written.map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => "a file of that name is there already; choose another name".to_owned(),
+        _ => error.to_string(),
+    })
+}
+
+/// Writes behind what is in a file.
+pub(super) fn append(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    let written = File::options().append(true).open(path).and_then(|mut file| file.write_all(bytes));
+    written.map_err(|error| error.to_string())
+}
+
+/// A text file that is not too large.
+pub(super) fn text(path: &Path) -> Result<String, String> {
+    let said = |error: io::Error| error.to_string();
+    let file = File::open(path).map_err(said)?;
+    let mut text = String::new();
+    // One byte more than allowed shows that there is more.
+    file.take(LARGEST_TEXT + 1).read_to_string(&mut text).map_err(said)?;
+    if text.len() as u64 > LARGEST_TEXT {
+        return Err(format!("it has more than {LARGEST_TEXT} bytes"));
+    }
+    Ok(text)
+}

@@ -1,0 +1,202 @@
+//! A recording that is played: at its own pace, faster, all at once; paused; from another place.
+//!
+//! The console's time is the recording's then: it stands while the recording is paused, and passes in no time while it
+//! is played all at once.
+
+use std::path::{Path, PathBuf};
+
+use super::super::{Failure, Input, LinkInfo, Pace, Playback, Playing};
+use crate::host::clock;
+use crate::host::replay::{Recording, RecordingError};
+use crate::record::{Direction, Ending, Piece};
+use crate::time::{Duration, Instant};
+
+/// How often the place is shown while nothing happens.
+const TICK: Duration = Duration::from_millis(200);
+
+/// A recording that is played.
+pub(super) struct Player {
+    name: String,
+    path: PathBuf,
+    recording: Recording,
+    /// The console's time at the beginning of the recording.
+    begun: Instant,
+    /// The console's time now.
+    now: Instant,
+    /// What comes next, once it has been read.
+    next: Option<(Duration, Input)>,
+    pace: Pace,
+    /// Where the recording stood when its pace was set, and what the clock said then.
+    set: (Duration, Instant),
+    /// All at once up to here.
+    target: Option<Duration>,
+    length: Option<Duration>,
+    over: bool,
+}
+
+/// What is due.
+pub(super) enum Step {
+    /// Nothing for now.
+    Nothing,
+    /// Time passes to this moment.
+    To(Instant),
+    /// At this moment this happened.
+    Piece(Instant, Input),
+    /// The recording has ended, well or not.
+    Over(Option<Failure>),
+}
+
+impl Player {
+    /// Plays a recording all at once; the console's time is `begun`.
+    pub(super) fn begin(name: &str, path: PathBuf, recording: Recording, begun: Instant) -> Self {
+        Player {
+            name: name.to_owned(),
+            path,
+            recording,
+            begun,
+            now: begun,
+            next: None,
+            pace: Pace::AtOnce,
+            set: (Duration::ZERO, Instant::ZERO),
+            target: None,
+            length: None,
+            over: false,
+        }
+    }
+
+    /// The same recording once more, from its beginning.
+    pub(super) fn begin_again(&mut self, recording: Recording) {
+        self.recording = recording;
+        self.begun = self.now;
+        self.next = None;
+        self.target = None;
+        self.over = false;
+    }
+
+    /// The file.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The console's time.
+    pub(super) fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// Moves the console's time; never backward.
+    pub(super) fn set_now(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+    }
+
+    /// The recording as a link.
+    pub(super) fn link_info(&self, baud: u32) -> LinkInfo {
+        let millis = self.recording.header().unix_millis;
+        let before = self.begun.since_start();
+        LinkInfo {
+            link: self.name.clone(),
+            baud,
+            read_only: true,
+            recording: None,
+            start_of_day: clock::day_before(clock::time_of_day(millis), before),
+            start_millis: millis - i64::try_from(before.as_millis()).unwrap_or_default(),
+        }
+    }
+
+    /// How it is played.
+    pub(super) fn playing(&self) -> Playing {
+        Playing { position: self.position(), length: self.length, pace: self.pace }
+    }
+
+    /// Whether it has to begin anew for that.
+    pub(super) fn is_behind(&self, playback: Playback) -> bool {
+        match playback {
+            Playback::Pace(_) => false,
+            Playback::Seek(place) => place < self.position(),
+            Playback::Again(_) => true,
+        }
+    }
+
+    /// Plays it differently. What lies behind needs [`Player::begin_again`] first.
+    pub(super) fn steer(&mut self, clock: Instant, playback: Playback) {
+        match playback {
+            Playback::Pace(pace) | Playback::Again(pace) => self.pace = pace,
+            Playback::Seek(place) => {
+                self.target = Some(place);
+                // Who looks for a place wants to see it.
+                if self.pace == Pace::AtOnce {
+                    self.pace = Pace::Paused;
+                }
+            }
+        }
+        self.set = (self.position(), clock);
+    }
+
+    /// When the next step is due, by the clock.
+    pub(super) fn wake_at(&self, clock: Instant) -> Option<Instant> {
+        match (self.pace, &self.next) {
+            _ if self.over => None,
+            (Pace::AtOnce, _) => Some(clock),
+            _ if self.target.is_some() => Some(clock),
+            (Pace::Paused, _) => None,
+            (Pace::Times(_), None) => Some(clock),
+            (Pace::Times(times), Some((at, _))) => {
+                let due = self.set.1 + at.saturating_sub(self.set.0) / times.max(1);
+                Some(due.min(clock + TICK))
+            }
+        }
+    }
+
+    /// What is due; `unreadable` says why a recording cannot be read.
+    pub(super) fn step(&mut self, clock: Instant, unreadable: fn(RecordingError) -> Failure) -> Step {
+        if self.over {
+            return Step::Nothing;
+        }
+        let goal = match (self.target, self.pace) {
+            (Some(target), _) => target,
+            (None, Pace::AtOnce) => Duration::MAX,
+            (None, Pace::Times(times)) => self.set.0 + clock.since(self.set.1) * times,
+            (None, Pace::Paused) => return Step::Nothing,
+        };
+        if self.next.is_none() {
+            self.next = match self.read(unreadable) {
+                Ok(next) => Some(next),
+                Err(failure) => {
+                    self.over = true;
+                    self.length = Some(self.position());
+                    return Step::Over(failure);
+                }
+            };
+        }
+        if let Some((at, input)) = self.next.take_if(|(at, _)| *at <= goal) {
+            return Step::Piece(self.begun + at, input);
+        }
+        if self.target.take().is_some() {
+            self.set = (goal, clock);
+        }
+        let moment = self.begun + goal;
+        if moment > self.now { Step::To(moment) } else { Step::Nothing }
+    }
+
+    fn position(&self) -> Duration {
+        self.now.since(self.begun)
+    }
+
+    /// The next piece that matters; at the end why it has ended, if it should not have.
+    fn read(&mut self, unreadable: fn(RecordingError) -> Failure) -> Result<(Duration, Input), Option<Failure>> {
+        loop {
+            let (at, input) = match self.recording.next() {
+                Ok(Some(Piece::Header(_))) => continue,
+                Ok(Some(Piece::Bytes { at, direction: Direction::FromUnit, bytes })) => (at, Input::Bytes(bytes)),
+                Ok(Some(Piece::Bytes { at, direction: Direction::ToUnit, bytes })) => (at, Input::Sent(bytes)),
+                Ok(Some(Piece::Mark { at, text })) => (at, Input::Mark(text)),
+                Ok(None) => {
+                    let cut = self.recording.ending() == Some(Ending::CutShort);
+                    let text = "The recording ends in the middle of a line: whoever wrote it was killed.".to_owned();
+                    return Err(cut.then(|| Failure { text, hints: Vec::new() }));
+                }
+                Err(error) => return Err(Some(unreadable(error))),
+            };
+            return Ok((at.since_start(), input));
+        }
+    }
+}

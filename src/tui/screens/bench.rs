@@ -1,0 +1,285 @@
+//! The bench of an emulated unit: its sensors, its power, its faults.
+//!
+//! Everything here is an order in words, the same that `axcon emulate` takes; the emulated unit answers in words too.
+
+use std::collections::VecDeque;
+
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+
+use super::Scene;
+use crate::device::Product;
+use crate::time::Instant;
+use crate::tui::action::Action;
+use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::popup::Question;
+use crate::tui::view::View;
+use crate::tui::visible;
+use crate::tui::widgets::{format, lines};
+use crate::wire::stream::{Reading, Source};
+
+/// Name on the tab.
+pub const TITLE: &str = "Bench";
+
+/// Keys of the screen.
+pub const BINDINGS: &[Binding] = &[
+    Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "input above" },
+    Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "input", long: "input below" },
+    Binding { keys: &[Press::Plain(KeyCode::Left)], cmd: Cmd::Left, short: "", long: "10 °C colder" },
+    Binding { keys: &[Press::Plain(KeyCode::Right)], cmd: Cmd::Right, short: "", long: "10 °C warmer" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Enter)],
+        cmd: Cmd::Accept,
+        short: "set",
+        long: "type the temperature of the chosen input's sensor",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('o'))],
+        cmd: Cmd::OpenWire,
+        short: "open",
+        long: "break the sensor's wire",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('h'))],
+        cmd: Cmd::ShortWire,
+        short: "short",
+        long: "short the sensor",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('r'))],
+        cmd: Cmd::Repair,
+        short: "repair",
+        long: "make its wires whole again",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('p'))],
+        cmd: Cmd::Power,
+        short: "power",
+        long: "pull the power for a second",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('/'))],
+        cmd: Cmd::Type,
+        short: "order",
+        long: "type any order, as on the input of axcon emulate: fault, nmt, write, heal ...",
+    },
+];
+
+/// What an arrow changes.
+const STEP: f64 = 10.0;
+/// Where a sensor begins whose temperature nobody knows.
+const ROOM_TEMPERATURE: f64 = 20.0;
+/// Orders that are remembered.
+const KEPT_ORDERS: usize = 100;
+/// Prefix of links to emulated units in this program.
+const EMULATED: &str = "emu:";
+
+/// The page.
+#[derive(Debug, Default)]
+pub struct Bench {
+    input: usize,
+    /// What was last done to each input, in its order.
+    inputs: Vec<Input>,
+    /// Orders and their answers, newest last.
+    orders: VecDeque<Order>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Input {
+    temperature: Option<f64>,
+    wire: Wire,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Wire {
+    #[default]
+    Whole,
+    Open,
+    Shorted,
+}
+
+#[derive(Debug)]
+struct Order {
+    at: Instant,
+    line: String,
+    answer: Option<Result<Option<String>, String>>,
+}
+
+/// The product of the emulated unit in this program, if the link is one.
+pub fn emulated(view: &View) -> Option<&'static Product> {
+    let name = view.link.name.as_deref()?;
+    let (scheme, rest) = name.split_at_checked(EMULATED.len())?;
+    let product = rest.split('?').next().unwrap_or(rest);
+    scheme.eq_ignore_ascii_case(EMULATED).then(|| Product::named(product)).flatten()
+}
+
+impl Bench {
+    /// Another link: another bench.
+    pub fn begin_link(&mut self) {
+        *self = Bench::default();
+    }
+
+    /// An order goes to the unit.
+    pub fn ordered(&mut self, at: Instant, line: String) {
+        self.orders.push_back(Order { at, line, answer: None });
+        if self.orders.len() > KEPT_ORDERS {
+            self.orders.pop_front();
+        }
+    }
+
+    /// What came of it.
+    pub fn answered(&mut self, line: &str, answer: Result<Option<String>, String>) {
+        if let Some(order) = self.orders.iter_mut().find(|order| order.line == line && order.answer.is_none()) {
+            let done = answer.is_ok();
+            order.answer = Some(answer);
+            if done {
+                self.remember(line);
+            }
+        }
+    }
+
+    /// What a command does here.
+    pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
+        let product = emulated(view)?;
+        let last = usize::from(product.measurement.channels).saturating_sub(1);
+        let number = self.input + 1;
+        let warmer = |by: f64| {
+            let present = self.inputs.get(self.input).and_then(|input| input.temperature);
+            let present = present.or_else(|| streamed(view, product, self.input)).unwrap_or(ROOM_TEMPERATURE);
+            Some(Action::Order(format!("set {number} temperature {:.1}", present + by)))
+        };
+        match cmd {
+            Cmd::Up => self.input = self.input.saturating_sub(1),
+            Cmd::Down => self.input = (self.input + 1).min(last),
+            Cmd::Left => return warmer(-STEP),
+            Cmd::Right => return warmer(STEP),
+            Cmd::Accept => return Some(Action::Ask(Question::temperature(number))),
+            Cmd::OpenWire => return Some(Action::Order(format!("open {number}"))),
+            Cmd::ShortWire => return Some(Action::Order(format!("short {number}"))),
+            Cmd::Repair => return Some(Action::Order(format!("repair {number}"))),
+            Cmd::Power => return Some(Action::Order("power cycle 1".into())),
+            Cmd::Type => return Some(Action::Ask(Question::order())),
+            _ => {}
+        }
+        None
+    }
+
+    /// What an order has changed about an input, to show it beside the input.
+    fn remember(&mut self, line: &str) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let number =
+            words.get(1).and_then(|word| word.parse::<usize>().ok()).filter(|&number| (1..=64).contains(&number));
+        let Some(place) = number.map(|number| number - 1) else { return };
+        if self.inputs.len() <= place {
+            self.inputs.resize(place + 1, Input::default());
+        }
+        let Some(input) = self.inputs.get_mut(place) else { return };
+        match words.as_slice() {
+            ["set", _, "temperature", value] => input.temperature = value.parse().ok().or(input.temperature),
+            ["process", _] => input.temperature = None,
+            ["open", ..] => input.wire = Wire::Open,
+            ["short", _] => input.wire = Wire::Shorted,
+            ["repair", _] => input.wire = Wire::Whole,
+            _ => {}
+        }
+    }
+
+    /// The picture.
+    pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let theme = scene.theme;
+        let Some(product) = emulated(scene.view) else {
+            let rows = [
+                lines::rule(theme, area.width, "Bench", ""),
+                Line::raw("  Here the sensors, the cable and the power of an emulated unit are in your hands."),
+                Line::raw("  The link is none: press 1 and choose an emulated unit."),
+            ];
+            return lines::draw(frame, area, rows);
+        };
+        let mut rows = vec![lines::rule(theme, area.width, "Sensors", &format!("of this emulated {}", product.name))];
+        let heads = format!("    {:<8}{:<24}{:<16}{:>16}   {}", "Input", "Set to", "Wire", "The unit says", "State");
+        rows.push(Line::styled(heads, theme.quiet()));
+        rows.extend((0..usize::from(product.measurement.channels)).map(|place| self.row(scene, product, place)));
+        rows.push(Line::default());
+        let (upper, rest) = lines::split(area, rows.len() as u16);
+        lines::draw(frame, upper, rows);
+        let (heading, log) = lines::split(rest, 1);
+        lines::draw(frame, heading, [lines::rule(theme, area.width, "Orders", "and what came of them")]);
+        if self.orders.is_empty() {
+            let text = "  None yet. Without orders the sensors follow the emulator's default process.";
+            return lines::draw(frame, log, [Line::styled(text, theme.quiet())]);
+        }
+        let room = usize::from(log.height);
+        let newest = self.orders.iter().skip(self.orders.len().saturating_sub(room));
+        lines::draw(frame, log, newest.map(|order| order_row(scene, order, area.width)));
+    }
+
+    fn row(&self, scene: Scene, product: &Product, place: usize) -> Line<'static> {
+        let theme = scene.theme;
+        let input = self.inputs.get(place).cloned().unwrap_or_default();
+        let is_chosen = place == self.input;
+        let set = match input.temperature {
+            Some(value) => format!("{value:.1} °C"),
+            None => "default process".into(),
+        };
+        let (wire, style) = match input.wire {
+            Wire::Whole => ("whole", Style::new()),
+            Wire::Open => ("broken", theme.bad()),
+            Wire::Shorted => ("shorted", theme.bad()),
+        };
+        let channel = channel_of(scene.view, product, place);
+        let says = channel.and_then(|channel| channel.reading.value()).map_or_else(
+            || "-".to_owned(),
+            |value| {
+                let source = scene.view.stream.source.unwrap_or(Source::FieldValue);
+                format!("{value:.*}", super::overview::decimals(scene.view, source))
+            },
+        );
+        let state = channel.map_or("", |channel| match channel.reading {
+            Reading::Value(_) => "ok",
+            Reading::Disabled => "disabled",
+            Reading::Open => "open circuit",
+            Reading::Short => "short circuit",
+            Reading::Error => "no reading",
+        });
+        let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, place + 1);
+        Line::from(vec![
+            Span::styled(name, if is_chosen { theme.strong() } else { Style::new() }),
+            Span::raw(format!("{set:<24}")),
+            Span::styled(format!("{wire:<16}"), style),
+            Span::raw(format!("{says:>16}   {state}")),
+        ])
+    }
+}
+
+/// The stream's channel of an input: a unit may send its cold junction in front.
+fn channel_of<'a>(view: &'a View, product: &Product, place: usize) -> Option<&'a crate::tui::view::Channel> {
+    let channels = &view.stream.channels;
+    let in_front = channels.len().checked_sub(usize::from(product.measurement.channels))?;
+    channels.get(in_front + place)
+}
+
+fn streamed(view: &View, product: &Product, place: usize) -> Option<f64> {
+    let is_temperature = view.stream.source == Some(Source::FieldValue);
+    channel_of(view, product, place).filter(|_| is_temperature)?.reading.value()
+}
+
+fn order_row(scene: Scene, order: &Order, columns: u16) -> Line<'static> {
+    let theme = scene.theme;
+    let time = format::time_of_day(scene.start_of_day, order.at);
+    let (answer, style) = match &order.answer {
+        None => ("...".to_owned(), theme.quiet()),
+        Some(Ok(None)) => ("done".into(), theme.good()),
+        Some(Ok(Some(text))) => (visible::text(text), Style::new()),
+        Some(Err(why)) => (format!("refused: {}", visible::text(why)), theme.bad()),
+    };
+    let line = format::left(&visible::text(&order.line), 28);
+    let room = usize::from(columns).saturating_sub(42);
+    Line::from(vec![
+        Span::styled(format!("  {time}  "), theme.quiet()),
+        Span::raw(format!("{line}  ")),
+        Span::styled(format::keep_start(&answer, room), style),
+    ])
+}

@@ -1,0 +1,447 @@
+//! The object dictionary: what the unit shows, beside what its manual says.
+//!
+//! Before it has been read the manual's own table is there to look things up.
+
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+
+use super::Scene;
+use crate::canopen::ObjectAddress;
+use crate::device::Product;
+use crate::device::dictionary::{Access, Bound, Entry, Limits, Object};
+use crate::dump::{self, Difference, Dump, DumpEntry};
+use crate::session::Job;
+use crate::tui::action::Action;
+use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::popup::{Purpose, Question};
+use crate::tui::view::View;
+use crate::tui::visible;
+use crate::tui::widgets::{format, lines};
+
+/// Name on the tab.
+pub const TITLE: &str = "Dictionary";
+
+/// Keys of the screen.
+pub const BINDINGS: &[Binding] = &[
+    Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "entry above" },
+    Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "choose", long: "entry below" },
+    Binding { keys: &[Press::Plain(KeyCode::PageUp)], cmd: Cmd::PageUp, short: "", long: "a page up" },
+    Binding { keys: &[Press::Plain(KeyCode::PageDown)], cmd: Cmd::PageDown, short: "", long: "a page down" },
+    Binding { keys: &[Press::Plain(KeyCode::Home)], cmd: Cmd::First, short: "", long: "first entry" },
+    Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "", long: "last entry" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('/'))],
+        cmd: Cmd::Find,
+        short: "find",
+        long: "show only what has these words in address, name, value or meaning",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('o'))],
+        cmd: Cmd::Only,
+        short: "only",
+        long: "everything, only what differs from the factory's, only what differs from the other dump",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('w'))],
+        cmd: Cmd::Compare,
+        short: "with",
+        long: "compare with a saved dump (JSON)",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('e'))],
+        cmd: Cmd::Export,
+        short: "export",
+        long: "write what was read to a file: .json, .csv, .dcf or .txt",
+    },
+    Binding { keys: &[Press::Plain(KeyCode::Esc)], cmd: Cmd::Back, short: "", long: "show everything again" },
+];
+
+/// Rows of the pane that explains the chosen entry, its heading included.
+const DETAIL_ROWS: u16 = 8;
+/// From this width on that pane stands beside the table ...
+const BESIDE_AT: u16 = 150;
+/// ... and takes so many columns.
+const DETAIL_COLUMNS: u16 = 64;
+/// Columns of everything but the name: cursor and mark, address, value, factory's value.
+const FIXED_COLUMNS: usize = 4 + 9 + 16 + 16;
+/// From this width on the meaning of the value has a column.
+const MEANING_AT: usize = 120;
+/// Columns of it.
+const MEANING_COLUMNS: usize = 36;
+
+/// The page.
+#[derive(Debug, Default)]
+pub struct Dictionary {
+    cursor: usize,
+    words: String,
+    only: Only,
+    other: Option<Other>,
+}
+
+/// Which entries are shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Only {
+    #[default]
+    Everything,
+    Deviations,
+    Differences,
+}
+
+/// A dump to compare with.
+#[derive(Debug)]
+struct Other {
+    name: String,
+    dump: Dump,
+}
+
+/// One row of the table.
+struct Row<'a> {
+    at: ObjectAddress,
+    /// What the manual says.
+    known: Option<(&'static Object, &'static Entry)>,
+    /// What the unit shows.
+    read: Option<&'a DumpEntry>,
+    /// How the other dump differs.
+    difference: Option<Difference>,
+}
+
+impl Dictionary {
+    /// Another link: what it showed is gone.
+    pub fn begin_link(&mut self) {
+        self.cursor = 0;
+    }
+
+    /// Shows only what has these words; none for everything.
+    pub fn find(&mut self, words: &str) {
+        self.words = words.to_lowercase();
+        self.cursor = 0;
+    }
+
+    /// A dump to compare with has been read.
+    pub fn compare(&mut self, name: String, dump: Dump) {
+        self.other = Some(Other { name, dump });
+        self.only = Only::Differences;
+        self.cursor = 0;
+    }
+
+    /// What a command does here.
+    pub fn on(&mut self, cmd: Cmd, view: &View, page: usize) -> Option<Action> {
+        let last = self.rows(view).len().saturating_sub(1);
+        let page = page.saturating_sub(usize::from(DETAIL_ROWS) + 2).max(1);
+        self.cursor = match cmd {
+            Cmd::Up => self.cursor.saturating_sub(1),
+            Cmd::Down => self.cursor + 1,
+            Cmd::PageUp => self.cursor.saturating_sub(page),
+            Cmd::PageDown => self.cursor + page,
+            Cmd::First => 0,
+            Cmd::Last => last,
+            _ => self.cursor,
+        }
+        .min(last);
+        match cmd {
+            Cmd::Find => return Some(Action::Ask(Question::find(&self.words))),
+            Cmd::Only => {
+                self.only = match self.only {
+                    Only::Everything => Only::Deviations,
+                    Only::Deviations if self.other.is_some() => Only::Differences,
+                    Only::Deviations | Only::Differences => Only::Everything,
+                };
+                self.cursor = 0;
+            }
+            Cmd::Back => {
+                (self.only, self.other, self.cursor) = (Only::Everything, None, 0);
+                self.words.clear();
+            }
+            Cmd::Compare => return Some(Action::Ask(Question::file(Purpose::Compare, view))),
+            Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportDictionary, view))),
+            _ => {}
+        }
+        None
+    }
+
+    /// The rows that are shown.
+    fn rows<'a>(&self, view: &'a View) -> Vec<Row<'a>> {
+        let product = view.product();
+        let known = |at: ObjectAddress| {
+            let object = product?.dictionary.object(at.index)?;
+            Some((object, object.entry(at.sub)?))
+        };
+        let mut rows: Vec<Row> = match &view.dictionary {
+            Some(read) => {
+                let entries = read.dump.entries.iter().filter_map(|entry| Some((entry.at()?, entry)));
+                let mut rows: Vec<_> = entries
+                    .map(|(at, entry)| Row { at, known: known(at), read: Some(entry), difference: None })
+                    .collect();
+                let missing = manual(product).filter(|row| read.reading.entries.iter().all(|read| read.at != row.at));
+                rows.extend(missing.collect::<Vec<_>>());
+                rows
+            }
+            None => manual(product).collect(),
+        };
+        if let (Some(other), Some(read)) = (&self.other, &view.dictionary) {
+            for difference in dump::differences(&other.dump, &read.dump) {
+                let index = u16::from_str_radix(&difference.index, 16).unwrap_or_default();
+                let at = ObjectAddress::new(index, difference.subindex);
+                match rows.iter_mut().find(|row| row.at == at) {
+                    Some(row) => row.difference = Some(difference),
+                    None => rows.push(Row { at, known: known(at), read: None, difference: Some(difference) }),
+                }
+            }
+        }
+        rows.sort_by_key(|row| (row.at.index, row.at.sub));
+        rows.retain(|row| match self.only {
+            Only::Everything => true,
+            Only::Deviations => row.read.is_some_and(|read| read.deviates),
+            Only::Differences => row.difference.is_some(),
+        });
+        if !self.words.is_empty() {
+            let words: Vec<&str> = self.words.split_whitespace().collect();
+            rows.retain(|row| {
+                let text = row.text();
+                words.iter().all(|word| text.contains(word))
+            });
+        }
+        rows
+    }
+
+    /// The picture.
+    pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let (theme, view) = (scene.theme, scene.view);
+        let rows = self.rows(view);
+        let (upper, detail) = match area.width >= BESIDE_AT {
+            true => {
+                let width = area.width - DETAIL_COLUMNS;
+                let beside = Rect { x: area.x + width + 2, width: DETAIL_COLUMNS - 2, ..area };
+                (Rect { width, ..area }, beside)
+            }
+            false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
+        };
+        let (head, table) = lines::split(upper, 2);
+        let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len()))];
+        let columns = usize::from(upper.width);
+        let name_columns = name_columns(columns);
+        let factory = match &self.other {
+            Some(other) => format!("in {}", visible::text(&other.name)),
+            None => "Factory".into(),
+        };
+        let mut heads = format!(
+            "    {}{}{}{}",
+            format::left("Address", 9),
+            format::left("Name", name_columns),
+            format::left("Value", 16),
+            format::left(&factory, 16)
+        );
+        if columns >= MEANING_AT {
+            heads.push_str("Meaning");
+        }
+        lines::draw(frame, head, heading.into_iter().chain([Line::styled(heads, theme.quiet())]));
+        if rows.is_empty() {
+            let text = match (view.product(), &view.dictionary) {
+                (None, None) => {
+                    "Nothing to show: the unit has not said what it is. V reads its dictionary all the same."
+                }
+                _ => "Nothing here matches. O chooses what is shown, / what it has to contain, Esc shows everything.",
+            };
+            let broken = format::wrap(text, columns.saturating_sub(4));
+            return lines::draw(frame, table, broken.into_iter().map(|line| Line::raw(format!("  {line}"))));
+        }
+        let cursor = self.cursor.min(rows.len() - 1);
+        let first = lines::first_visible(cursor, rows.len(), usize::from(table.height));
+        let shown = rows.iter().enumerate().skip(first).take(usize::from(table.height));
+        lines::draw(frame, table, shown.map(|(number, row)| row.line(scene, number == cursor, columns)));
+        lines::draw(frame, detail, rows[cursor].detail(scene, detail.width, detail.height > DETAIL_ROWS));
+    }
+
+    fn remark(&self, scene: Scene, shown: usize) -> String {
+        let view = scene.view;
+        let mut parts = Vec::new();
+        if view.job == Some(Job::ReadDictionary) {
+            parts.push(format!("reading: {} so far", format::grouped(view.entries_read)));
+        } else {
+            match &view.dictionary {
+                None => parts.push("the manual's; V reads the unit's".to_owned()),
+                Some(read) => {
+                    let time = format::time_of_day(scene.start_of_day, read.at);
+                    let all = read.dump.entries.len();
+                    parts.push(format!("{shown} of {all}, {} not as factory, {time}", read.dump.deviations()));
+                }
+            }
+        }
+        match self.only {
+            Only::Everything => {}
+            Only::Deviations => parts.push("only those".into()),
+            Only::Differences => parts.push("only differences".into()),
+        }
+        if !self.words.is_empty() {
+            parts.push(format!("with '{}'", visible::text(&self.words)));
+        }
+        parts.join(", ")
+    }
+}
+
+/// The manual's entries, as nobody has read them.
+fn manual<'a>(product: Option<&'static Product>) -> impl Iterator<Item = Row<'a>> {
+    product.into_iter().flat_map(|product| product.dictionary.entries()).map(|(at, object, entry)| Row {
+        at,
+        known: Some((object, entry)),
+        read: None,
+        difference: None,
+    })
+}
+
+fn name_columns(columns: usize) -> usize {
+    let meaning = if columns >= MEANING_AT { MEANING_COLUMNS } else { 0 };
+    columns.saturating_sub(FIXED_COLUMNS + meaning)
+}
+
+impl Row<'_> {
+    fn name(&self) -> String {
+        match self.known {
+            Some((object, entry)) => dump::name(object, entry),
+            None => "not in the manual".into(),
+        }
+    }
+
+    fn value(&self) -> String {
+        match self.read {
+            Some(read) if read.value.is_none() => visible::text(&read.text),
+            Some(read) => match &read.unit {
+                Some(unit) => format!("{} {unit}", read.shown()),
+                None => read.shown(),
+            },
+            None => "-".into(),
+        }
+    }
+
+    fn default(&self) -> String {
+        let manual = || self.known.and_then(|(_, entry)| Some(dump::shown(entry, entry.default?.value)));
+        match self.read {
+            Some(read) => read.shown_default(),
+            None => manual().unwrap_or_else(|| "-".into()),
+        }
+    }
+
+    fn meaning(&self) -> Option<&str> {
+        self.read.and_then(|read| read.meaning.as_deref())
+    }
+
+    /// What is searched, in lower case.
+    fn text(&self) -> String {
+        let description = self.known.and_then(|(_, entry)| entry.description.as_deref()).unwrap_or_default();
+        let text =
+            format!("{} {} {} {} {description}", self.at, self.name(), self.value(), self.meaning().unwrap_or(""));
+        text.to_lowercase()
+    }
+
+    fn line(&self, scene: Scene, is_chosen: bool, columns: usize) -> Line<'static> {
+        let theme = scene.theme;
+        let deviates = self.read.is_some_and(|read| read.deviates);
+        let was_read = scene.view.dictionary.is_some();
+        let mark = match (self.read, &self.difference) {
+            (_, Some(_)) => "≠",
+            (Some(_), None) if deviates => "*",
+            (None, None) if was_read => "?",
+            _ => " ",
+        };
+        let other = match &self.difference {
+            Some(difference) => difference.left.clone().unwrap_or_else(|| "not there".into()),
+            None => self.default(),
+        };
+        let value_style = if deviates || self.difference.is_some() { theme.warning() } else { theme.strong() };
+        let mut line = Line::from(vec![
+            Span::raw(if is_chosen { "› " } else { "  " }),
+            Span::styled(format!("{mark} "), theme.warning()),
+            Span::raw(format::left(&self.at.to_string(), 9)),
+            Span::raw(format::left(&self.name(), name_columns(columns).saturating_sub(1))),
+            Span::raw(" "),
+            Span::styled(format::left(&self.value(), 15), value_style),
+            Span::raw(" "),
+            Span::styled(format::left(&other, 16), theme.quiet()),
+        ]);
+        if columns >= MEANING_AT {
+            line.push_span(Span::raw(format::left(self.meaning().unwrap_or_default(), MEANING_COLUMNS)));
+        }
+        if is_chosen { line.style(theme.bar()) } else { line }
+    }
+
+    /// Everything about it; without much room the first lines of it.
+    fn detail(&self, scene: Scene, columns: u16, has_room: bool) -> Vec<Line<'static>> {
+        let theme = scene.theme;
+        let room = usize::from(columns).saturating_sub(2 + lines::LABEL_COLUMNS);
+        let section = self.known.map(|(object, _)| format!("manual, section {}", object.section)).unwrap_or_default();
+        let mut rows = vec![lines::rule(theme, columns, &format!("{} {}", self.at, self.name()), &section)];
+        let mut labelled = |label: &str, text: String, most: usize| {
+            let most = if has_room { usize::MAX } else { most };
+            for (number, line) in format::wrap(&text, room).into_iter().take(most).enumerate() {
+                let label = if number == 0 { label } else { "" };
+                rows.push(lines::labelled(theme, label, Span::styled(line, Style::new())));
+            }
+        };
+        let mut value = self.value();
+        if let Some(meaning) = self.meaning() {
+            value.push_str(&format!(": {meaning}"));
+        }
+        match self.read {
+            Some(read) if read.deviates => value.push_str("; not as the factory made it"),
+            Some(_) => {}
+            None if scene.view.dictionary.is_some() => value = "not shown by the unit".into(),
+            None => value = "not read yet: V reads it".into(),
+        }
+        labelled("Value", value, 1);
+        let Some((_, entry)) = self.known else {
+            let text = self.read.map(|read| visible::text(&read.text)).unwrap_or_default();
+            labelled("Printed", text, 3);
+            return rows;
+        };
+        let factory = entry.default.map_or_else(
+            || "none: the unit itself supplies it".to_owned(),
+            |default| {
+                let meaning = entry.meaning(default.value).map(|text| format!(": {text}")).unwrap_or_default();
+                let node = if default.plus_node_id { " + node-ID" } else { "" };
+                format!("{}{node}{meaning}", dump::shown(entry, default.value))
+            },
+        );
+        labelled("Factory", factory, 1);
+        let access = match entry.access {
+            Access::ReadOnly => "read only",
+            Access::ReadWrite => "read and write",
+        };
+        let mappable = if entry.mappable { ", a PDO may carry it" } else { "" };
+        let data_type = format!("{:?}", entry.data_type).to_uppercase();
+        labelled("Type", format!("{data_type}, {access}{mappable}{}", range(&entry.limits, entry)), 1);
+        if !entry.meanings.is_empty() {
+            let meanings: Vec<String> =
+                entry.meanings.iter().map(|meaning| format!("{} {}", meaning.value, meaning.text)).collect();
+            labelled("Values", meanings.join(", "), 2);
+        }
+        if let Some(description) = &entry.description {
+            labelled("What for", description.clone(), 3);
+        }
+        if let Some(read) = self.read.filter(|read| !read.text.is_empty()) {
+            labelled("Printed", visible::text(&read.text), 1);
+        }
+        rows
+    }
+}
+
+/// `, 0 to 100 °C`.
+fn range(limits: &Limits, entry: &Entry) -> String {
+    let bound = |bound: &Bound| match bound {
+        Bound::Value(value) => value.to_string(),
+        Bound::Entry { at, offset: 0 } => format!("{at}"),
+        Bound::Entry { at, offset } => format!("{at}{offset:+}"),
+    };
+    let unit = entry.unit.as_deref().map(|unit| format!(" {unit}")).unwrap_or_default();
+    let values: Vec<String> = limits.values.iter().map(ToString::to_string).collect();
+    let span = match (&limits.low, &limits.high) {
+        (Some(low), Some(high)) => Some(format!("{} to {}{unit}", bound(low), bound(high))),
+        (Some(low), None) => Some(format!("from {}{unit}", bound(low))),
+        (None, Some(high)) => Some(format!("up to {}{unit}", bound(high))),
+        (None, None) => None,
+    };
+    let parts: Vec<String> = values.into_iter().chain(span).collect();
+    if parts.is_empty() { String::new() } else { format!(", {}", parts.join(" or ")) }
+}

@@ -1,0 +1,223 @@
+//! What was recorded before, and how a recording is played.
+
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+
+use super::Scene;
+use crate::time::Duration;
+use crate::tui::action::Action;
+use crate::tui::input::{Pace, Playback, Playing, RecordingEntry};
+use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::view::View;
+use crate::tui::visible;
+use crate::tui::widgets::{format, lines};
+
+/// Name on the tab.
+pub const TITLE: &str = "Recordings";
+
+/// Keys of the screen.
+pub const BINDINGS: &[Binding] = &[
+    Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "recording above" },
+    Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "choose", long: "recording below" },
+    Binding { keys: &[Press::Plain(KeyCode::Enter)], cmd: Cmd::Accept, short: "play", long: "play the chosen one" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char(' '))],
+        cmd: Cmd::Pause,
+        short: "pause",
+        long: "stop playing, or go on; at the end: from the beginning",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('+'))],
+        cmd: Cmd::Faster,
+        short: "faster",
+        long: "1, 2, 5, 10, 60 times as fast, or all at once",
+    },
+    Binding { keys: &[Press::Plain(KeyCode::Char('-'))], cmd: Cmd::Slower, short: "slower", long: "one step slower" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Left)],
+        cmd: Cmd::Left,
+        short: "back",
+        long: "10 seconds back, or a hundredth of a long recording",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Right)],
+        cmd: Cmd::Right,
+        short: "",
+        long: "10 seconds on, or a hundredth of a long recording",
+    },
+    Binding { keys: &[Press::Plain(KeyCode::Home)], cmd: Cmd::First, short: "", long: "to its beginning" },
+    Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "", long: "to its end" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('r'))],
+        cmd: Cmd::Refresh,
+        short: "",
+        long: "look for recordings again",
+    },
+];
+
+/// How fast a recording can be played, slowest first.
+const PACES: [Pace; 6] =
+    [Pace::Times(1), Pace::Times(2), Pace::Times(5), Pace::Times(10), Pace::Times(60), Pace::AtOnce];
+/// What an arrow moves by at least.
+const LEAST_STEP: Duration = Duration::from_secs(10);
+/// Rows of what is being played.
+const PLAYER_ROWS: u16 = 4;
+
+/// The page.
+#[derive(Debug, Default)]
+pub struct Recordings {
+    found: Found,
+    cursor: usize,
+    /// The pace to go on with after a pause.
+    pace: Option<Pace>,
+}
+
+#[derive(Debug, Default)]
+enum Found {
+    #[default]
+    Nothing,
+    Listed(Vec<RecordingEntry>),
+    Failed(String),
+}
+
+impl Recordings {
+    /// The list has come.
+    pub fn listed(&mut self, found: Result<Vec<RecordingEntry>, String>) {
+        self.found = found.map_or_else(Found::Failed, Found::Listed);
+        self.cursor = self.cursor.min(self.entries().len().saturating_sub(1));
+    }
+
+    /// What was found, newest first.
+    pub fn entries(&self) -> &[RecordingEntry] {
+        match &self.found {
+            Found::Listed(entries) => entries,
+            Found::Nothing | Found::Failed(_) => &[],
+        }
+    }
+
+    /// What a command does here.
+    pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
+        let last = self.entries().len().saturating_sub(1);
+        match cmd {
+            Cmd::Up => self.cursor = self.cursor.saturating_sub(1),
+            Cmd::Down => self.cursor = (self.cursor + 1).min(last),
+            Cmd::Refresh => return Some(Action::ListRecordings),
+            Cmd::Accept => return self.entries().get(self.cursor).map(|entry| Action::Open(entry.link.clone())),
+            _ => {}
+        }
+        let playing = view.playing?;
+        let step = playing.length.map_or(LEAST_STEP, |length| (length / 100).max(LEAST_STEP));
+        let play = match cmd {
+            Cmd::Pause if playing.pace != Pace::Paused => {
+                self.pace = Some(playing.pace);
+                Playback::Pace(Pace::Paused)
+            }
+            // At the end there is nothing to go on with.
+            Cmd::Pause if playing.length.is_some_and(|length| playing.position >= length) => {
+                Playback::Again(Pace::Times(1))
+            }
+            Cmd::Pause => Playback::Pace(self.pace.unwrap_or(Pace::Times(1))),
+            Cmd::Faster => Playback::Pace(step_of_pace(playing.pace, 1)),
+            Cmd::Slower => Playback::Pace(step_of_pace(playing.pace, -1)),
+            Cmd::Left => Playback::Seek(playing.position.saturating_sub(step)),
+            Cmd::Right => Playback::Seek(playing.position + step),
+            Cmd::First => Playback::Seek(Duration::ZERO),
+            Cmd::Last => Playback::Seek(playing.length.unwrap_or(Duration::MAX)),
+            _ => return None,
+        };
+        Some(Action::Play(play))
+    }
+
+    /// The picture.
+    pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let rest = match scene.view.playing {
+            Some(playing) => {
+                let (upper, rest) = lines::split(area, PLAYER_ROWS);
+                lines::draw(frame, upper, player(scene, playing, upper.width));
+                rest
+            }
+            None => area,
+        };
+        let theme = scene.theme;
+        let (heading, list) = lines::split(rest, 1);
+        let entries = self.entries();
+        let remark = if entries.is_empty() { String::new() } else { format!("{}, newest first", entries.len()) };
+        lines::draw(frame, heading, [lines::rule(theme, area.width, "Recordings", &remark)]);
+        match &self.found {
+            Found::Nothing => lines::draw(frame, list, [Line::styled("  Looking for recordings ...", theme.quiet())]),
+            Found::Failed(why) => {
+                let broken = format::wrap(&visible::text(why), usize::from(list.width).saturating_sub(4));
+                lines::draw(frame, list, broken.into_iter().map(|line| Line::styled(format!("  {line}"), theme.bad())));
+            }
+            Found::Listed(entries) if entries.is_empty() => {
+                let text = "  None yet. Every connection is recorded from its first byte.";
+                lines::draw(frame, list, [Line::styled(text, theme.quiet())]);
+            }
+            Found::Listed(entries) => {
+                let first = lines::first_visible(self.cursor, entries.len(), usize::from(list.height));
+                let rows = entries.iter().enumerate().skip(first);
+                lines::draw(frame, list, rows.map(|(number, entry)| self.row(scene, entry, number, list.width)));
+            }
+        }
+    }
+
+    fn row(&self, scene: Scene, entry: &RecordingEntry, number: usize, columns: u16) -> Line<'static> {
+        let is_chosen = number == self.cursor;
+        let length = entry.length.map_or_else(|| "?".to_owned(), format::minutes);
+        let size = format!("{} kB", format::grouped(entry.bytes.div_ceil(1000)));
+        let fixed = format!(
+            " {} {}  {length:>9}  {size:>11}  ",
+            if is_chosen { "›" } else { " " },
+            format::left(&entry.begun, 19)
+        );
+        let port = match entry.part {
+            0 | 1 => visible::text(&entry.port),
+            part => format!("{}, part {part}", visible::text(&entry.port)),
+        };
+        let room = usize::from(columns).saturating_sub(format::width(&fixed));
+        let style = if is_chosen { scene.theme.bar() } else { Style::new() };
+        Line::styled(format!("{fixed}{}", format::left(&format::keep_end(&port, room), room)), style)
+    }
+}
+
+fn step_of_pace(pace: Pace, step: isize) -> Pace {
+    let place = PACES.iter().position(|&known| known == pace).unwrap_or(0);
+    PACES[place.saturating_add_signed(step).min(PACES.len() - 1)]
+}
+
+/// What is being played: how far, how fast.
+fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
+    let theme = scene.theme;
+    let name = scene.view.link.name.as_deref().map(visible::text).unwrap_or_default();
+    let ended = playing.length.is_some_and(|length| playing.position >= length);
+    let pace = match playing.pace {
+        _ if ended => "at its end".to_owned(),
+        Pace::Paused => "paused".into(),
+        Pace::Times(1) => "as fast as it was".into(),
+        Pace::Times(times) => format!("{times} times as fast"),
+        Pace::AtOnce => "all at once".into(),
+    };
+    let length = playing.length.map_or_else(|| "?".to_owned(), format::minutes);
+    let place = format!("{} of {length}", format::minutes(playing.position));
+    let room = usize::from(columns).saturating_sub(format::width(&place) + format::width(&pace) + 10);
+    let part = playing
+        .length
+        .filter(|length| !length.is_zero())
+        .map_or(0.0, |length| (playing.position.as_secs_f64() / length.as_secs_f64()).min(1.0));
+    let filled = (part * room as f64) as usize;
+    let heading = format::keep_end(&name, usize::from(columns).saturating_sub(20));
+    vec![
+        lines::rule(theme, columns, "Playing", &heading),
+        Line::from(vec![
+            Span::styled(format!("  {place}  "), theme.strong()),
+            Span::styled("█".repeat(filled), theme.curve()),
+            Span::styled("░".repeat(room.saturating_sub(filled)), theme.quiet()),
+            Span::raw(format!("  {pace}")),
+        ]),
+        Line::styled("  All screens show the unit as it was then. Arrows move 10 s, Home to its start.", theme.quiet()),
+        Line::default(),
+    ]
+}

@@ -1,0 +1,268 @@
+//! The data stream: a table of all channels and the chosen one's curve over any time.
+
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+
+use super::Scene;
+use crate::time::{Duration, Instant};
+use crate::tui::action::Action;
+use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::popup::{Purpose, Question};
+use crate::tui::theme::Theme;
+use crate::tui::view::{Channel, Stream as Values, View};
+use crate::tui::visible;
+use crate::tui::widgets::chart::{self, Curve};
+use crate::tui::widgets::spark::sparkline;
+use crate::tui::widgets::{format, lines};
+use crate::wire::stream::{Reading, Source};
+
+/// Name on the tab.
+pub const TITLE: &str = "Stream";
+
+/// Keys of the screen.
+pub const BINDINGS: &[Binding] = &[
+    Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "channel above" },
+    Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "channel", long: "channel below" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('z'))],
+        cmd: Cmd::Zoom,
+        short: "zoom",
+        long: "the chart's time: 1 minute, 10 minutes, 1 hour, 8 hours, everything",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char(' '))],
+        cmd: Cmd::Pause,
+        short: "pause",
+        long: "hold the picture, or let it follow again; rows are taken in meanwhile",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Left)],
+        cmd: Cmd::Left,
+        short: "",
+        long: "hold the picture, and move the cursor to an earlier moment",
+    },
+    Binding { keys: &[Press::Plain(KeyCode::Right)], cmd: Cmd::Right, short: "", long: "cursor to a later moment" },
+    Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "", long: "follow the newest row again" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('k'))],
+        cmd: Cmd::Mark,
+        short: "mark",
+        long: "mark this moment in chart and recording",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('r'))],
+        cmd: Cmd::Restart,
+        short: "",
+        long: "start minimum, maximum and mean anew",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('e'))],
+        cmd: Cmd::Export,
+        short: "export",
+        long: "write the rows kept and all that come to a CSV file; again: stop",
+    },
+];
+
+/// What the chart can show, in the order of the key.
+const WINDOWS: [(&str, Option<Duration>); 5] = [
+    ("1 minute", Some(Duration::from_secs(60))),
+    ("10 minutes", Some(Duration::from_secs(600))),
+    ("1 hour", Some(Duration::from_secs(3600))),
+    ("8 hours", Some(Duration::from_secs(8 * 3600))),
+    ("everything", None),
+];
+/// Steps of the cursor over the whole width.
+const CURSOR_STEPS: u32 = 60;
+/// Smallest span of a trend: less than this is noise.
+const LEAST_SPAN: f64 = 1.0;
+/// Columns of the table before the trend begins.
+const TABLE_COLUMNS: usize = 77;
+
+/// The page.
+#[derive(Debug, Default)]
+pub struct Stream {
+    channel: usize,
+    window: usize,
+    held: Option<Held>,
+}
+
+/// The picture is held.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    /// What stands at the right edge.
+    end: Instant,
+    /// What is looked at.
+    cursor: Instant,
+}
+
+impl Stream {
+    /// Another link: nothing is held any more.
+    pub fn begin_link(&mut self) {
+        *self = Stream { window: self.window, ..Stream::default() };
+    }
+
+    /// What a command does here.
+    pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
+        let values = &view.stream;
+        let last = values.channels.len().saturating_sub(1);
+        self.channel = self.channel.min(last);
+        match cmd {
+            Cmd::Up => self.channel = self.channel.saturating_sub(1),
+            Cmd::Down => self.channel = (self.channel + 1).min(last),
+            Cmd::Zoom => self.window = (self.window + 1) % WINDOWS.len(),
+            Cmd::Pause if self.held.is_some() => self.held = None,
+            Cmd::Pause => self.held = values.newest.map(|at| Held { end: at, cursor: at }),
+            Cmd::Left | Cmd::Right => self.move_cursor(values, cmd == Cmd::Left),
+            Cmd::Last => self.held = None,
+            Cmd::Restart => return Some(Action::RestartExtremes),
+            Cmd::Mark => return Some(Action::Mark),
+            Cmd::Export if values.export.is_some() => return Some(Action::EndExport),
+            Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportStream, view))),
+            _ => {}
+        }
+        None
+    }
+
+    fn move_cursor(&mut self, values: &Values, earlier: bool) {
+        let Some(newest) = values.newest else { return };
+        let held = self.held.unwrap_or(Held { end: newest, cursor: newest });
+        let (from, _) = self.times(values, held.end);
+        let step = (held.end.since(from) / CURSOR_STEPS).max(Duration::from_millis(1));
+        let cursor = match earlier {
+            true => from + held.cursor.since(from).saturating_sub(step),
+            false => (held.cursor + step).min(held.end),
+        };
+        self.held = Some(Held { cursor, ..held });
+    }
+
+    /// The moments at the edges of the chart that ends at `end`.
+    fn times(&self, values: &Values, end: Instant) -> (Instant, Instant) {
+        let begun = values.channels.first().and_then(Channel::begun).unwrap_or(end);
+        let from = match WINDOWS[self.window].1 {
+            // A chart that is not full yet begins with the first row.
+            Some(length) => Instant::ZERO + end.since_start().saturating_sub(length),
+            None => begun,
+        };
+        (from.max(begun).min(end), end)
+    }
+
+    /// The picture.
+    pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let (theme, values) = (scene.theme, &scene.view.stream);
+        let Some(newest) = values.newest else {
+            let mut rows = vec![lines::rule(theme, area.width, "Stream", "")];
+            let room = usize::from(area.width).saturating_sub(4);
+            let broken = super::overview::without_values(scene).into_iter().flat_map(|text| format::wrap(text, room));
+            rows.extend(broken.map(|line| Line::raw(format!("  {line}"))));
+            return lines::draw(frame, area, rows);
+        };
+        let table = self.table(scene, area.width);
+        let (upper, rest) = lines::split(area, table.len() as u16);
+        lines::draw(frame, upper, table);
+        let Some(channel) = values.channels.get(self.channel.min(values.channels.len().saturating_sub(1))) else {
+            return;
+        };
+        let (from, to) = self.times(values, self.held.map_or(newest, |held| held.end));
+        let (name, _) = WINDOWS[self.window];
+        let state = if self.held.is_some() { "held, End follows again" } else { "follows" };
+        let remark = format!("{name}, {state}");
+        let (heading, canvas) = lines::split(rest, 1);
+        lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Curve of {}", channel.name), &remark)]);
+        let curve = Curve {
+            samples: channel.samples(from, to),
+            window: Some((from, to)),
+            cursor: self.held.map(|held| held.cursor),
+            marks: values.marks.iter().copied().collect(),
+        };
+        chart::draw(theme, scene.start_of_day, &curve, canvas, frame);
+    }
+
+    fn table(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
+        let (theme, values) = (scene.theme, &scene.view.stream);
+        let source = match values.source {
+            Some(Source::ProcessValue) => "process value (7130h) in counts",
+            Some(Source::FieldValue) | None => "field value (6100h) in °C",
+        };
+        let every = values.period.map(|period| format!(", every {}", format::period(period))).unwrap_or_default();
+        let remark = format!("{source}{every}, {} rows", format::grouped(values.rows));
+        let mut rows = vec![lines::rule(theme, columns, "Stream", &remark)];
+        let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
+        let value = self.held.map_or_else(|| "Value".to_owned(), |held| format!("At {}", time(held.cursor)));
+        let heads =
+            format!("    {:<8}{value:>13}   {:<15}{:>11}{:>11}{:>11}", "Channel", "State", "Min", "Max", "Mean");
+        rows.push(Line::styled(heads, theme.quiet()));
+        for (number, channel) in values.channels.iter().enumerate() {
+            rows.push(self.row(scene, channel, number, columns));
+        }
+        rows.push(note(scene));
+        rows
+    }
+
+    fn row(&self, scene: Scene, channel: &Channel, number: usize, columns: u16) -> Line<'static> {
+        let (theme, stream) = (scene.theme, &scene.view.stream);
+        let source = stream.source.unwrap_or(Source::FieldValue);
+        let decimals = super::overview::decimals(scene.view, source);
+        let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
+        let reading = match self.held {
+            None => Some(channel.reading),
+            Some(held) => channel.at(held.cursor).map(|(_, reading)| reading),
+        };
+        let is_chosen = number == self.channel;
+        let is_old = stream.late || scene.view.facts.stream.is_none() || self.held.is_some();
+        let (state, style) = state(theme, reading);
+        let unit = if source == Source::FieldValue { " °C" } else { "   " };
+        let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, channel.name);
+        let mut line = Line::from(vec![
+            Span::styled(name, if is_chosen { theme.strong() } else { Style::new() }),
+            Span::styled(
+                format!("{:>13}", format!("{}{unit}", show(reading.and_then(Reading::value)))),
+                if is_old { theme.quiet() } else { theme.strong() },
+            ),
+            Span::raw("   "),
+            Span::styled(format!("{state:<15}"), style),
+            Span::raw(format!("{:>11}{:>11}{:>11}", show(channel.min), show(channel.max), show(channel.mean()))),
+        ]);
+        let room = usize::from(columns).saturating_sub(TABLE_COLUMNS + 2);
+        if room > 10 {
+            let newest = channel.history.len().saturating_sub(room);
+            let values: Vec<_> = channel.history.range(newest..).map(|sample| sample.1.value()).collect();
+            line.push_span(Span::styled(format!("  {}", sparkline(&values, room, LEAST_SPAN)), theme.curve()));
+        }
+        line
+    }
+}
+
+/// A reading's state as a person reads it.
+fn state(theme: Theme, reading: Option<Reading>) -> (&'static str, Style) {
+    match reading {
+        None => ("not kept", theme.quiet()),
+        Some(Reading::Value(_)) => ("ok", theme.good()),
+        Some(Reading::Disabled) => ("disabled", theme.quiet()),
+        Some(Reading::Open) => ("open circuit", theme.bad()),
+        Some(Reading::Short) => ("short circuit", theme.bad()),
+        Some(Reading::Error) => ("no reading", theme.bad()),
+    }
+}
+
+/// What has to be said below the table: where rows go, or that none come.
+fn note(scene: Scene) -> Line<'static> {
+    let (theme, view) = (scene.theme, scene.view);
+    if let Some(export) = &view.stream.export {
+        let path = visible::text(&export.path.to_string_lossy());
+        let text = format!("  {} rows written to {path}; E ends it.", format::grouped(export.rows));
+        return Line::styled(text, theme.good());
+    }
+    if view.facts.stream.is_none() {
+        return Line::styled("  The stream is off: these are its last values. T switches it on.", theme.warning());
+    }
+    if view.stream.late {
+        return Line::styled(
+            "  No new row: these values are old. M asks whether the unit still answers.",
+            theme.warning(),
+        );
+    }
+    Line::default()
+}

@@ -1,0 +1,94 @@
+//! The unit's diagnostics: the newest page as printed, and what its numbers have been since the first.
+
+use crate::time::Instant;
+use crate::wire::{Text, diagnostics, visible};
+
+/// Numbers of a page that are followed at most.
+const MOST_TRACKED: usize = 200;
+
+/// The pages so far.
+#[derive(Debug, Default)]
+pub struct Diagnostics {
+    /// Lines of the newest page, as printed.
+    pub lines: Vec<String>,
+    /// When it came.
+    pub at: Option<Instant>,
+    /// Pages so far.
+    pub pages: u64,
+    /// The numbers found on them, in the page's order.
+    pub found: Vec<Tracked>,
+}
+
+/// A number on the pages, with what it has been.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tracked {
+    /// What the page calls it.
+    pub label: String,
+    /// As printed, where there is one.
+    pub unit: Option<String>,
+    /// On the newest page; `None` if it is not there any more.
+    pub value: Option<f64>,
+    /// Smallest since the first page.
+    pub min: f64,
+    /// Largest since the first page.
+    pub max: f64,
+}
+
+impl Diagnostics {
+    pub(super) fn page(&mut self, at: Instant, lines: &[Text]) {
+        self.lines = lines.iter().map(|line| visible::line(line.text.trim_end().as_bytes())).collect();
+        self.at = Some(at);
+        self.pages += 1;
+        self.found.iter_mut().for_each(|tracked| tracked.value = None);
+        let found: Vec<_> = self.lines.iter().flat_map(|line| diagnostics::quantities(line)).collect();
+        for quantity in found {
+            let same = |tracked: &Tracked| {
+                // Two of one name stand on a page one after the other.
+                tracked.value.is_none() && tracked.label == quantity.label && tracked.unit == quantity.unit
+            };
+            match self.found.iter().position(same) {
+                Some(place) => {
+                    let tracked = &mut self.found[place];
+                    tracked.value = Some(quantity.value);
+                    tracked.min = tracked.min.min(quantity.value);
+                    tracked.max = tracked.max.max(quantity.value);
+                }
+                None if self.found.len() < MOST_TRACKED => self.found.push(Tracked {
+                    label: quantity.label,
+                    unit: quantity.unit,
+                    value: Some(quantity.value),
+                    min: quantity.value,
+                    max: quantity.value,
+                }),
+                None => {}
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Span;
+
+    fn page(lines: &[&str]) -> Vec<Text> {
+        lines.iter().map(|line| Text { text: (*line).to_owned(), span: Span::default() }).collect()
+    }
+
+    #[test]
+    fn numbers_are_followed_from_page_to_page() {
+        let mut diagnostics = Diagnostics::default();
+        for supply in [24.1, 23.0, 24.0] {
+            diagnostics.page(Instant::ZERO, &page(&[&format!("Supply: {supply} V"), "Input 5 uV", "Input 7 uV"]));
+        }
+        let supply = &diagnostics.found[0];
+        assert_eq!((supply.value, supply.min, supply.max), (Some(24.0), 23.0, 24.1));
+        assert_eq!(
+            diagnostics.found.iter().map(|found| found.value).collect::<Vec<_>>(),
+            [Some(24.0), Some(5.0), Some(7.0)]
+        );
+        diagnostics.page(Instant::ZERO, &page(&["nothing of that"]));
+        assert!(diagnostics.found.iter().all(|found| found.value.is_none()));
+        assert_eq!((diagnostics.pages, diagnostics.lines.len()), (4, 1));
+    }
+}

@@ -1,0 +1,284 @@
+//! What the screens may read: everything known, folded from the session's events.
+
+mod diagnostics;
+mod stream;
+
+use std::collections::VecDeque;
+
+pub use diagnostics::{Diagnostics, Tracked};
+pub use stream::{Channel, Export, Fault, FaultKind, Stream};
+
+use super::input::{Failure, Playing};
+use crate::device::Product;
+use crate::dump::Dump;
+use crate::session::{DictionaryReading, Event, Facts, Job, LoadReport, Outcome, Progress, UnitState};
+use crate::time::Instant;
+
+/// Everything a screen may read.
+#[derive(Debug, Default)]
+pub struct View {
+    /// The link.
+    pub link: Link,
+    /// What is known of the unit.
+    pub facts: Facts,
+    /// The job that runs.
+    pub job: Option<Job>,
+    /// The data stream.
+    pub stream: Stream,
+    /// Faults seen since connecting, newest first.
+    pub faults: VecDeque<Fault>,
+    /// The unit's object dictionary, once it has been read.
+    pub dictionary: Option<DictionaryRead>,
+    /// Entries read so far while it is being read.
+    pub entries_read: usize,
+    /// The unit's diagnostics.
+    pub diagnostics: Diagnostics,
+    /// The upload.
+    pub load: Load,
+    /// How a recording is played, where the link is one.
+    pub playing: Option<Playing>,
+    /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
+    pub viewing: bool,
+    /// The latest word to the user.
+    pub notice: Option<Notice>,
+}
+
+/// The link and how it stands.
+#[derive(Debug, Default)]
+pub struct Link {
+    /// What opened it, or was to open it.
+    pub name: Option<String>,
+    /// Baud rate.
+    pub baud: u32,
+    /// Where the recording is written.
+    pub recording: Option<String>,
+    /// The start of time, in milliseconds since 1970, UTC.
+    pub start_millis: i64,
+    /// How it stands.
+    pub state: LinkState,
+}
+
+/// How a link stands.
+#[derive(Debug, Default, PartialEq)]
+pub enum LinkState {
+    /// No link.
+    #[default]
+    Closed,
+    /// Being opened.
+    Opening,
+    /// Open.
+    Open {
+        /// Whether sending is forbidden.
+        read_only: bool,
+    },
+    /// It has ended by itself.
+    Lost(Failure),
+}
+
+/// The upload.
+#[derive(Debug, Default)]
+pub struct Load {
+    /// Where it stands.
+    pub progress: Option<Progress>,
+    /// Since when the unit holds us by XOFF.
+    pub held_since: Option<Instant>,
+    /// How the last one ended, until the user has read it.
+    pub report: Option<LoadReport>,
+    /// The last one was refused because nobody knew the product.
+    pub product_unknown: bool,
+}
+
+/// The object dictionary as the unit showed it.
+#[derive(Debug)]
+pub struct DictionaryRead {
+    /// What was read, with its meaning.
+    pub dump: Dump,
+    /// What was read.
+    pub reading: DictionaryReading,
+    /// When it was complete.
+    pub at: Instant,
+}
+
+/// A word to the user, shown until the next one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Notice {
+    /// How much it matters.
+    pub tone: Tone,
+    /// What it says.
+    pub text: String,
+}
+
+/// How much a word matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// Good to know.
+    Quiet,
+    /// It has worked.
+    Good,
+    /// It has not.
+    Bad,
+}
+
+impl View {
+    /// Takes in one event; `facts` are the session's at that moment.
+    pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
+        match event {
+            Event::Heard { .. } => {}
+            Event::Page { at, lines } => self.diagnostics.page(*at, lines),
+            Event::EntriesRead(count) => self.entries_read = *count,
+            Event::Row { at, row, .. } => {
+                let product = self.product();
+                self.stream.row(*at, row, product, &mut self.faults);
+            }
+            Event::FactsChanged => self.facts_changed(facts),
+            Event::Held(true) => self.load.held_since = Some(now),
+            Event::Held(false) => self.load.held_since = None,
+            Event::Progress(progress) => {
+                self.job = Some(Job::Load);
+                self.load.progress = Some(*progress);
+            }
+            Event::Finished(outcome) => self.finished(now, outcome),
+        }
+    }
+
+    /// When [`View::timeout`] is wanted.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        self.stream.late_at().filter(|_| self.facts.stream.is_some())
+    }
+
+    /// The time is `now`. Says whether anything has changed.
+    pub fn timeout(&mut self, now: Instant) -> bool {
+        let late = self.poll_timeout().is_some_and(|due| due <= now);
+        self.stream.late |= late;
+        late
+    }
+
+    /// Starts minimum, maximum and mean of every channel anew.
+    pub fn restart_extremes(&mut self) {
+        self.stream.restart_extremes();
+    }
+
+    /// Marks a moment of the stream.
+    pub fn mark(&mut self, at: Instant) {
+        self.stream.mark(at);
+    }
+
+    /// A new link: what was known of the unit before says nothing about the one at its end.
+    pub fn begin_link(&mut self, link: Link) {
+        *self = View { link, ..View::default() };
+    }
+
+    /// Whether keys and commands can reach a unit.
+    pub fn can_send(&self) -> bool {
+        self.link.state == LinkState::Open { read_only: false }
+    }
+
+    /// The product, where it is one we know.
+    pub fn product(&self) -> Option<&'static Product> {
+        self.facts.product.as_ref().and_then(|known| Product::named(&known.value))
+    }
+
+    /// Whether the user has to say what the unit is, because nobody else can.
+    pub fn needs_label(&self) -> bool {
+        self.facts.product.is_none() && (self.facts.state == UnitState::Loader || self.load.product_unknown)
+    }
+
+    /// Says something to the user.
+    pub fn tell(&mut self, tone: Tone, text: impl Into<String>) {
+        self.notice = Some(Notice { tone, text: text.into() });
+    }
+
+    fn facts_changed(&mut self, facts: &Facts) {
+        if facts.stream.is_none() {
+            self.stream.late = false;
+        }
+        if facts.state == UnitState::Application && self.facts.state != UnitState::Application {
+            // Whatever sub-menu was open, a restart has closed it.
+            self.viewing = false;
+        }
+        self.facts = facts.clone();
+    }
+
+    fn finished(&mut self, now: Instant, outcome: &Outcome) {
+        self.job = None;
+        match outcome {
+            Outcome::DictionaryRead(reading) => self.dictionary_read(now, reading),
+            Outcome::Identified => self.identified(),
+            Outcome::StreamRuns { was_on: true } => {
+                self.tell(Tone::Good, "The stream was on already and now sends what you asked for.");
+            }
+            Outcome::StreamRuns { was_on: false } => self.tell(Tone::Good, done(Job::StreamOn)),
+            Outcome::Done(job) => self.tell(Tone::Good, done(*job)),
+            Outcome::NoAnswer { job, awaited, .. } => {
+                self.tell(Tone::Bad, format!("No answer: waited for {awaited}, {}.", doing(*job)));
+            }
+            Outcome::Refused { job, reason, .. } => {
+                self.tell(Tone::Bad, format!("The unit refused, {}: {reason}", doing(*job)));
+            }
+            Outcome::Cancelled(Job::Diagnostics) => self.tell(Tone::Quiet, done(Job::Diagnostics)),
+            Outcome::Cancelled(job) => self.tell(Tone::Quiet, format!("Cancelled, {}.", doing(*job))),
+            Outcome::Loaded(report) => {
+                self.load.progress = None;
+                self.load.held_since = None;
+                self.load.product_unknown =
+                    report.verdict == crate::session::Verdict::Refused && report.product.is_none();
+                self.load.report = Some((**report).clone());
+            }
+        }
+    }
+
+    fn dictionary_read(&mut self, now: Instant, reading: &DictionaryReading) {
+        let dump = Dump::of(reading, self.product(), &self.facts);
+        let (entries, deviations) = (dump.entries.len(), dump.deviations());
+        if dump.complete {
+            let text = format!("The dictionary is read: {entries} entries, {deviations} not as the factory's.");
+            self.tell(Tone::Good, text);
+        } else {
+            let text = format!("Not all of the object dictionary was shown: {entries} entries were read.");
+            self.tell(Tone::Bad, text);
+        }
+        self.dictionary = Some(DictionaryRead { dump, reading: reading.clone(), at: now });
+    }
+
+    fn identified(&mut self) {
+        let version = self.facts.version.as_ref().map(|known| format!(" {}", known.value)).unwrap_or_default();
+        match (self.facts.state, &self.facts.product) {
+            (UnitState::Silent, _) => self.tell(Tone::Bad, "Nobody has answered: check power, cable and port."),
+            (UnitState::Loader, _) => self.tell(Tone::Quiet, "The unit waits in its loader for a file: L loads one."),
+            (UnitState::Unknown | UnitState::Application, Some(product)) => {
+                let text = format!("The unit is an {}{version}.", product.value);
+                self.tell(Tone::Good, text);
+            }
+            (UnitState::Unknown | UnitState::Application, None) => {
+                self.tell(Tone::Quiet, "The unit talks, but has not said what it is; after a power cycle it does.");
+            }
+        }
+    }
+}
+
+/// What a job was about, to follow "No answer: waited for ...,".
+pub fn doing(job: Job) -> &'static str {
+    match job {
+        Job::Identify => "asking who is there",
+        Job::StreamOn => "switching the stream on",
+        Job::StreamOff => "switching the stream off",
+        Job::RestoreDefaults => "restoring the defaults",
+        Job::ReadDictionary => "reading the object dictionary",
+        Job::Diagnostics => "reading the diagnostics",
+        Job::Overhear => "listening",
+        Job::Load => "loading new software",
+    }
+}
+
+fn done(job: Job) -> &'static str {
+    match job {
+        Job::Identify => "The unit has answered.",
+        Job::StreamOn => "The stream is on, also after a power cycle, until T switches it off.",
+        Job::StreamOff => "The stream is off.",
+        Job::RestoreDefaults => "The defaults are restored and the unit has restarted.",
+        Job::ReadDictionary => "The object dictionary has been read.",
+        Job::Diagnostics => "The diagnostics are off.",
+        Job::Overhear => "This is the end of the recording. 3 shows all of it.",
+        Job::Load => "The upload has ended.",
+    }
+}

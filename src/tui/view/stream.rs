@@ -1,0 +1,312 @@
+//! The data stream as the screens show it: channels with their values, trends and faults.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+use crate::device::Product;
+use crate::time::{Duration, Instant};
+use crate::tui::trend::Trend;
+use crate::wire::stream::{Layout, Reading, Row, Source};
+
+/// Samples kept of each channel as they came; a [`Trend`] keeps the rest.
+pub const KEPT_SAMPLES: usize = 3600;
+/// Faults kept, the newest first.
+pub const KEPT_FAULTS: usize = 200;
+/// Marks kept.
+pub const KEPT_MARKS: usize = 100;
+
+/// A stream is late after this many of its periods without a row ...
+const LATE_PERIODS: u32 = 3;
+/// ... but not before this time: a busy unit may swallow a row or two.
+const LATE_AT_LEAST: Duration = Duration::from_secs(2);
+
+/// The data stream.
+#[derive(Debug, Default)]
+pub struct Stream {
+    /// What the newest row carries.
+    pub source: Option<Source>,
+    /// The channels, in the row's order.
+    pub channels: Vec<Channel>,
+    /// Rows since the channels began.
+    pub rows: u64,
+    /// When the newest row came.
+    pub newest: Option<Instant>,
+    /// Time between rows, smoothed.
+    pub period: Option<Duration>,
+    /// No row for longer than the stream's period explains.
+    pub late: bool,
+    /// Moments the user has marked.
+    pub marks: VecDeque<Instant>,
+    /// The file that rows are written to.
+    pub export: Option<Export>,
+}
+
+/// A file that rows are written to as they come.
+#[derive(Debug)]
+pub struct Export {
+    /// Which.
+    pub path: PathBuf,
+    /// Rows written so far.
+    pub rows: u64,
+    /// The channels it has columns for.
+    pub channels: Vec<String>,
+}
+
+/// One channel of the stream.
+#[derive(Debug)]
+pub struct Channel {
+    /// Its name, `TC1`.
+    pub name: String,
+    /// The newest reading.
+    pub reading: Reading,
+    /// Smallest value.
+    pub min: Option<f64>,
+    /// Largest value.
+    pub max: Option<f64>,
+    /// Sum of the values since minimum and maximum began, and how many they were.
+    sum: (f64, u64),
+    /// The newest samples, oldest first.
+    pub history: VecDeque<(Instant, Reading)>,
+    /// All samples, in stretches.
+    trend: Trend,
+}
+
+/// A wiring fault.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fault {
+    /// The channel's name.
+    pub channel: String,
+    /// Open or short circuit.
+    pub kind: FaultKind,
+    /// First row that showed it.
+    pub since: Instant,
+    /// First row that did not.
+    pub until: Option<Instant>,
+}
+
+/// What is wrong with a sensor's circuit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// Open circuit.
+    Open,
+    /// Short circuit.
+    Short,
+    /// The unit has no value for another reason.
+    Failed,
+}
+
+impl Stream {
+    /// Takes in a row; faults that begin or end with it are noted in `faults`.
+    pub(super) fn row(&mut self, at: Instant, row: &Row, product: Option<&Product>, faults: &mut VecDeque<Fault>) {
+        let names = channel_names(product, row.readings.len());
+        let same =
+            self.source == Some(row.source) && self.channels.iter().map(|channel| &channel.name).eq(names.iter());
+        if !same {
+            let (export, marks) = (self.export.take(), std::mem::take(&mut self.marks));
+            *self = Stream { source: Some(row.source), export, marks, ..Stream::default() };
+            self.channels = names.into_iter().map(Channel::new).collect();
+        }
+        if let Some(before) = self.newest {
+            let gap = at.since(before);
+            // A new setting shows at once, jitter hardly.
+            self.period = Some(match self.period {
+                Some(period) if gap < period * 2 && gap * 2 > period => (period * 7 + gap) / 8,
+                _ => gap,
+            });
+        }
+        self.newest = Some(at);
+        self.rows += 1;
+        self.late = false;
+        for (channel, &reading) in self.channels.iter_mut().zip(&row.readings) {
+            channel.read(at, reading);
+            let fault = match reading {
+                Reading::Open => Some(FaultKind::Open),
+                Reading::Short => Some(FaultKind::Short),
+                Reading::Error => Some(FaultKind::Failed),
+                Reading::Value(_) | Reading::Disabled => None,
+            };
+            note_fault(faults, &channel.name, fault, at);
+        }
+    }
+
+    /// When the newest row is too old.
+    pub(super) fn late_at(&self) -> Option<Instant> {
+        let newest = self.newest.filter(|_| !self.late)?;
+        Some(newest + (self.period.unwrap_or_default() * LATE_PERIODS).max(LATE_AT_LEAST))
+    }
+
+    /// Marks a moment.
+    pub(super) fn mark(&mut self, at: Instant) {
+        self.marks.push_back(at);
+        if self.marks.len() > KEPT_MARKS {
+            self.marks.pop_front();
+        }
+    }
+
+    /// Starts minimum, maximum and mean of every channel anew.
+    pub(super) fn restart_extremes(&mut self) {
+        for channel in &mut self.channels {
+            let value = channel.reading.value();
+            (channel.min, channel.max) = (value, value);
+            channel.sum = value.map_or((0.0, 0), |value| (value, 1));
+        }
+    }
+
+    /// The rows that are kept as they came, oldest first.
+    pub fn kept_rows(&self) -> impl Iterator<Item = (Instant, Row)> {
+        let count = self.channels.first().map_or(0, |channel| channel.history.len());
+        (0..count).filter_map(|number| {
+            let readings: Option<Vec<Reading>> =
+                self.channels.iter().map(|channel| channel.history.get(number).map(|sample| sample.1)).collect();
+            let at = self.channels.first()?.history.get(number)?.0;
+            Some((at, Row { source: self.source?, readings: readings? }))
+        })
+    }
+}
+
+impl Channel {
+    fn new(name: String) -> Self {
+        Channel {
+            name,
+            reading: Reading::Disabled,
+            min: None,
+            max: None,
+            sum: (0.0, 0),
+            history: VecDeque::new(),
+            trend: Trend::default(),
+        }
+    }
+
+    fn read(&mut self, at: Instant, reading: Reading) {
+        let value = reading.value();
+        self.reading = reading;
+        if let Some(value) = value {
+            self.min = Some(self.min.map_or(value, |min| min.min(value)));
+            self.max = Some(self.max.map_or(value, |max| max.max(value)));
+            self.sum = (self.sum.0 + value, self.sum.1 + 1);
+        }
+        self.trend.push(at, value);
+        self.history.push_back((at, reading));
+        if self.history.len() > KEPT_SAMPLES {
+            self.history.pop_front();
+        }
+    }
+
+    /// Mean of the values since minimum and maximum began.
+    pub fn mean(&self) -> Option<f64> {
+        (self.sum.1 > 0).then(|| self.sum.0 / self.sum.1 as f64)
+    }
+
+    /// Samples between two moments, oldest first, `None` where there was no value: as they came if they are kept, else
+    /// the extremes of stretches of time.
+    pub fn samples(&self, from: Instant, to: Instant) -> Vec<(Instant, Option<f64>)> {
+        let within = |at: Instant| from <= at && at <= to;
+        let kept_from = self.history.front().map_or(Instant::NEVER, |sample| sample.0);
+        let kept = self.history.iter().filter(|sample| within(sample.0)).map(|&(at, reading)| (at, reading.value()));
+        if kept_from <= from || self.history.len() < KEPT_SAMPLES {
+            return kept.collect();
+        }
+        let mut samples = Vec::new();
+        for (at, stretch) in self.trend.stretches().filter(|(at, _)| within(*at)) {
+            if stretch.count > 0 {
+                samples.extend([(at, Some(stretch.min)), (at, Some(stretch.max))]);
+            }
+            samples.extend(stretch.has_gap.then_some((at, None)));
+        }
+        samples
+    }
+
+    /// When the first sample came.
+    pub fn begun(&self) -> Option<Instant> {
+        let first = self.trend.stretches().next().map(|(at, _)| at);
+        first.into_iter().chain(self.history.front().map(|sample| sample.0)).min()
+    }
+
+    /// What the channel read at a moment: its newest sample not behind it.
+    pub fn at(&self, moment: Instant) -> Option<(Instant, Reading)> {
+        let behind = self.history.partition_point(|sample| sample.0 <= moment);
+        behind.checked_sub(1).and_then(|place| self.history.get(place)).copied()
+    }
+}
+
+/// Names from the product's file; a unit that has not said what it is gives them away by their number.
+fn channel_names(product: Option<&Product>, count: usize) -> Vec<String> {
+    let fits = |layout: &&Layout| layout.channels.len() == count;
+    let known = product.map(|product| &product.stream).filter(fits);
+    let likely = || Product::all().iter().map(|product| &product.stream).find(fits);
+    match known.or_else(likely) {
+        Some(layout) => layout.channels.clone(),
+        None => (1..=count).map(|number| format!("#{number}")).collect(),
+    }
+}
+
+fn note_fault(faults: &mut VecDeque<Fault>, channel: &str, seen: Option<FaultKind>, at: Instant) {
+    let open = faults.iter_mut().find(|fault| fault.until.is_none() && fault.channel == channel);
+    if open.as_ref().map(|fault| fault.kind) == seen {
+        return;
+    }
+    if let Some(fault) = open {
+        fault.until = Some(at);
+    }
+    if let Some(kind) = seen {
+        faults.push_front(Fault { channel: channel.to_owned(), kind, since: at, until: None });
+        faults.truncate(KEPT_FAULTS);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::{Event, Facts};
+    use crate::tui::view::View;
+
+    fn row(view: &mut View, millis: u64, readings: [Reading; 5]) {
+        let at = Instant::from_millis(millis);
+        let row = Row { source: Source::FieldValue, readings: readings.to_vec() };
+        view.fold(at, &Event::Row { at, span: Default::default(), row }, &Facts::default());
+    }
+
+    fn with_first(reading: Reading) -> [Reading; 5] {
+        [reading, Reading::Value(1.0), Reading::Value(1.0), Reading::Disabled, Reading::Value(1.0)]
+    }
+
+    #[test]
+    fn a_fault_is_remembered_with_its_beginning_and_its_end() {
+        let mut view = View::default();
+        let readings = [Reading::Value(20.0), Reading::Open, Reading::Open, Reading::Short, Reading::Value(21.0)];
+        for (number, reading) in readings.into_iter().enumerate() {
+            row(&mut view, 1000 * number as u64, with_first(reading));
+        }
+        let seen: Vec<_> = view.faults.iter().map(|f| (f.kind, f.since, f.until)).collect();
+        let at = Instant::from_millis;
+        assert_eq!(seen, [(FaultKind::Short, at(3000), Some(at(4000))), (FaultKind::Open, at(1000), Some(at(3000)))]);
+        assert_eq!((view.stream.channels[0].min, view.stream.channels[0].max), (Some(20.0), Some(21.0)));
+    }
+
+    #[test]
+    fn history_is_bounded() {
+        let mut view = View::default();
+        for number in 0..(KEPT_SAMPLES as u64 + 100) {
+            row(&mut view, number, with_first(if number % 2 == 0 { Reading::Open } else { Reading::Short }));
+        }
+        assert!(view.stream.channels.iter().all(|channel| channel.history.len() == KEPT_SAMPLES));
+        assert_eq!(view.faults.len(), KEPT_FAULTS);
+    }
+
+    #[test]
+    fn a_stream_is_late_after_three_of_its_periods_and_nothing_ticks_before() {
+        let mut view = View::default();
+        for number in 0..10 {
+            row(&mut view, 5000 * number, with_first(Reading::Value(20.0)));
+        }
+        assert_eq!(view.poll_timeout(), None, "no stream is known to be on");
+        let facts = Facts { stream: Some(Source::FieldValue), ..Facts::default() };
+        view.fold(Instant::from_millis(45_000), &Event::FactsChanged, &facts);
+        assert_eq!(view.poll_timeout(), Some(Instant::from_millis(60_000)));
+        assert!(!view.timeout(Instant::from_millis(59_999)));
+        assert!(view.timeout(Instant::from_millis(60_000)));
+        assert_eq!(view.poll_timeout(), None, "it cannot get later than late");
+        row(&mut view, 61_000, with_first(Reading::Value(20.0)));
+        assert!(!view.stream.late);
+    }
+}
