@@ -246,6 +246,42 @@ mod processes {
     }
 }
 
+/// Calls `changed` from a thread of its own whenever device files have come or gone, a moment after the last of them:
+/// an adapter brings several. Where the system does not tell, nothing is ever called.
+#[cfg(target_os = "linux")]
+pub fn watch(changed: impl Fn() + Send + 'static) -> std::io::Result<()> {
+    use rustix::fs::inotify::{self, CreateFlags, Reader, WatchFlags};
+    use std::mem::MaybeUninit;
+
+    let watch = inotify::init(CreateFlags::CLOEXEC)?;
+    inotify::add_watch(&watch, "/dev", WatchFlags::CREATE | WatchFlags::DELETE | WatchFlags::ATTRIB)?;
+    std::thread::Builder::new().name("ports".into()).spawn(move || {
+        let mut buffer = [MaybeUninit::uninit(); 4096];
+        let mut events = Reader::new(&watch, &mut buffer);
+        while let Ok(event) = events.next() {
+            // Other devices come and go all day long.
+            let is_serial = event.file_name().is_some_and(|name| name.to_bytes().starts_with(b"tty"));
+            if !is_serial {
+                continue;
+            }
+            // The rights are set, and the adapter's other ports come, a moment later.
+            std::thread::sleep(SETTLED);
+            changed();
+        }
+    })?;
+    Ok(())
+}
+
+/// The same on a system that does not tell.
+#[cfg(not(target_os = "linux"))]
+pub fn watch(_changed: impl Fn() + Send + 'static) -> std::io::Result<()> {
+    Ok(())
+}
+
+/// How long after a device file has come its rights are settled.
+#[cfg(target_os = "linux")]
+const SETTLED: std::time::Duration = std::time::Duration::from_millis(300);
+
 #[cfg(test)]
 mod tests {
     use super::*;

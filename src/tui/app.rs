@@ -159,6 +159,7 @@ impl App {
             Input::FileRead { path, text } => self.file_read(&path, text),
             Input::RecordingsListed(found) => {
                 self.recordings.listed(found);
+                self.connect.recorded(self.recordings.entries());
                 self.dirty = true;
             }
             Input::Playing(playing) => {

@@ -23,6 +23,7 @@ use crate::host;
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::{self, Connection, LinkError, LinkSpec};
+use crate::host::ports;
 use crate::host::recorder::{Plan, Recorder};
 use crate::host::replay::{Recording, RecordingError};
 use crate::host::signal::Signals;
@@ -87,6 +88,13 @@ pub fn run(world: World) -> io::Result<End> {
     });
     let (answer, answers) = channel();
     let (dialling, dialled) = channel();
+    let (found, waker) = (answer.clone(), sender.clone());
+    // Without a watch, R looks again.
+    let _ = ports::watch(move || {
+        if found.send(Input::PortsListed(files::ports())).is_ok() {
+            let _ = waker.try_send(host::Input::Wake);
+        }
+    });
     let mut console = Console {
         app,
         world,

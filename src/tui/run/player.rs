@@ -200,3 +200,114 @@ impl Player {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::endpoint::Secrecy;
+    use crate::record::{Cast, Header};
+
+    /// A recording with a byte in every second, `a` at second 0.
+    struct Shelf {
+        folder: tempfile::TempDir,
+    }
+
+    impl Shelf {
+        fn new() -> Self {
+            let shelf = Shelf { folder: tempfile::tempdir().expect("a folder") };
+            let header = Header { port: "u0".into(), settings: "115200 8N1".into(), part: 1, ..Header::default() };
+            let file = std::fs::File::create(shelf.path()).expect("a file");
+            let mut cast = Cast::begin(file, &header, Instant::ZERO).expect("begun");
+            for (second, byte) in (b'a'..=b'k').enumerate() {
+                let at = Instant::from_millis(1000 * second as u64);
+                cast.push(at, Direction::FromUnit, Secrecy::Open, &[byte]).expect("written");
+            }
+            shelf
+        }
+
+        fn path(&self) -> PathBuf {
+            self.folder.path().join("x.cast")
+        }
+
+        fn recording(&self) -> Recording {
+            Recording::open(&self.path()).expect("a recording")
+        }
+
+        fn player(&self) -> Player {
+            Player::begin("replay:x", self.path(), self.recording(), Instant::from_millis(500))
+        }
+    }
+
+    fn unreadable(error: RecordingError) -> Failure {
+        Failure { text: error.to_string(), hints: Vec::new() }
+    }
+
+    fn clock(millis: u64) -> Instant {
+        Instant::from_millis(millis)
+    }
+
+    /// Everything that is due by the clock, as the bytes heard; `.` for the end.
+    fn heard(player: &mut Player, clock: Instant) -> String {
+        let mut heard = String::new();
+        loop {
+            match player.step(clock, unreadable) {
+                Step::Nothing => return heard,
+                Step::To(moment) => player.set_now(moment),
+                Step::Piece(moment, Input::Bytes(bytes)) => {
+                    player.set_now(moment);
+                    heard.push_str(&String::from_utf8_lossy(&bytes));
+                }
+                Step::Piece(..) => heard.push('?'),
+                Step::Over(failure) => {
+                    assert_eq!(failure, None);
+                    heard.push('.');
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn all_at_once_then_back_and_on_at_a_pace() {
+        let shelf = Shelf::new();
+        let mut player = shelf.player();
+        assert_eq!(heard(&mut player, clock(0)), "abcdefghijk.");
+        let seconds = Duration::from_secs;
+        assert_eq!(player.playing(), Playing { position: seconds(10), length: Some(seconds(10)), pace: Pace::AtOnce });
+        assert_eq!(player.wake_at(clock(0)), None, "at its end nothing wakes anybody");
+
+        let seek = Playback::Seek(Duration::from_millis(3500));
+        assert!(player.is_behind(seek));
+        player.begin_again(shelf.recording());
+        player.steer(clock(100), seek);
+        assert_eq!(heard(&mut player, clock(100)), "abcd", "up to the place, and not further");
+        assert_eq!(player.playing().position, Duration::from_millis(3500));
+        assert_eq!((player.playing().pace, player.wake_at(clock(100))), (Pace::Paused, None));
+        assert_eq!(heard(&mut player, clock(60_000)), "", "a pause lasts as long as it lasts");
+
+        player.steer(clock(60_000), Playback::Pace(Pace::Times(2)));
+        assert_eq!(heard(&mut player, clock(60_250)), "e", "half a second of the recording");
+        assert_eq!(heard(&mut player, clock(61_250)), "fg");
+        assert!(player.wake_at(clock(61_250)).is_some_and(|at| at <= clock(61_450)), "the place is shown as it moves");
+        player.steer(clock(61_250), Playback::Pace(Pace::Paused));
+        assert_eq!(heard(&mut player, clock(99_000)), "");
+        let on = Playback::Seek(Duration::from_secs(8));
+        assert!(!player.is_behind(on));
+        player.steer(clock(99_000), on);
+        assert_eq!(heard(&mut player, clock(99_000)), "hi");
+        player.steer(clock(99_000), Playback::Pace(Pace::AtOnce));
+        assert_eq!(heard(&mut player, clock(99_000)), "jk.");
+    }
+
+    #[test]
+    fn the_consoles_time_never_runs_backward() {
+        let shelf = Shelf::new();
+        let mut player = shelf.player();
+        heard(&mut player, clock(0));
+        let before = player.now();
+        player.begin_again(shelf.recording());
+        player.steer(clock(0), Playback::Again(Pace::Times(1)));
+        assert_eq!(player.playing().position, Duration::ZERO);
+        assert!(player.now() >= before);
+        assert_eq!(heard(&mut player, clock(1_000)), "ab");
+    }
+}

@@ -5,10 +5,10 @@ use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::Scene;
+use super::{Scene, ScreenId};
 use crate::device::Product;
 use crate::tui::action::Action;
-use crate::tui::input::PortEntry;
+use crate::tui::input::{PortEntry, RecordingEntry};
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::popup::Question;
 use crate::tui::view::{LinkState, View};
@@ -42,6 +42,8 @@ pub const BINDINGS: &[Binding] = &[
 
 /// Rows below the list that explain the chosen entry.
 const DETAIL_ROWS: u16 = 6;
+/// Links used before that are shown at most.
+const MOST_RECENT: usize = 5;
 /// Columns of a port's name; a longer one keeps its end.
 const NAME_COLUMNS: usize = 22;
 
@@ -49,6 +51,10 @@ const NAME_COLUMNS: usize = 22;
 #[derive(Debug, Default)]
 pub struct Connect {
     ports: Ports,
+    /// Links that were used before, newest first.
+    recent: Vec<String>,
+    /// Recordings that are there.
+    recordings: usize,
     cursor: usize,
 }
 
@@ -65,7 +71,9 @@ enum Ports {
 enum Entry<'a> {
     Port(&'a PortEntry),
     Emulated(&'static Product),
+    Recent(&'a str),
     Other,
+    Recordings,
 }
 
 impl Connect {
@@ -78,11 +86,29 @@ impl Connect {
 
     /// The list has come.
     pub fn listed(&mut self, ports: Result<Vec<PortEntry>, String>) {
-        // The cursor stays on the entry it was on, wherever that is now.
         let was_listed = matches!(self.ports, Ports::Listed(_));
-        let chosen = self.link_of(self.cursor).filter(|_| was_listed || self.cursor > 0);
-        self.ports = ports.map_or_else(Ports::Failed, Ports::Listed);
-        let kept = chosen.and_then(|link| (0..self.entries().len()).find(|&n| self.link_of(n).as_ref() == Some(&link)));
+        let stays = was_listed || self.cursor > 0;
+        self.change(stays, |connect| connect.ports = ports.map_or_else(Ports::Failed, Ports::Listed));
+    }
+
+    /// The recordings have been listed, newest first: they tell what was connected before.
+    pub fn recorded(&mut self, recordings: &[RecordingEntry]) {
+        let mut recent: Vec<String> = Vec::new();
+        for entry in recordings {
+            if recent.len() < MOST_RECENT && !recent.contains(&entry.port) {
+                recent.push(entry.port.clone());
+            }
+        }
+        self.change(true, |connect| (connect.recent, connect.recordings) = (recent, recordings.len()));
+    }
+
+    /// Changes the list; the cursor stays on the entry it was on, wherever that is then.
+    fn change(&mut self, stays: bool, change: impl FnOnce(&mut Connect)) {
+        let name = |connect: &Connect, number: usize| connect.entries().get(number).map(Entry::name);
+        let chosen = name(self, self.cursor).filter(|_| stays);
+        change(self);
+        let kept =
+            chosen.and_then(|chosen| (0..self.entries().len()).find(|&n| name(self, n).as_ref() == Some(&chosen)));
         self.cursor = kept.unwrap_or(0);
     }
 
@@ -95,9 +121,10 @@ impl Connect {
             Cmd::First => self.cursor = 0,
             Cmd::Last => self.cursor = last,
             Cmd::Accept => {
-                return Some(match self.link_of(self.cursor) {
-                    Some(link) => Action::Open(link),
-                    None => Action::Ask(Question::link()),
+                return Some(match self.entries().get(self.cursor) {
+                    Some(Entry::Recordings) => Action::Go(ScreenId::Recordings),
+                    Some(Entry::Other) | None => Action::Ask(Question::link()),
+                    Some(entry) => Action::Open(entry.name()),
                 });
             }
             Cmd::Type => return Some(Action::Ask(Question::link())),
@@ -144,13 +171,15 @@ impl Connect {
             let section = match entry {
                 Entry::Port(_) => 0,
                 Entry::Emulated(_) => 1,
-                Entry::Other => 2,
+                Entry::Recent(_) => 2,
+                Entry::Other | Entry::Recordings => 3,
             };
             if section != heading {
                 heading = section;
                 rows.push(Line::default());
                 rows.push(match section {
                     1 => lines::rule(theme, columns, "Emulated units", "no hardware needed"),
+                    2 => lines::rule(theme, columns, "Used before", ""),
                     _ => lines::rule(theme, columns, "Other", ""),
                 });
             }
@@ -171,7 +200,9 @@ impl Connect {
         let heading = match entry {
             Entry::Port(port) => visible::text(&port.link),
             Entry::Emulated(product) => format!("Emulated {}", product.name),
+            Entry::Recent(name) => visible::text(name),
             Entry::Other => "Another port".into(),
+            Entry::Recordings => "Recordings".into(),
         };
         let mut shown = vec![Line::default(), lines::rule(theme, columns, &heading, "")];
         match entry {
@@ -203,10 +234,17 @@ impl Connect {
                 shown.push(text(format!("{}, hosted in this program on a real pseudo-terminal.", product.title)));
                 shown.push(text("Behaves as the manual says. Its password for loading software is AXIO-2010.".into()));
             }
+            Entry::Recent(_) => {
+                shown.push(text("Was connected before, as the recordings say.".into()));
+            }
+            Entry::Recordings => {
+                shown
+                    .push(text("Every connection is recorded. A recording shows on all screens what was then.".into()));
+            }
             Entry::Other => {
                 shown.push(text("/dev/ttyUSB0 or COM3      a serial port that is not listed".into()));
                 shown.push(text("/dev/pts/3 or a link      a pseudo-terminal, e.g. of axcon emulate or socat".into()));
-                shown.push(text("emu:axtc4co               an emulated unit in this program".into()));
+                shown.push(text("tcp://host:port, rfc2217://host:port  a serial port in the network".into()));
             }
         }
         shown
@@ -218,14 +256,25 @@ impl Connect {
             Ports::Listing | Ports::Failed(_) => &[],
         };
         let emulated = Product::all().iter().map(Entry::Emulated);
-        ports.iter().map(Entry::Port).chain(emulated).chain([Entry::Other]).collect()
+        let mut entries: Vec<Entry> = ports.iter().map(Entry::Port).chain(emulated).collect();
+        let listed: Vec<String> = entries.iter().map(Entry::name).collect();
+        let is_new = |name: &&String| !listed.iter().any(|known| known.eq_ignore_ascii_case(name));
+        entries.extend(self.recent.iter().filter(is_new).map(|name| Entry::Recent(name)));
+        entries.push(Entry::Other);
+        entries.extend((self.recordings > 0).then_some(Entry::Recordings));
+        entries
     }
+}
 
-    fn link_of(&self, number: usize) -> Option<String> {
-        match self.entries().get(number)? {
-            Entry::Port(port) => Some(port.link.clone()),
-            Entry::Emulated(product) => Some(emulated_link(product)),
-            Entry::Other => None,
+impl Entry<'_> {
+    /// What opens it, or what it is.
+    fn name(&self) -> String {
+        match self {
+            Entry::Port(port) => port.link.clone(),
+            Entry::Emulated(product) => emulated_link(product),
+            Entry::Recent(name) => (*name).to_owned(),
+            Entry::Other => "another port ...".into(),
+            Entry::Recordings => "recordings ...".into(),
         }
     }
 }
@@ -238,7 +287,9 @@ fn row(scene: Scene, entry: &Entry, is_chosen: bool, columns: usize) -> Line<'st
             (visible::text(&port.link), format!("{busy}{}", visible::text(&port.description)), Some(port.link.clone()))
         }
         Entry::Emulated(product) => (emulated_link(product), product.title.clone(), Some(emulated_link(product))),
-        Entry::Other => ("another port ...".into(), String::new(), None),
+        Entry::Recent(name) => (visible::text(name), String::new(), Some((*name).to_owned())),
+        Entry::Other => (entry.name(), "type its path, or an address in the network".into(), None),
+        Entry::Recordings => (entry.name(), "what was connected before, to look at again".into(), None),
     };
     let is_ours = link.is_some() && link == scene.view.link.name;
     let state = match &scene.view.link.state {
