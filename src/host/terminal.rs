@@ -25,7 +25,14 @@ use super::Input;
 pub struct Screen {
     /// For drawing.
     pub terminal: DefaultTerminal,
+    /// Whether clicks and the wheel come to us.
+    has_mouse: bool,
 }
+
+/// Buttons and the wheel, with places beyond column 223. Not the pointer's every move, as the library's own command
+/// asks for: nothing here needs those, and each would wake us.
+const MOUSE_ON: &str = "\x1b[?1000h\x1b[?1006h";
+const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1000l";
 
 /// Raw mode only, for the plain terminal. Gives the terminal back when dropped.
 #[derive(Debug)]
@@ -49,7 +56,21 @@ impl Screen {
         restore_on_panic();
         take_screen()?;
         let terminal = Terminal::new(CrosstermBackend::new(stdout())).inspect_err(|_| restore())?;
-        Ok(Screen { terminal })
+        Ok(Screen { terminal, has_mouse: false })
+    }
+
+    /// Says whether clicks and the wheel shall come to us, or be the terminal program's own: to select text.
+    ///
+    /// # Errors
+    /// If the terminal refuses.
+    pub fn set_mouse(&mut self, wanted: bool) -> io::Result<()> {
+        if self.has_mouse != wanted {
+            self.has_mouse = wanted;
+            let mut out = stdout();
+            out.write_all(if wanted { MOUSE_ON } else { MOUSE_OFF }.as_bytes())?;
+            out.flush()?;
+        }
+        Ok(())
     }
 
     /// Gives the terminal back, stops the process as Ctrl-Z does, and takes the terminal again when it is continued.
@@ -60,6 +81,7 @@ impl Screen {
     #[cfg(unix)]
     pub fn suspend(&mut self) -> io::Result<()> {
         restore();
+        self.has_mouse = false;
         rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::STOP)?;
         take_screen()?;
         // Not `clear`: that asks the terminal for the cursor, whose answer the key thread would take.
@@ -137,6 +159,7 @@ fn restore() {
     let taken = TAKEN.swap(NOTHING, Ordering::SeqCst);
     if taken == SCREEN {
         let mut out = stdout();
+        let _ = out.write_all(MOUSE_OFF.as_bytes());
         let _ = queue!(out, DisableBracketedPaste, LeaveAlternateScreen, Show);
         let _ = out.flush();
     }

@@ -6,7 +6,9 @@
 use std::path::{Path, PathBuf};
 
 use ratatui::Frame;
-use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind};
+use ratatui::crossterm::event::{
+    Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
+};
 use ratatui::layout::Rect;
 
 use super::action::Action;
@@ -295,8 +297,42 @@ impl App {
                 self.dirty = true;
                 self.size = (columns, rows);
             }
-            TerminalEvent::Key(_) | TerminalEvent::FocusGained | TerminalEvent::FocusLost | TerminalEvent::Mouse(_) => {
-            }
+            TerminalEvent::Mouse(mouse) => self.mouse(mouse, effects),
+            TerminalEvent::Key(_) | TerminalEvent::FocusGained | TerminalEvent::FocusLost => {}
+        }
+    }
+
+    /// Whether clicks and the wheel mean something here. On the terminal screen they are the terminal program's own, to
+    /// select and copy what the unit prints.
+    pub fn wants_mouse(&self) -> bool {
+        !self.passes_keys()
+    }
+
+    fn mouse(&mut self, mouse: MouseEvent, effects: &mut Vec<Effect>) {
+        let step = match mouse.kind {
+            MouseEventKind::ScrollUp => Some(KeyCode::Up),
+            MouseEventKind::ScrollDown => Some(KeyCode::Down),
+            _ => None,
+        };
+        if let Some(code) = step.filter(|_| self.popup.is_none()) {
+            self.dirty = true;
+            return self.key(KeyEvent::new(code, KeyModifiers::NONE), effects);
+        }
+        if mouse.kind != MouseEventKind::Down(MouseButton::Left) || self.popup.is_some() {
+            return;
+        }
+        let (columns, rows) = self.size;
+        let column = usize::from(mouse.column);
+        let front = self.help.is_none().then_some(self.front);
+        let cmd = match mouse.row {
+            1 => frame::tab_at(&self.view, front, usize::from(columns), column).map(Cmd::Go),
+            row if row + 2 == rows => frame::menu_at(column),
+            _ => None,
+        };
+        if let Some(cmd) = cmd {
+            self.dirty = true;
+            self.help = None;
+            self.on(cmd, effects);
         }
     }
 

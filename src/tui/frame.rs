@@ -4,7 +4,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::keymap::{Binding, EVERYWHERE, MENU};
+use super::keymap::{Binding, Cmd, EVERYWHERE, MENU};
 use super::screens::ScreenId;
 use super::screens::bench::emulated;
 use super::theme::Theme;
@@ -21,6 +21,8 @@ const ABOVE: u16 = 2;
 const BELOW: u16 = 3;
 /// What stands before the recording's name.
 const RECORDING: &str = "rec ";
+/// What stands before the unit's menu.
+const UNIT: &str = " Unit  ";
 /// What is being done takes no more than this.
 const ACTIVITY_COLUMNS: usize = 24;
 /// With fewer columns than this the recording's name says nothing.
@@ -86,21 +88,13 @@ pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
 /// The tabs; on the right what is being done, or else where the recording goes.
 pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) -> Line<'static> {
     let mut line = Line::raw(" ");
-    let all = |title: fn(ScreenId) -> &'static str| ScreenId::ALL.map(|id| format::width(title(id)) + 5).iter().sum();
-    let needed: usize = all(ScreenId::title);
-    let title = if needed + ACTIVITY_COLUMNS <= columns { ScreenId::title } else { ScreenId::short_title };
-    // Only an emulated unit has a bench.
-    let shown =
-        ScreenId::ALL.into_iter().filter(|&id| id != ScreenId::Bench || front == Some(id) || emulated(view).is_some());
-    for (number, screen) in (1..).zip(shown) {
-        let text = format!(" {number} {} ", title(screen));
+    for (screen, text) in tab_texts(view, front, columns) {
+        let (name, blank) = text.split_at(text.trim_end().len() + 1);
         line.push_span(match front == Some(screen) {
-            true => Span::styled(text, theme.bar()),
-            false => Span::raw(text),
+            true => Span::styled(name.to_owned(), theme.bar()),
+            false => Span::raw(name.to_owned()),
         });
-        if needed + ACTIVITY_COLUMNS <= columns {
-            line.push_span(Span::raw(" "));
-        }
+        line.push_span(Span::raw(blank.to_owned()));
     }
     if front.is_none() {
         line.push_span(Span::styled(" Help ", theme.bar()));
@@ -120,6 +114,38 @@ pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) 
     line.push_span(Span::raw(" ".repeat(room.saturating_sub(right.width()))));
     line.push_span(right);
     line
+}
+
+/// The tabs, each with the blanks around it.
+fn tab_texts(view: &View, front: Option<ScreenId>, columns: usize) -> Vec<(ScreenId, String)> {
+    let needed: usize = ScreenId::ALL.map(|id| format::width(id.title()) + 5).iter().sum();
+    let is_roomy = needed + ACTIVITY_COLUMNS <= columns;
+    // Only an emulated unit has a bench.
+    let has_place = |id: &ScreenId| *id != ScreenId::Bench || front == Some(*id) || emulated(view).is_some();
+    let text = |(number, id): (usize, ScreenId)| match is_roomy {
+        true => (id, format!(" {number} {}  ", id.title())),
+        false => (id, format!(" {number} {} ", id.short_title())),
+    };
+    (1..).zip(ScreenId::ALL.into_iter().filter(has_place)).map(text).collect()
+}
+
+/// The screen whose tab is at a column.
+pub fn tab_at(view: &View, front: Option<ScreenId>, columns: usize, column: usize) -> Option<ScreenId> {
+    let mut end = 1;
+    tab_texts(view, front, columns).into_iter().find_map(|(screen, text)| {
+        end += format::width(&text);
+        (1..end).contains(&column).then_some(screen)
+    })
+}
+
+/// The command that the unit's menu shows at a column.
+pub fn menu_at(column: usize) -> Option<Cmd> {
+    let mut end = format::width(UNIT);
+    MENU.iter().filter(|binding| !binding.short.is_empty()).find_map(|binding| {
+        let begin = end;
+        end += binding.keys.first().map_or(0, |press| format::width(&press.name())) + format::width(binding.short) + 3;
+        (begin..end).contains(&column).then_some(binding.cmd)
+    })
 }
 
 /// What is being done.
@@ -171,7 +197,7 @@ pub fn notice(view: &View, theme: Theme, columns: usize) -> Line<'static> {
 
 /// The unit's menu.
 pub fn menu(theme: Theme) -> Line<'static> {
-    let mut line = Line::from(Span::styled(" Unit  ", theme.quiet()));
+    let mut line = Line::from(Span::styled(UNIT, theme.quiet()));
     line.spans.extend(hints(theme, &[MENU]));
     line
 }

@@ -8,7 +8,9 @@ use std::path::PathBuf;
 use insta::assert_snapshot;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use ratatui::crossterm::event::{
+    Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
+};
 
 use super::{
     App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, Pace, Playback, Playing,
@@ -813,6 +815,34 @@ fn a_recording_is_steered_by_its_keys() {
     plays(&mut stage, 100, Pace::Paused);
     stage.keys(" ");
     assert_eq!(stage.asked(), [Effect::Play(Playback::Again(Pace::Times(1)))], "from the beginning");
+}
+
+#[test]
+fn a_click_is_the_key_it_stands_on_and_the_wheel_moves() {
+    for size in [SMALL, LARGE] {
+        let mut stage = Stage::with_dictionary(size);
+        let click = |stage: &mut Stage, kind, text: &str| {
+            let picture = stage.picture();
+            let (row, line) = picture.lines().enumerate().find(|(_, line)| line.contains(text)).expect(text);
+            let column = line.split(text).next().map_or(0, |before| before.chars().count()) as u16 + 1;
+            let mouse = MouseEvent { kind, column, row: row as u16, modifiers: KeyModifiers::NONE };
+            stage.input(Input::Terminal(TerminalEvent::Mouse(mouse)));
+        };
+        let left = MouseEventKind::Down(MouseButton::Left);
+        click(&mut stage, MouseEventKind::ScrollDown, "Object");
+        assert!(stage.shows("› "), "{}", stage.picture());
+        assert!(stage.shows("1001:00 Error Register"), "{}", stage.picture());
+        for (tab, shows) in
+            [("6 Stream", "The stream is off"), ("8 Rec", "Looking for recordings"), ("5 Dict", "Object")]
+        {
+            click(&mut stage, left, tab);
+            assert!(stage.shows(shows), "{}", stage.picture());
+        }
+        click(&mut stage, left, "T stream");
+        assert!(stage.shows("Switch the data stream on"), "{}", stage.picture());
+        click(&mut stage, left, "5 Dict");
+        assert!(stage.shows("Switch the data stream on"), "a question wants an answer first");
+    }
 }
 
 #[test]

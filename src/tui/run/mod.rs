@@ -165,6 +165,7 @@ impl Console {
             if self.app.is_dirty() && now >= next_frame {
                 screen.terminal.draw(|frame| self.app.draw(frame))?;
                 self.app.drawn();
+                screen.set_mouse(self.app.wants_mouse())?;
                 next_frame = now + FRAME;
             }
             // A flood of inputs must not keep a timer from expiring.
