@@ -124,14 +124,38 @@ fn every_link_in_the_documents_leads_somewhere() {
     assert!(dead.is_empty(), "dead links:\n{}", dead.join("\n"));
 }
 
+/// With this in the environment the pictures in the documents are replaced by those the program draws.
+const UPDATE: &str = "AXCON_UPDATE_DOCS";
+
 #[test]
-fn the_picture_in_the_readme_is_one_the_program_draws() {
+fn the_pictures_in_the_documents_are_those_the_program_draws() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = fs::read_to_string(root.join("README.md")).expect("a README");
-    let snapshot = root.join("src/tui/snapshots/axcon__tui__pictures__overview_streaming_small.snap");
-    let snapshot = fs::read_to_string(snapshot).expect("the picture");
-    let picture = snapshot.splitn(3, "---\n").nth(2).expect("a picture behind the header").trim_end();
-    assert!(readme.contains(picture), "the README shows another picture than the program draws:\n{picture}");
+    let mut shown = 0;
+    for (path, text) in files("docs", "md").into_iter().chain([("README.md".into(), read(&root.join("README.md")))]) {
+        let mut current = String::new();
+        let mut rest = text.as_str();
+        while let Some((before, behind)) = rest.split_once("<!-- picture: ") {
+            let (name, behind) = behind.split_once(" -->\n```text\n").expect("a name, then the picture");
+            let (_, behind) = behind.split_once("```").expect("the picture's end");
+            let snapshot = read(&root.join(format!("src/tui/snapshots/axcon__tui__pictures__{name}.snap")));
+            let picture = snapshot.splitn(3, "---\n").nth(2).expect("a picture behind the header").trim_end();
+            current.push_str(&format!("{before}<!-- picture: {name} -->\n```text\n{picture}\n```"));
+            rest = behind;
+            shown += 1;
+        }
+        current.push_str(rest);
+        if current != text && std::env::var_os(UPDATE).is_some() {
+            fs::write(root.join(&path), &current).expect("the document can be written");
+            continue;
+        }
+        let path = path.display();
+        assert!(current == text, "{path} shows other pictures than the program draws; {UPDATE}=1 replaces them");
+    }
+    assert!(shown >= 10, "pictures are looked for: {shown}");
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 /// All source files and tests with their text, by their paths from the repository's root.
