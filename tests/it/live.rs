@@ -165,3 +165,81 @@ fn a_cable_that_is_plugged_in_again_is_connected_by_itself() {
     let recording = fs::read_to_string(&recordings[0]).expect("a recording");
     assert!(recording.contains("\"m\",\"link lost\"") && recording.contains("\"m\",\"link back as"), "{recording}");
 }
+
+#[test]
+fn ctrl_z_gives_the_terminal_back_until_the_program_goes_on() {
+    let world = World::new();
+    let mut screen = console(&world, &[]);
+    screen.wait("application runs");
+    screen.keys("\x1a");
+    assert!(screen.is_given_back(), "{}", screen.text());
+    // The shell writes something of its own meanwhile.
+    screen.signal(rustix::process::Signal::CONT);
+    screen.wait("application runs");
+    assert!(!screen.is_as_the_shell_left_it());
+    screen.keys("q");
+    assert_eq!(screen.wait_end(), Some(0));
+    assert!(screen.is_given_back());
+}
+
+#[test]
+fn a_wire_broken_on_the_bench_is_an_open_circuit_in_the_stream() {
+    let world = World::new();
+    let screen = console(&world, &[]);
+    screen.wait("application runs");
+    screen.keys("t");
+    screen.wait("Switch the data stream on");
+    screen.keys("\x7f\x7f\x7f\x7f100\r");
+    screen.wait("every 100 ms");
+    screen.keys("9");
+    screen.wait("of this emulated AXTC4CO");
+    screen.keys("\x1b[B\x1b[B");
+    screen.wait("› 3");
+    screen.keys("\r451\r");
+    screen.wait("451.0 °C");
+    screen.keys("o");
+    let bench = screen.wait("open circuit");
+    assert!(bench.contains("broken") && bench.contains("open 3                        done"), "{bench}");
+    screen.keys("/warm it up\r");
+    screen.wait("refused: column 1");
+    // A click on a tab.
+    let column = bench.lines().nth(1).and_then(|tabs| tabs.find("6 Stream")).expect("a tab") + 2;
+    screen.keys(&format!("\x1b[<0;{column};2M\x1b[<0;{column};2m"));
+    let stream = screen.wait("Curve of CJ");
+    assert!(stream.contains("open circuit"), "{stream}");
+    screen.keys("e\x15rows.csv\r");
+    screen.wait("rows written to rows.csv");
+    screen.keys("e");
+    screen.wait("rows are in rows.csv");
+    let rows = fs::read_to_string(world.path("rows.csv")).expect("written");
+    assert!(rows.starts_with("time,source,CJ,TC1,TC2,TC3,TC4\n") && rows.contains(",open,"), "{rows}");
+    screen.keys("e\x15rows.csv\r");
+    screen.wait("is there already");
+    assert_eq!(fs::read_to_string(world.path("rows.csv")).expect("still there"), rows);
+}
+
+#[test]
+fn recordings_are_listed_and_played_from_any_place() {
+    let world = World::new();
+    let first = console(&world, &[]);
+    first.wait("application runs");
+    first.keys("q");
+    drop(first);
+    let mut screen = Screen::start(world.command(&[]), 24, 80);
+    screen.wait("recordings ...");
+    screen.keys("8");
+    screen.wait("1, newest first");
+    screen.keys("\r");
+    screen.wait("at its end");
+    screen.keys("\x1b[H");
+    let begun = screen.wait("paused");
+    assert!(begun.contains("0:00 of "), "{begun}");
+    screen.keys("2");
+    screen.wait("nothing heard yet");
+    screen.keys("8+++");
+    screen.wait("at its end");
+    screen.keys("2");
+    screen.wait("application runs");
+    screen.keys("q");
+    assert_eq!(screen.wait_end(), Some(0));
+}

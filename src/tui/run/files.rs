@@ -83,7 +83,7 @@ pub(super) fn recordings() -> Result<Vec<RecordingEntry>, String> {
 pub(super) fn create(path: &Path, bytes: &[u8]) -> Result<(), String> {
     let written = File::options().write(true).create_new(true).open(path).and_then(|mut file| file.write_all(bytes));
     written.map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => "a file of that name is there already; choose another name".to_owned(),
+        io::ErrorKind::AlreadyExists => "a file of that name is there already".to_owned(),
         _ => error.to_string(),
     })
 }

@@ -199,7 +199,7 @@ impl Bench {
             return lines::draw(frame, area, rows);
         };
         let mut rows = vec![lines::rule(theme, area.width, "Sensors", &format!("of this emulated {}", product.name))];
-        let heads = format!("    {:<8}{:<24}{:<16}{:>16}   {}", "Input", "Set to", "Wire", "The unit says", "State");
+        let heads = format!("    {:<8}{:<20}{:<10}{:>16}   {}", "Input", "Set to", "Wire", "The unit says", "State");
         rows.push(Line::styled(heads, theme.quiet()));
         rows.extend((0..usize::from(product.measurement.channels)).map(|place| self.row(scene, product, place)));
         rows.push(Line::default());
@@ -247,8 +247,8 @@ impl Bench {
         let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, place + 1);
         Line::from(vec![
             Span::styled(name, if is_chosen { theme.strong() } else { Style::new() }),
-            Span::raw(format!("{set:<24}")),
-            Span::styled(format!("{wire:<16}"), style),
+            Span::raw(format!("{set:<20}")),
+            Span::styled(format!("{wire:<10}"), style),
             Span::raw(format!("{says:>16}   {state}")),
         ])
     }

@@ -87,8 +87,11 @@ impl Screen {
     /// Whether the terminal edits lines and echoes, as a shell expects it.
     pub fn is_as_the_shell_left_it(&self) -> bool {
         let modes = tcgetattr(&self.slave).expect("settings").local_modes;
-        let alternate = self.picture.lock().expect("no panic").screen().alternate_screen();
-        modes.contains(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG) && !alternate
+        let parser = self.picture.lock().expect("no panic");
+        let screen = parser.screen();
+        let has_mouse = screen.mouse_protocol_mode() != vt100::MouseProtocolMode::None;
+        modes.contains(LocalModes::ICANON | LocalModes::ECHO | LocalModes::ISIG)
+            && !(screen.alternate_screen() || has_mouse || screen.bracketed_paste() || screen.hide_cursor())
     }
 
     /// Whether the terminal is given back in time: what the program said last may still be on its way to the picture.
