@@ -4,7 +4,9 @@
 A second opinion on the emulator: nothing here is shared with axcon, and the operating system does XON/XOFF, as in
 Tera Term or HyperTerminal. Needs pyserial.
 
-    upload_pyserial.py PORT FILE VERSION [--password TEXT] [--key-at-loader]
+    upload_pyserial.py PORT FILE VERSION [--password TEXT] [--key-at-loader] [--deaf] [--line-feeds]
+
+--deaf sends without flow control, --line-feeds ends lines with CR LF: the mistakes of real terminals.
 
 Exit code 0 if the unit starts with VERSION, 1 with a message if anything else happens.
 """
@@ -32,8 +34,8 @@ class Failed(Exception):
 
 
 class Unit:
-    def __init__(self, port):
-        self.port = serial.Serial(port, 115200, xonxoff=True, timeout=0.05, write_timeout=UPLOAD_WAIT, exclusive=True)
+    def __init__(self, port, deaf):
+        self.port = serial.Serial(port, 115200, xonxoff=not deaf, timeout=0.05, write_timeout=UPLOAD_WAIT, exclusive=True)
         self.heard = b""
 
     def wait(self, what, found, seconds):
@@ -62,7 +64,8 @@ def upload(arguments):
     if not lines or not all(line[:1] in (b"S", b"s") for line in lines):
         raise Failed(f"{arguments.file} is not an S-record file")
 
-    unit = Unit(arguments.port)
+    unit = Unit(arguments.port, arguments.deaf)
+    line_end = b"\r\n" if arguments.line_feeds else b"\r"
     unit.drain(0.3)
     unit.port.write(b"l")
     unit.wait("password prompt", lambda heard: PASSWORD_PROMPT.search(heard.rstrip()), PROMPT_WAIT)
@@ -75,12 +78,12 @@ def upload(arguments):
     begun = time.monotonic()
     count = sum(len(line) + 1 for line in lines)
     for line in lines:
-        unit.port.write(line + b"\r")
+        unit.port.write(line + line_end)
         # What the unit says meanwhile is kept: the banner may come while the last records are still in the driver.
         unit.heard += unit.port.read(unit.port.in_waiting)
     wanted = re.compile(rb"V?" + re.escape(arguments.version.lstrip("Vv").encode()) + rb"(?![0-9.])", re.IGNORECASE)
     banner = unit.wait(
-        f"banner with version {arguments.version}", lambda heard: wanted.search(heard), UPLOAD_WAIT + BANNER_WAIT
+        f"banner with version {arguments.version}", lambda heard: wanted.search(heard), arguments.patience
     )
     seconds = time.monotonic() - begun
     print(f"{len(lines)} records, {count} characters in {seconds:.1f} s; heard {banner[-200:]!r}")
@@ -93,6 +96,9 @@ def main():
     parser.add_argument("version", help="what the new banner has to say, e.g. 1.2.0")
     parser.add_argument("--password", default="AXIO-2010", help="what emulated units take, unless given")
     parser.add_argument("--key-at-loader", action="store_true", help="the loader wants a key before it listens")
+    parser.add_argument("--deaf", action="store_true", help="without flow control")
+    parser.add_argument("--line-feeds", action="store_true", help="CR LF behind each record")
+    parser.add_argument("--patience", type=float, default=UPLOAD_WAIT + BANNER_WAIT, help="seconds for the banner")
     arguments = parser.parse_args()
     try:
         upload(arguments)

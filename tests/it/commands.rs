@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use crate::support::flashed::assert_flash_holds;
 use crate::support::shell::{PATIENCE, Ran, Running, World};
 
 /// Without a wire's pace, so that the tests wait for the unit's flash only.
@@ -72,27 +73,6 @@ fn objects(text: &str) -> Vec<Value> {
 
 fn error_object(ran: &Ran) -> Value {
     json(ran.err.lines().last().unwrap_or_default())
-}
-
-/// What a file of S-records puts into flash, read by a program that shares nothing with ours.
-fn words_of(file: &Path) -> Vec<(usize, Vec<u8>)> {
-    let text = fs::read_to_string(file).expect("an image");
-    let mut words = Vec::new();
-    for line in text.lines().filter(|line| !line.is_empty()) {
-        if let srec::Record::S3(data) = line.parse().expect("a record") {
-            words.push((u32::from(data.address) as usize * 2, data.data));
-        }
-    }
-    words
-}
-
-fn assert_flash_holds(flash: &Path, image: &Path) {
-    let flash = fs::read(flash).expect("flash.bin");
-    let words = words_of(image);
-    assert!(!words.is_empty());
-    for (at, data) in words {
-        assert_eq!(flash[at..at + data.len()], data, "from byte {at:#x} on");
-    }
 }
 
 #[test]

@@ -16,6 +16,7 @@ mod image_corpus;
 mod image_files;
 mod images;
 #[cfg(unix)]
+mod lines;
 mod live;
 #[cfg(unix)]
 mod network;

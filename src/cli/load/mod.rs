@@ -403,7 +403,9 @@ pub fn next_step(report: &LoadReport) -> &'static str {
         (Verdict::UnitRefused, UnitNow::Application) => {
             "the unit runs as before: check the password (upper and lower case matter) and try again"
         }
-        (Verdict::NoAnswer, _) => "nothing has been changed",
+        (Verdict::NoAnswer, _) => {
+            "nothing has been changed: look at power, cable and port, then run the same command again"
+        }
         (_, UnitNow::Loader) if report.records == 0 => {
             "the unit waits in its loader, its old software intact: upload, or switch it off and on"
         }

@@ -1,6 +1,7 @@
 //! What several stories need.
 
 pub mod bench;
+pub mod flashed;
 #[cfg(unix)]
 pub mod puppet;
 #[cfg(unix)]

@@ -41,7 +41,13 @@ impl Server {
     /// A raw socket with this serial port behind it, at 115,200 baud.
     pub fn of_port(path: &Path) -> Self {
         let path = PathBuf::from(path);
-        Server::start(move |client| bridge(&path, client))
+        Server::start(move |client| bridge(&path, client, usize::MAX))
+    }
+
+    /// The same; it hangs up when so many bytes have come from its client.
+    pub fn of_port_for(path: &Path, bytes: usize) -> Self {
+        let path = PathBuf::from(path);
+        Server::start(move |client| bridge(&path, client, bytes))
     }
 
     /// The link to it.
@@ -61,8 +67,8 @@ impl Drop for Server {
     }
 }
 
-/// Carries bytes both ways until the client leaves or the port goes.
-fn bridge(path: &Path, mut client: TcpStream) {
+/// Carries bytes both ways until the client leaves, the port goes, or so many bytes have come from the client.
+fn bridge(path: &Path, mut client: TcpStream, most: usize) {
     let name = path.to_str().expect("UTF-8");
     let mut port = serialport::new(name, 115_200).timeout(Duration::from_millis(20)).open().expect("the port opens");
     let mut reader = port.try_clone().expect("a second handle");
@@ -83,10 +89,12 @@ fn bridge(path: &Path, mut client: TcpStream) {
         let _ = socket.shutdown(Shutdown::Both);
     });
     let mut buffer = [0; 4096];
-    loop {
+    let mut carried = 0;
+    while carried < most {
         match client.read(&mut buffer) {
             Ok(0) => break,
             Ok(count) => {
+                carried += count;
                 let mut left = &buffer[..count];
                 while !left.is_empty() {
                     match port.write(left) {
