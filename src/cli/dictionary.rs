@@ -29,7 +29,7 @@ enum Deed {
     /// It is read through the unit's V, which works in pre-operational state only; meanwhile the unit may halt scanning
     /// and CAN. The view is left in any case.
     Dump {
-        /// How it is written. JSON if --json is given.
+        /// How it is written. Otherwise FILE's ending says so (.json, .csv, .dcf), or --json.
         #[arg(long, value_enum)]
         format: Option<Format>,
         /// Write to FILE instead of standard output.
@@ -53,6 +53,18 @@ enum Format {
     Json,
     Csv,
     Dcf,
+}
+
+impl Format {
+    /// The format that a file's name promises.
+    fn of_file(file: &Path) -> Option<Self> {
+        match file.extension()?.to_str()?.to_lowercase().as_str() {
+            "json" => Some(Format::Json),
+            "csv" => Some(Format::Csv),
+            "dcf" => Some(Format::Dcf),
+            _ => None,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -83,7 +95,8 @@ const LARGEST_DUMP: u64 = 4 << 20;
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     match args.command {
         Deed::Dump { format, out } => {
-            let format = format.unwrap_or(if output.json { Format::Json } else { Format::Table });
+            let by_name = out.as_deref().and_then(Format::of_file);
+            let format = format.or(by_name).unwrap_or(if output.json { Format::Json } else { Format::Table });
             dump(format, out.as_deref(), global, output)
         }
         Deed::Diff { left, right } => diff(&left, &right, output),

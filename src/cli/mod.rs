@@ -12,6 +12,7 @@ pub mod identify;
 pub mod image;
 pub mod link;
 pub mod load;
+pub mod manual;
 pub mod output;
 pub mod password;
 pub mod playback;
@@ -23,7 +24,7 @@ pub mod terminal;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use error::CliError;
 use output::Output;
@@ -32,13 +33,37 @@ use output::Output;
 ///
 /// Without a command: the console on the screen.
 #[derive(Debug, Parser)]
-#[command(name = "axcon", version, propagate_version = true, max_term_width = 100)]
+#[command(
+    name = "axcon",
+    version,
+    long_version = LONG_VERSION,
+    propagate_version = true,
+    max_term_width = 100,
+    after_long_help = EXIT_CODES
+)]
 struct Cli {
     #[command(flatten)]
     global: Global,
     #[command(subcommand)]
     command: Option<Command>,
 }
+
+/// Version, commit where known, target and profile of the build.
+const LONG_VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\n", env!("AXCON_BUILD"));
+
+/// What the exit codes mean, for the long help and the man page.
+const EXIT_CODES: &str = "Exit codes:
+  0    done
+  1    failed otherwise
+  2    the command line makes no sense, or it destroys something and nobody said --yes
+  3    the port: none, several, missing, denied, busy, gone
+  4    no answer in time
+  5    the image is refused: it has defects, cannot be read, or is not for this unit
+  6    the unit refused, a wrong password above all
+  7    the upload failed and the unit waits in its loader: send again
+  8    the upload failed and nobody can say what the unit is now
+  9    the unit runs, but not what was sent
+  130  interrupted";
 
 /// What every command understands.
 #[derive(Debug, Clone, Args)]
@@ -96,6 +121,15 @@ enum Command {
     Emulate(emulate::Args),
     /// Work on S-record images without a unit.
     Image(image::Args),
+    /// Write completions for a shell.
+    Completions(manual::CompletionArgs),
+    /// Write man pages.
+    Man(manual::ManArgs),
+}
+
+/// The whole command line as clap knows it: what completions, man pages and the reference are made from.
+pub fn command() -> clap::Command {
+    Cli::command()
 }
 
 /// Runs the program and gives its exit code.
@@ -131,5 +165,7 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Eds(args)) => eds::run(args, output),
         Some(Command::Emulate(args)) => emulate::run(args, global, output),
         Some(Command::Image(args)) => image::run(args, global, output),
+        Some(Command::Completions(args)) => manual::completions(&args, output),
+        Some(Command::Man(args)) => manual::man(&args, output),
     }
 }

@@ -24,6 +24,7 @@ mod network;
 mod ptys;
 #[cfg(unix)]
 mod recordings;
+mod reference;
 mod stranger;
 mod support;
 mod swarm;

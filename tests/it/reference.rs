@@ -1,0 +1,146 @@
+//! `docs/cli.md` is what the command line says of itself, and the examples in the documents are commands that work.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use clap::builder::StyledStr;
+use clap::{Arg, ArgAction, Command};
+
+use crate::support::shell::World;
+
+/// With this in the environment the reference is written anew.
+const UPDATE: &str = "AXCON_UPDATE_DOCS";
+
+#[test]
+fn the_reference_is_what_the_command_line_says_of_itself() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/cli.md");
+    let mut command = axcon::cli::command();
+    command.build();
+    let mut reference = String::from(
+        "# Commands\n\nMade from the command line itself: `AXCON_UPDATE_DOCS=1 cargo test --test it the_reference` writes \
+         this anew.\nThe options of every command stand under `axcon`.\n",
+    );
+    describe(&command, &mut reference);
+    if std::env::var_os(UPDATE).is_some() {
+        fs::write(&path, &reference).expect("written");
+    }
+    let current = fs::read_to_string(&path).unwrap_or_default();
+    assert!(current == reference, "docs/cli.md is not what the command line says; {UPDATE}=1 writes it anew");
+}
+
+fn describe(command: &Command, out: &mut String) {
+    let name = command.get_bin_name().unwrap_or_else(|| command.get_name()).to_owned();
+    let is_root = !name.contains(' ');
+    let text = |text: Option<&StyledStr>| text.map(ToString::to_string).unwrap_or_default();
+    let about = command.get_long_about().or_else(|| command.get_about());
+    write!(out, "\n## {name}\n\n{}\n", text(about).trim()).expect("a string");
+    let usage = command.clone().render_usage().to_string();
+    write!(out, "\n```text\n{}\n```\n", usage.trim_start_matches("Usage: ").trim()).expect("a string");
+    let described = |arg: &&Arg| {
+        !arg.is_hide_set() && (is_root || !arg.is_global_set()) && !["help", "version"].contains(&arg.get_id().as_str())
+    };
+    let rows: Vec<String> = command.get_arguments().filter(described).map(row).collect();
+    if !rows.is_empty() {
+        write!(out, "\n| argument | means |\n|---|---|\n{}\n", rows.join("\n")).expect("a string");
+    }
+    if let Some(after) = command.get_after_long_help().filter(|_| is_root) {
+        write!(out, "\n```text\n{after}\n```\n").expect("a string");
+    }
+    for inner in command.get_subcommands().filter(|inner| inner.get_name() != "help") {
+        describe(inner, out);
+    }
+}
+
+fn row(arg: &Arg) -> String {
+    let takes_value =
+        !matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::Count | ArgAction::Help | ArgAction::Version);
+    let names = arg.get_value_names().map(|names| names.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "));
+    let value = names.filter(|_| takes_value).unwrap_or_default();
+    let short = arg.get_short().map(|short| format!("-{short}, ")).unwrap_or_default();
+    let shown = match arg.get_long() {
+        Some(long) => format!("{short}--{long} {value}"),
+        None => format!("[{value}]"),
+    };
+    let help = arg.get_long_help().or_else(|| arg.get_help()).map(ToString::to_string).unwrap_or_default();
+    let mut means = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    if !means.ends_with('.') {
+        means.push('.');
+    }
+    let choices: Vec<String> = arg
+        .get_possible_values()
+        .iter()
+        .filter(|_| takes_value)
+        .map(|value| format!("`{}`", value.get_name()))
+        .collect();
+    if !choices.is_empty() {
+        write!(means, " One of {}.", choices.join(", ")).expect("a string");
+    }
+    let defaults: Vec<String> =
+        arg.get_default_values().iter().map(|value| value.to_string_lossy().into_owned()).collect();
+    if takes_value && !defaults.is_empty() {
+        write!(means, " Default: `{}`.", defaults.join(" ")).expect("a string");
+    }
+    if let Some(variable) = arg.get_env() {
+        write!(means, " Environment: `{}`.", variable.to_string_lossy()).expect("a string");
+    }
+    format!("| `{}` | {} |", shown.trim(), means.replace('|', "\\|"))
+}
+
+#[test]
+fn completions_and_man_pages_name_every_command() {
+    let world = World::new();
+    let names: Vec<String> =
+        axcon::cli::command().get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    assert!(names.len() > 10);
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let ran = world.run(&["completions", shell], b"");
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        assert!(names.iter().all(|name| ran.out.contains(name.as_str())), "{shell}: {}", ran.out);
+    }
+    assert_eq!(world.run(&["man", "--out", "pages"], b"").code, Some(0));
+    for name in &names {
+        assert!(world.path(&format!("pages/axcon-{name}.1")).exists(), "{name}");
+    }
+    let page = world.run(&["man"], b"");
+    assert!(page.out.contains(".TH axcon 1") && page.out.contains("waits in its loader"), "{}", page.out);
+    fs::write(world.path("file"), "").expect("written");
+    let ran = world.run(&["man", "--out", "file"], b"");
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("cannot write man pages to 'file'"), "{}", ran.err);
+}
+
+#[test]
+fn the_version_says_what_was_built() {
+    let world = World::new();
+    assert_eq!(world.run(&["-V"], b"").out, format!("axcon {}\n", env!("CARGO_PKG_VERSION")));
+    let long = world.run(&["--version"], b"").out;
+    assert!(long.starts_with(&format!("axcon {}\n", env!("CARGO_PKG_VERSION"))) && long.lines().count() == 2, "{long}");
+    assert!(long.contains("debug") || long.contains("release"), "{long}");
+}
+
+#[test]
+fn the_everyday_commands_of_the_readme_work_as_printed() {
+    let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("a README");
+    let tasks =
+        readme.split("## Everyday tasks").nth(1).and_then(|text| text.split("\n## ").next()).expect("the tasks");
+    let cells = tasks.lines().filter_map(|line| line.split('|').nth(3));
+    let commands: Vec<&str> =
+        cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).filter(|text| text.starts_with("axcon ")).collect();
+    assert!(commands.len() >= 7, "{commands:?}");
+    let world = World::new();
+    let unit = world.start(&["emulate", "axtc4co", "--link", "u0", "--line-rate", "off"]);
+    unit.wait_out("serial: ");
+    for command in commands.into_iter().filter(|command| !command.contains("IMAGE")) {
+        let mut args: Vec<&str> = command.split(' ').skip(1).collect();
+        if args[0] == "stream" && !args.contains(&"--count") {
+            args.extend(["--count", "3"]);
+        }
+        if args[..2] != ["dictionary", "diff"] {
+            args.extend(["--port", "u0", "--baud", "3000000"]);
+        }
+        let ran = world.run(&args, b"");
+        assert_eq!(ran.code, Some(0), "{command}\n{}\n{}", ran.out, ran.err);
+    }
+    assert!(world.path("values.csv").exists());
+}
