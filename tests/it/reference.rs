@@ -136,7 +136,7 @@ fn the_everyday_commands_of_the_readme_work_as_printed() {
         if args[0] == "stream" && !args.contains(&"--count") {
             args.extend(["--count", "3"]);
         }
-        if args[..2] != ["dictionary", "diff"] {
+        if !args.starts_with(&["dictionary", "diff"]) {
             args.extend(["--port", "u0", "--baud", "3000000"]);
         }
         let ran = world.run(&args, b"");
