@@ -1,7 +1,7 @@
 //! A unit's object dictionary with what it means: names, units, the factory's values, what differs.
 //!
 //! A session reads what the unit shows ([`DictionaryReading`]); here it is set beside what the product's manual says.
-//! [`difference`] compares two of them, [`text`] writes them for people and spreadsheets, and JSON is what is read again.
+//! [`differences`] compares two of them; they are written for people and spreadsheets, and read again as JSON.
 
 mod difference;
 mod text;
