@@ -6,6 +6,7 @@
 mod complaint;
 pub mod dictionary;
 pub mod eds;
+pub mod emergency;
 mod loader;
 pub mod schema;
 

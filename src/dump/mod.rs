@@ -14,10 +14,13 @@ pub use difference::{Difference, differences};
 
 use crate::canopen::{DataType, ObjectAddress, Value};
 use crate::device::dictionary::{Access, Entry, Object};
+use crate::device::emergency::Emergency;
 use crate::device::{Product, eds};
 use crate::session::{DictionaryReading, Facts};
 use crate::wire::visible;
 
+/// The list of active errors (CiA 301).
+const ERROR_FIELD: u16 = 0x1003;
 /// What a dump says it is.
 const SCHEMA: &str = "axcon.dictionary/1";
 
@@ -112,7 +115,7 @@ impl Dump {
                 default: default.and_then(number),
                 deviates: entry.is_some_and(|entry| deviates(read.at, entry, read.value, default)),
                 unit: entry.and_then(|entry| entry.unit.clone()),
-                meaning: entry.zip(read.value).and_then(|(entry, value)| entry.meaning(value)).map(str::to_owned),
+                meaning: entry.zip(read.value).and_then(|(entry, value)| meaning(product?, read.at, entry, value)),
                 bits: entry.is_some_and(is_bits),
             }
         });
@@ -180,6 +183,15 @@ impl Dump {
         serde_json::to_string(self).unwrap_or_default() + "\n"
     }
 
+    /// The errors in the unit's list 1003h, the newest first, in words.
+    pub fn errors(&self) -> impl Iterator<Item = &str> {
+        let listed = |entry: &&DumpEntry| {
+            entry.at().is_some_and(|at| at.index == ERROR_FIELD && at.sub > 0)
+                && entry.value.as_ref().and_then(serde_json::Number::as_u64).is_some_and(|bits| bits != 0)
+        };
+        self.entries.iter().filter(listed).map(|entry| entry.meaning.as_deref().unwrap_or(&entry.text))
+    }
+
     /// How many parameters are not what the factory made them.
     pub fn deviations(&self) -> usize {
         self.entries.iter().filter(|entry| entry.deviates).count()
@@ -227,6 +239,15 @@ pub fn shown(entry: &Entry, value: Value) -> String {
     match value.as_integer() {
         Some(bits) if is_bits(entry) => format!("0x{bits:08X}"),
         _ => value.to_string(),
+    }
+}
+
+/// What a value stands for; an error of the list 1003h in words.
+fn meaning(product: &Product, at: ObjectAddress, entry: &Entry, value: Value) -> Option<String> {
+    let error = value.as_integer().and_then(|bits| u32::try_from(bits).ok()).filter(|&bits| bits != 0);
+    match (at.index, at.sub, error) {
+        (ERROR_FIELD, 1.., Some(bits)) => Some(Emergency::from(bits).words(product)),
+        _ => entry.meaning(value).map(str::to_owned),
     }
 }
 

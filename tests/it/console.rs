@@ -292,6 +292,19 @@ fn a_period_the_line_cannot_carry_is_named_before_it_is_set() {
 }
 
 #[test]
+fn the_units_list_of_errors_is_told_in_words() {
+    let mut desk = Desk::new();
+    let now = desk.now;
+    desk.unit.unit_mut().turn(now, Knob::Open(2, None)).expect("TC2");
+    desk.run(Duration::from_secs(5)).keys("v").press(KeyCode::Enter);
+    desk.wait_for("not as factory");
+    desk.keys("/1003:01").press(KeyCode::Enter);
+    assert!(desk.picture().contains("0x0202F001: TC2: open circuit"), "{}", desk.picture());
+    desk.keys("2");
+    assert!(desk.picture().contains("TC2: open circuit  in the unit's list of errors (1003h)"), "{}", desk.picture());
+}
+
+#[test]
 fn diagnostics_stand_beside_their_numbers_until_s_stops_them() {
     let mut desk = Desk::new();
     desk.keys("s");

@@ -293,7 +293,8 @@ fn faults(scene: Scene, area: Rect) -> Vec<Line<'static>> {
     let lasting = all.iter().filter(|fault| fault.until.is_none()).count();
     let remark = if all.is_empty() { String::new() } else { format!("{lasting} now, {} since connecting", all.len()) };
     let mut shown = vec![lines::rule(theme, area.width, "Faults", &remark)];
-    if all.is_empty() {
+    let listed = listed(scene);
+    if all.is_empty() && listed.is_empty() {
         let word = if scene.view.stream.rows > 0 {
             "None seen."
         } else {
@@ -305,14 +306,34 @@ fn faults(scene: Scene, area: Rect) -> Vec<Line<'static>> {
     // Lasting faults first: they are the ones to work on.
     let lasting = all.iter().filter(|fault| fault.until.is_none());
     let ended = all.iter().filter(|fault| fault.until.is_some());
+    let mut rows: Vec<Line> = lasting.map(|fault| fault_row(scene, fault)).collect();
+    rows.extend(listed);
+    rows.extend(ended.map(|fault| fault_row(scene, fault)));
     let room = usize::from(area.height.saturating_sub(1));
-    let hidden = all.len().saturating_sub(room);
-    let fitting = if hidden > 0 { room.saturating_sub(1) } else { room };
-    shown.extend(lasting.chain(ended).take(fitting).map(|fault| fault_row(scene, fault)));
+    let hidden = rows.len().saturating_sub(room);
     if hidden > 0 {
-        shown.push(Line::styled(format!("  and {} more", all.len() - fitting), theme.quiet()));
+        let fitting = room.saturating_sub(1);
+        let more = format!("  and {} more", rows.len() - fitting);
+        rows.truncate(fitting);
+        rows.push(Line::styled(more, theme.quiet()));
     }
+    shown.extend(rows);
     shown
+}
+
+/// The errors in the unit's own list, as it was when the dictionary was read.
+fn listed(scene: Scene) -> Vec<Line<'static>> {
+    let theme = scene.theme;
+    let Some(read) = &scene.view.dictionary else { return Vec::new() };
+    let time = format::time_of_day(scene.start_of_day, read.at);
+    let row = |words: &str| {
+        Line::from(vec![
+            Span::raw("    "),
+            Span::styled(visible::text(words), theme.bad()),
+            Span::styled(format!("  in the unit's list of errors (1003h), read {time}"), theme.quiet()),
+        ])
+    };
+    read.dump.errors().map(row).collect()
 }
 
 fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
