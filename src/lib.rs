@@ -32,6 +32,8 @@ pub mod session;
 
 pub mod dump;
 
+pub mod monitor;
+
 pub mod emulator;
 
 pub mod host;

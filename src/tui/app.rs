@@ -27,12 +27,12 @@ use super::screens::recordings::Recordings;
 use super::screens::stream::Stream;
 use super::screens::terminal::{Meaning, Terminal};
 use super::screens::{Scene, ScreenId};
-use super::scrollback::Scrollback;
 use super::theme::Theme;
 use super::view::{Export, Link, LinkState, Tone, View};
 use super::widgets::{format, lines};
 use crate::dump::{self, Dump};
 use crate::endpoint::Endpoint;
+use crate::monitor::Scrollback;
 use crate::record::Record;
 use crate::session::{Command, Event, Facts, Job, LoadOrder, Outcome, Session, UnitNow};
 use crate::time::{Duration, Instant};
@@ -452,13 +452,13 @@ impl App {
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         let action = match self.front {
             ScreenId::Connect => self.connect.on(cmd, &self.view),
-            ScreenId::Overview => self.overview.on(cmd, self.view.stream.channels.len()),
+            ScreenId::Overview => self.overview.on(cmd, self.view.monitor.stream.channels.len()),
             ScreenId::Terminal => self.terminal.on(cmd, &self.scrollback, record, page),
             ScreenId::Load => self.load.on(cmd, &self.view, page),
             ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
             ScreenId::Stream => self.stream.on(cmd, &self.view),
             ScreenId::Diagnostics => {
-                let found = &self.view.diagnostics;
+                let found = &self.view.monitor.diagnostics;
                 self.diagnostics.on(cmd, found.lines.len().max(found.found.len()), page)
             }
             ScreenId::Recordings => self.recordings.on(cmd, &self.view),
@@ -707,14 +707,14 @@ impl App {
 
     fn mark(&mut self, effects: &mut Vec<Effect>) {
         self.view.mark(self.now);
-        let text = format!("mark {}", self.view.stream.marks.len());
+        let text = format!("mark {}", self.view.monitor.stream.marks.len());
         self.scrollback.note(self.now, text.clone());
         self.view.tell(Tone::Quiet, format!("{text} is set, in the chart and in the recording."));
         effects.push(Effect::Mark(text));
     }
 
     fn export_stream(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
-        let (stream, start) = (&self.view.stream, self.view.link.start_millis);
+        let (stream, start) = (&self.view.monitor.stream, self.view.link.start_millis);
         let channels: Vec<String> = stream.channels.iter().map(|channel| channel.name.clone()).collect();
         if channels.is_empty() {
             return self.view.tell(Tone::Bad, "There are no rows yet: T switches the stream on.");
@@ -726,13 +726,13 @@ impl App {
             rows += 1;
         }
         effects.push(Effect::CreateFile { path: path.clone(), bytes: text.into_bytes() });
-        self.view.stream.export = Some(Export { path, rows, channels });
+        self.view.export = Some(Export { path, rows, channels });
     }
 
     /// A row for the file that rows are written to.
     fn export_row(&mut self, at: Instant, row: &Row, effects: &mut Vec<Effect>) {
         let start = self.view.link.start_millis;
-        let Some(export) = &mut self.view.stream.export else { return };
+        let Some(export) = &mut self.view.export else { return };
         if export.channels.len() != row.readings.len() {
             return self.end_export(Some("the stream has other channels now"));
         }
@@ -746,7 +746,7 @@ impl App {
     }
 
     fn end_export(&mut self, why: Option<&str>) {
-        let Some(export) = self.view.stream.export.take() else { return };
+        let Some(export) = self.view.export.take() else { return };
         let path = export.path.display();
         let text = match why {
             None => format!("{} rows are in {path}.", format::grouped(export.rows)),
@@ -776,13 +776,13 @@ impl App {
     fn file_written(&mut self, path: &Path, result: Result<(), String>) {
         self.dirty = true;
         let shown = path.display();
-        let is_export = self.view.stream.export.as_ref().is_some_and(|export| export.path == path);
+        let is_export = self.view.export.as_ref().is_some_and(|export| export.path == path);
         match result {
             Ok(()) if is_export => {}
             Ok(()) => self.view.tell(Tone::Good, format!("{shown} is written.")),
             Err(why) => {
                 if is_export {
-                    self.view.stream.export = None;
+                    self.view.export = None;
                 }
                 self.view.tell(Tone::Bad, format!("{shown} is not written: {why}."));
             }

@@ -19,17 +19,22 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("device", &["canopen", "image", "time", "version", "wire"]),
     ("session", &["canopen", "device", "endpoint", "image", "record", "secret", "time", "version", "wire"]),
     ("dump", &["canopen", "device", "session", "wire"]),
+    ("monitor", &["device", "endpoint", "record", "session", "time", "wire"]),
+    ("report", &["device", "dump", "monitor", "session", "time", "wire"]),
     ("emulator", &["canopen", "device", "endpoint", "image", "rng", "time", "version", "wire"]),
     ("host", &["canopen", "device", "emulator", "endpoint", "image", "record", "rng", "telnet", "time", "version"]),
     (
         "tui",
-        &["canopen", "device", "dump", "endpoint", "image", "record", "secret", "session", "time", "version", "wire"],
+        &[
+            "canopen", "device", "dump", "endpoint", "image", "monitor", "record", "secret", "session", "time",
+            "version", "wire",
+        ],
     ),
     (
         "cli",
         &[
-            "canopen", "device", "dump", "emulator", "endpoint", "host", "image", "record", "secret", "session",
-            "telnet", "time", "tui", "version", "wire",
+            "canopen", "device", "dump", "emulator", "endpoint", "host", "image", "monitor", "record", "report",
+            "secret", "session", "telnet", "time", "tui", "version", "wire",
         ],
     ),
 ];

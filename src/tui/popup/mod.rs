@@ -182,7 +182,7 @@ impl Question {
     pub fn file(purpose: Purpose, view: &View) -> Question {
         let typed = match purpose {
             Purpose::Image | Purpose::Compare => TextField::default(),
-            Purpose::ExportStream => TextField::new(suggested(view, "stream", view.stream.newest, "csv")),
+            Purpose::ExportStream => TextField::new(suggested(view, "stream", view.monitor.stream.newest, "csv")),
             Purpose::ExportDictionary => {
                 let at = view.dictionary.as_ref().map(|read| read.at);
                 TextField::new(suggested(view, "dictionary", at, "json"))

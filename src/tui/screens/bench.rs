@@ -233,7 +233,7 @@ impl Bench {
         let says = channel.and_then(|channel| channel.reading.value()).map_or_else(
             || "-".to_owned(),
             |value| {
-                let source = scene.view.stream.source.unwrap_or(Source::FieldValue);
+                let source = scene.view.monitor.stream.source.unwrap_or(Source::FieldValue);
                 format!("{value:.*}", super::overview::decimals(scene.view, source))
             },
         );
@@ -255,14 +255,14 @@ impl Bench {
 }
 
 /// The stream's channel of an input: a unit may send its cold junction in front.
-fn channel_of<'a>(view: &'a View, product: &Product, place: usize) -> Option<&'a crate::tui::view::Channel> {
-    let channels = &view.stream.channels;
+fn channel_of<'a>(view: &'a View, product: &Product, place: usize) -> Option<&'a crate::monitor::Channel> {
+    let channels = &view.monitor.stream.channels;
     let in_front = channels.len().checked_sub(usize::from(product.measurement.channels))?;
     channels.get(in_front + place)
 }
 
 fn streamed(view: &View, product: &Product, place: usize) -> Option<f64> {
-    let is_temperature = view.stream.source == Some(Source::FieldValue);
+    let is_temperature = view.monitor.stream.source == Some(Source::FieldValue);
     channel_of(view, product, place).filter(|_| is_temperature)?.reading.value()
 }
 

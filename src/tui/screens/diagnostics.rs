@@ -6,10 +6,10 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::Scene;
+use crate::monitor::Tracked;
 use crate::session::Job;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::view::Tracked;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
@@ -60,7 +60,7 @@ impl Diagnostics {
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let (theme, view) = (scene.theme, scene.view);
-        let diagnostics = &view.diagnostics;
+        let diagnostics = &view.monitor.diagnostics;
         let runs = view.job == Some(Job::Diagnostics);
         let Some(at) = diagnostics.at else {
             let mut rows = vec![lines::rule(theme, area.width, "Diagnostics", "")];
@@ -98,7 +98,7 @@ impl Diagnostics {
 
     /// The numbers on the page: with what they have been where there is room, else in two columns.
     fn draw_found(&self, scene: Scene, area: Rect, frame: &mut Frame) {
-        let (theme, found) = (scene.theme, &scene.view.diagnostics.found);
+        let (theme, found) = (scene.theme, &scene.view.monitor.diagnostics.found);
         let (heading, body) = lines::split(area, 1);
         let is_wide = area.width >= BESIDE / 2 && area.height > LEAST_FOUND_ROWS * 2;
         lines::draw(frame, heading, [lines::rule(theme, area.width, "Numbers on it", "")]);

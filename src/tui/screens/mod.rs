@@ -14,9 +14,9 @@ pub mod stream;
 pub mod terminal;
 
 use super::keymap::Binding;
-use super::scrollback::Scrollback;
 use super::theme::Theme;
 use super::view::View;
+use crate::monitor::Scrollback;
 use crate::record::Record;
 use crate::time::{Duration, Instant};
 

@@ -6,11 +6,12 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::{Scene, terminal};
+use crate::monitor::{Channel, Fault, FaultKind};
 use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::view::{Channel, Fault, FaultKind, View};
+use crate::tui::view::View;
 use crate::tui::visible;
 use crate::tui::widgets::chart::{self, Curve};
 use crate::tui::widgets::spark::sparkline;
@@ -80,7 +81,7 @@ impl Overview {
         let values = self.values(scene, area.width);
         let (middle, rest) = lines::split(rest, values.len() as u16);
         lines::draw(frame, middle, values);
-        let chart_rows = match scene.view.stream.channels.get(self.cursor) {
+        let chart_rows = match scene.view.monitor.stream.channels.get(self.cursor) {
             Some(channel) if area.height >= CHART_ROWS => {
                 let rows = rest.height * 3 / 5;
                 let (chart, _) = lines::split(rest, rows);
@@ -94,7 +95,7 @@ impl Overview {
     }
 
     fn values(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
-        let (theme, stream) = (scene.theme, &scene.view.stream);
+        let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
         let is_on = scene.view.facts.stream.is_some();
         let newest = stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
         let Some(source) = stream.source else {
@@ -146,7 +147,7 @@ pub fn decimals(view: &View, source: Source) -> usize {
 fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     let (theme, facts) = (scene.theme, &scene.view.facts);
     let title = scene.view.product().map(|product| product.title.clone()).unwrap_or_default();
-    let stream = match (facts.stream, scene.view.stream.period) {
+    let stream = match (facts.stream, scene.view.monitor.stream.period) {
         (None, _) => "off".to_owned(),
         (Some(source), period) => {
             let source = match source {
@@ -197,11 +198,12 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
 /// What the unit's diagnostics say beside the channels: supply, cold junction, active errors.
 fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
     let view = scene.view;
-    let at = view.diagnostics.at?;
-    let of_channel = |label: &str| view.stream.channels.iter().any(|channel| label.starts_with(channel.name.as_str()));
+    let at = view.monitor.diagnostics.at?;
+    let of_channel =
+        |label: &str| view.monitor.stream.channels.iter().any(|channel| label.starts_with(channel.name.as_str()));
     let known = view.product().map(|product| product.stream.channels.as_slice()).unwrap_or_default();
     let said =
-        view.diagnostics.found.iter().filter(|found| {
+        view.monitor.diagnostics.found.iter().filter(|found| {
             !of_channel(&found.label) && !known.iter().any(|name| found.label.starts_with(name.as_str()))
         });
     let said = said.filter_map(|found| {
@@ -275,7 +277,7 @@ fn value_row(
     let newest = channel.history.len().saturating_sub(room);
     let values: Vec<_> = channel.history.range(newest..).map(|&(_, reading)| reading.value()).collect();
     let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, channel.name);
-    let is_old = scene.view.stream.late || scene.view.facts.stream.is_none();
+    let is_old = scene.view.monitor.stream.late || scene.view.facts.stream.is_none();
     let value_style = if is_old { theme.quiet() } else { theme.strong() };
     Line::from(vec![
         Span::styled(name, if is_chosen { theme.strong() } else { ratatui::style::Style::new() }),
@@ -289,13 +291,13 @@ fn value_row(
 
 fn faults(scene: Scene, area: Rect) -> Vec<Line<'static>> {
     let theme = scene.theme;
-    let all = &scene.view.faults;
+    let all = &scene.view.monitor.faults;
     let lasting = all.iter().filter(|fault| fault.until.is_none()).count();
     let remark = if all.is_empty() { String::new() } else { format!("{lasting} now, {} since connecting", all.len()) };
     let mut shown = vec![lines::rule(theme, area.width, "Faults", &remark)];
     let listed = listed(scene);
     if all.is_empty() && listed.is_empty() {
-        let word = if scene.view.stream.rows > 0 {
+        let word = if scene.view.monitor.stream.rows > 0 {
             "None seen."
         } else {
             "None known: open and short circuits show in the stream."

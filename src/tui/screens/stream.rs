@@ -7,12 +7,13 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::Scene;
+use crate::monitor::{Channel, Stream as Values};
 use crate::time::{Duration, Instant};
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::popup::{Purpose, Question};
 use crate::tui::theme::Theme;
-use crate::tui::view::{Channel, Stream as Values, View};
+use crate::tui::view::View;
 use crate::tui::visible;
 use crate::tui::widgets::chart::{self, Curve};
 use crate::tui::widgets::spark::sparkline;
@@ -106,7 +107,7 @@ impl Stream {
 
     /// What a command does here.
     pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
-        let values = &view.stream;
+        let values = &view.monitor.stream;
         let last = values.channels.len().saturating_sub(1);
         self.channel = self.channel.min(last);
         match cmd {
@@ -119,7 +120,7 @@ impl Stream {
             Cmd::Last => self.held = None,
             Cmd::Restart => return Some(Action::RestartExtremes),
             Cmd::Mark => return Some(Action::Mark),
-            Cmd::Export if values.export.is_some() => return Some(Action::EndExport),
+            Cmd::Export if view.export.is_some() => return Some(Action::EndExport),
             Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportStream, view))),
             _ => {}
         }
@@ -151,7 +152,7 @@ impl Stream {
 
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
-        let (theme, values) = (scene.theme, &scene.view.stream);
+        let (theme, values) = (scene.theme, &scene.view.monitor.stream);
         let Some(newest) = values.newest else {
             let mut rows = vec![lines::rule(theme, area.width, "Stream", "")];
             let room = usize::from(area.width).saturating_sub(4);
@@ -181,7 +182,7 @@ impl Stream {
     }
 
     fn table(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
-        let (theme, values) = (scene.theme, &scene.view.stream);
+        let (theme, values) = (scene.theme, &scene.view.monitor.stream);
         let source = match values.source {
             Some(Source::ProcessValue) => "process value (7130h) in counts",
             Some(Source::FieldValue) | None => "field value (6100h) in °C",
@@ -202,7 +203,7 @@ impl Stream {
     }
 
     fn row(&self, scene: Scene, channel: &Channel, number: usize, columns: u16) -> Line<'static> {
-        let (theme, stream) = (scene.theme, &scene.view.stream);
+        let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
         let source = stream.source.unwrap_or(Source::FieldValue);
         let decimals = super::overview::decimals(scene.view, source);
         let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
@@ -250,7 +251,7 @@ fn state(theme: Theme, reading: Option<Reading>) -> (&'static str, Style) {
 /// What has to be said below the table: where rows go, or that none come.
 fn note(scene: Scene) -> Line<'static> {
     let (theme, view) = (scene.theme, scene.view);
-    if let Some(export) = &view.stream.export {
+    if let Some(export) = &view.export {
         let path = visible::text(&export.path.to_string_lossy());
         let text = format!("  {} rows written to {path}; E ends it.", format::grouped(export.rows));
         return Line::styled(text, theme.good());
@@ -258,7 +259,7 @@ fn note(scene: Scene) -> Line<'static> {
     if view.facts.stream.is_none() {
         return Line::styled("  The stream is off: these are its last values. T switches it on.", theme.warning());
     }
-    if view.stream.late {
+    if view.monitor.stream.late {
         return Line::styled(
             "  No new row: these values are old. M asks whether the unit still answers.",
             theme.warning(),

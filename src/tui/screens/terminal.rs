@@ -10,11 +10,11 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::Scene;
+use crate::monitor::{Origin, Scrollback, TextLine};
 use crate::record::{Direction, Record};
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::popup::Question;
-use crate::tui::scrollback::{Origin, Scrollback, TextLine};
 use crate::tui::theme::Theme;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};

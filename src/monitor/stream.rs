@@ -1,11 +1,10 @@
 //! The data stream as the screens show it: channels with their values, trends and faults.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
 
+use super::trend::Trend;
 use crate::device::Product;
 use crate::time::{Duration, Instant};
-use crate::tui::trend::Trend;
 use crate::wire::stream::{Layout, Reading, Row, Source};
 
 /// Samples kept of each channel as they came; a [`Trend`] keeps the rest.
@@ -37,19 +36,6 @@ pub struct Stream {
     pub late: bool,
     /// Moments the user has marked.
     pub marks: VecDeque<Instant>,
-    /// The file that rows are written to.
-    pub export: Option<Export>,
-}
-
-/// A file that rows are written to as they come.
-#[derive(Debug)]
-pub struct Export {
-    /// Which.
-    pub path: PathBuf,
-    /// Rows written so far.
-    pub rows: u64,
-    /// The channels it has columns for.
-    pub channels: Vec<String>,
 }
 
 /// One channel of the stream.
@@ -102,8 +88,8 @@ impl Stream {
         let same =
             self.source == Some(row.source) && self.channels.iter().map(|channel| &channel.name).eq(names.iter());
         if !same {
-            let (export, marks) = (self.export.take(), std::mem::take(&mut self.marks));
-            *self = Stream { source: Some(row.source), export, marks, ..Stream::default() };
+            let marks = std::mem::take(&mut self.marks);
+            *self = Stream { source: Some(row.source), marks, ..Stream::default() };
             self.channels = names.into_iter().map(Channel::new).collect();
         }
         if let Some(before) = self.newest {
@@ -130,13 +116,13 @@ impl Stream {
     }
 
     /// When the newest row is too old.
-    pub(super) fn late_at(&self) -> Option<Instant> {
+    pub fn late_at(&self) -> Option<Instant> {
         let newest = self.newest.filter(|_| !self.late)?;
         Some(newest + (self.period.unwrap_or_default() * LATE_PERIODS).max(LATE_AT_LEAST))
     }
 
     /// Marks a moment.
-    pub(super) fn mark(&mut self, at: Instant) {
+    pub fn mark(&mut self, at: Instant) {
         self.marks.push_back(at);
         if self.marks.len() > KEPT_MARKS {
             self.marks.pop_front();
@@ -144,7 +130,7 @@ impl Stream {
     }
 
     /// Starts minimum, maximum and mean of every channel anew.
-    pub(super) fn restart_extremes(&mut self) {
+    pub fn restart_extremes(&mut self) {
         for channel in &mut self.channels {
             let value = channel.reading.value();
             (channel.min, channel.max) = (value, value);
@@ -257,13 +243,14 @@ fn note_fault(faults: &mut VecDeque<Fault>, channel: &str, seen: Option<FaultKin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::{Event, Facts};
-    use crate::tui::view::View;
+    use crate::monitor::Monitor;
+    use crate::record::Span;
+    use crate::session::Event;
 
-    fn row(view: &mut View, millis: u64, readings: [Reading; 5]) {
+    fn row(monitor: &mut Monitor, millis: u64, readings: [Reading; 5]) {
         let at = Instant::from_millis(millis);
         let row = Row { source: Source::FieldValue, readings: readings.to_vec() };
-        view.fold(at, &Event::Row { at, span: Default::default(), row }, &Facts::default());
+        monitor.fold(&Event::Row { at, span: Span::default(), row }, None);
     }
 
     fn with_first(reading: Reading) -> [Reading; 5] {
@@ -272,41 +259,24 @@ mod tests {
 
     #[test]
     fn a_fault_is_remembered_with_its_beginning_and_its_end() {
-        let mut view = View::default();
+        let mut monitor = Monitor::default();
         let readings = [Reading::Value(20.0), Reading::Open, Reading::Open, Reading::Short, Reading::Value(21.0)];
         for (number, reading) in readings.into_iter().enumerate() {
-            row(&mut view, 1000 * number as u64, with_first(reading));
+            row(&mut monitor, 1000 * number as u64, with_first(reading));
         }
-        let seen: Vec<_> = view.faults.iter().map(|f| (f.kind, f.since, f.until)).collect();
+        let seen: Vec<_> = monitor.faults.iter().map(|f| (f.kind, f.since, f.until)).collect();
         let at = Instant::from_millis;
         assert_eq!(seen, [(FaultKind::Short, at(3000), Some(at(4000))), (FaultKind::Open, at(1000), Some(at(3000)))]);
-        assert_eq!((view.stream.channels[0].min, view.stream.channels[0].max), (Some(20.0), Some(21.0)));
+        assert_eq!((monitor.stream.channels[0].min, monitor.stream.channels[0].max), (Some(20.0), Some(21.0)));
     }
 
     #[test]
     fn history_is_bounded() {
-        let mut view = View::default();
+        let mut monitor = Monitor::default();
         for number in 0..(KEPT_SAMPLES as u64 + 100) {
-            row(&mut view, number, with_first(if number % 2 == 0 { Reading::Open } else { Reading::Short }));
+            row(&mut monitor, number, with_first(if number % 2 == 0 { Reading::Open } else { Reading::Short }));
         }
-        assert!(view.stream.channels.iter().all(|channel| channel.history.len() == KEPT_SAMPLES));
-        assert_eq!(view.faults.len(), KEPT_FAULTS);
-    }
-
-    #[test]
-    fn a_stream_is_late_after_three_of_its_periods_and_nothing_ticks_before() {
-        let mut view = View::default();
-        for number in 0..10 {
-            row(&mut view, 5000 * number, with_first(Reading::Value(20.0)));
-        }
-        assert_eq!(view.poll_timeout(), None, "no stream is known to be on");
-        let facts = Facts { stream: Some(Source::FieldValue), ..Facts::default() };
-        view.fold(Instant::from_millis(45_000), &Event::FactsChanged, &facts);
-        assert_eq!(view.poll_timeout(), Some(Instant::from_millis(60_000)));
-        assert!(!view.timeout(Instant::from_millis(59_999)));
-        assert!(view.timeout(Instant::from_millis(60_000)));
-        assert_eq!(view.poll_timeout(), None, "it cannot get later than late");
-        row(&mut view, 61_000, with_first(Reading::Value(20.0)));
-        assert!(!view.stream.late);
+        assert!(monitor.stream.channels.iter().all(|channel| channel.history.len() == KEPT_SAMPLES));
+        assert_eq!(monitor.faults.len(), KEPT_FAULTS);
     }
 }

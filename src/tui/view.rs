@@ -1,16 +1,11 @@
 //! What the screens may read: everything known, folded from the session's events.
 
-mod diagnostics;
-mod stream;
-
-use std::collections::VecDeque;
-
-pub use diagnostics::{Diagnostics, Tracked};
-pub use stream::{Channel, Export, Fault, FaultKind, Stream};
+use std::path::PathBuf;
 
 use super::input::{Failure, Playing};
 use crate::device::Product;
 use crate::dump::Dump;
+use crate::monitor::Monitor;
 use crate::session::{DictionaryReading, Event, Facts, Job, LoadReport, Outcome, Progress, UnitState};
 use crate::time::Instant;
 
@@ -23,16 +18,14 @@ pub struct View {
     pub facts: Facts,
     /// The job that runs.
     pub job: Option<Job>,
-    /// The data stream.
-    pub stream: Stream,
-    /// Faults seen since connecting, newest first.
-    pub faults: VecDeque<Fault>,
+    /// What it has shown: stream, faults, diagnostics.
+    pub monitor: Monitor,
+    /// The file that rows are written to.
+    pub export: Option<Export>,
     /// The unit's object dictionary, once it has been read.
     pub dictionary: Option<DictionaryRead>,
     /// Entries read so far while it is being read.
     pub entries_read: usize,
-    /// The unit's diagnostics.
-    pub diagnostics: Diagnostics,
     /// The upload.
     pub load: Load,
     /// How a recording is played, where the link is one.
@@ -99,6 +92,17 @@ pub struct DictionaryRead {
     pub at: Instant,
 }
 
+/// A file that rows are written to as they come.
+#[derive(Debug)]
+pub struct Export {
+    /// Which.
+    pub path: PathBuf,
+    /// Rows written so far.
+    pub rows: u64,
+    /// The channels it has columns for.
+    pub channels: Vec<String>,
+}
+
 /// A word to the user, shown until the next one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
@@ -124,11 +128,10 @@ impl View {
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         match event {
             Event::Heard { .. } => {}
-            Event::Page { at, lines } => self.diagnostics.page(*at, lines),
             Event::EntriesRead(count) => self.entries_read = *count,
-            Event::Row { at, row, .. } => {
+            Event::Row { .. } | Event::Page { .. } => {
                 let product = self.product();
-                self.stream.row(*at, row, product, &mut self.faults);
+                self.monitor.fold(event, product);
             }
             Event::FactsChanged => self.facts_changed(facts),
             Event::Held(true) => self.load.held_since = Some(now),
@@ -143,24 +146,24 @@ impl View {
 
     /// When [`View::timeout`] is wanted.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.stream.late_at().filter(|_| self.facts.stream.is_some())
+        self.monitor.stream.late_at().filter(|_| self.facts.stream.is_some())
     }
 
     /// The time is `now`. Says whether anything has changed.
     pub fn timeout(&mut self, now: Instant) -> bool {
         let late = self.poll_timeout().is_some_and(|due| due <= now);
-        self.stream.late |= late;
+        self.monitor.stream.late |= late;
         late
     }
 
     /// Starts minimum, maximum and mean of every channel anew.
     pub fn restart_extremes(&mut self) {
-        self.stream.restart_extremes();
+        self.monitor.stream.restart_extremes();
     }
 
     /// Marks a moment of the stream.
     pub fn mark(&mut self, at: Instant) {
-        self.stream.mark(at);
+        self.monitor.stream.mark(at);
     }
 
     /// A new link: what was known of the unit before says nothing about the one at its end.
@@ -190,7 +193,7 @@ impl View {
 
     fn facts_changed(&mut self, facts: &Facts) {
         if facts.stream.is_none() {
-            self.stream.late = false;
+            self.monitor.stream.late = false;
         }
         if facts.state == UnitState::Application && self.facts.state != UnitState::Application {
             // Whatever sub-menu was open, a restart has closed it.
@@ -280,5 +283,39 @@ fn done(job: Job) -> &'static str {
         Job::Diagnostics => "The diagnostics are off.",
         Job::Overhear => "This is the end of the recording. 3 shows all of it.",
         Job::Load => "The upload has ended.",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Span;
+    use crate::wire::stream::{Reading, Row, Source};
+
+    fn row(view: &mut View, millis: u64, readings: [Reading; 5]) {
+        let at = Instant::from_millis(millis);
+        let row = Row { source: Source::FieldValue, readings: readings.to_vec() };
+        view.fold(at, &Event::Row { at, span: Span::default(), row }, &Facts::default());
+    }
+
+    fn with_first(reading: Reading) -> [Reading; 5] {
+        [reading, Reading::Value(1.0), Reading::Value(1.0), Reading::Disabled, Reading::Value(1.0)]
+    }
+
+    #[test]
+    fn a_stream_is_late_after_three_of_its_periods_and_nothing_ticks_before() {
+        let mut view = View::default();
+        for number in 0..10 {
+            row(&mut view, 5000 * number, with_first(Reading::Value(20.0)));
+        }
+        assert_eq!(view.poll_timeout(), None, "no stream is known to be on");
+        let facts = Facts { stream: Some(Source::FieldValue), ..Facts::default() };
+        view.fold(Instant::from_millis(45_000), &Event::FactsChanged, &facts);
+        assert_eq!(view.poll_timeout(), Some(Instant::from_millis(60_000)));
+        assert!(!view.timeout(Instant::from_millis(59_999)));
+        assert!(view.timeout(Instant::from_millis(60_000)));
+        assert_eq!(view.poll_timeout(), None, "it cannot get later than late");
+        row(&mut view, 61_000, with_first(Reading::Value(20.0)));
+        assert!(!view.monitor.stream.late);
     }
 }
