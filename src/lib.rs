@@ -34,6 +34,8 @@ pub mod dump;
 
 pub mod monitor;
 
+pub mod report;
+
 pub mod emulator;
 
 pub mod host;

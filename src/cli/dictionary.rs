@@ -8,9 +8,9 @@ use serde::Serialize;
 use super::Global;
 use super::confirm::confirm;
 use super::error::{CliError, Kind};
-use super::link;
 use super::output::Output;
 use super::talk::{Ended, Talk};
+use super::{files, link};
 use crate::device::Product;
 use crate::dump::{self, Difference, Dump, DumpError};
 use crate::session::{Command, DictionaryReading, Facts, Outcome};
@@ -139,7 +139,7 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
     };
     match out {
         None => output.data(text.as_bytes()),
-        Some(file) => write_whole(file, text.as_bytes()),
+        Some(file) => files::write_whole(file, text.as_bytes()),
     }
 }
 
@@ -149,17 +149,6 @@ fn configuration(reading: &DictionaryReading, product: Option<&Product>, facts: 
             .hint("--format json keeps everything that was read")
     })?;
     Ok(dump::configuration(reading, product, facts))
-}
-
-/// Writes a file so that the old or the new one is there at any moment.
-fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    let mut new = file.as_os_str().to_owned();
-    new.push(".new");
-    let new = PathBuf::from(new);
-    std::fs::write(&new, bytes).and_then(|()| std::fs::rename(&new, file)).map_err(|error| {
-        let context = format!("cannot write '{}'", file.display());
-        CliError::new(Kind::Failed, anyhow::Error::new(error).context(context))
-    })
 }
 
 fn diff(left: &str, right: &str, output: &mut Output) -> Result<(), CliError> {

@@ -8,6 +8,7 @@ pub mod dictionary;
 pub mod eds;
 pub mod emulate;
 pub mod error;
+pub mod files;
 pub mod identify;
 pub mod image;
 pub mod link;
@@ -17,6 +18,7 @@ pub mod output;
 pub mod password;
 pub mod playback;
 pub mod ports;
+pub mod report;
 pub mod stream;
 pub mod talk;
 pub mod terminal;
@@ -111,6 +113,8 @@ enum Command {
     Diagnostics(diagnostics::Args),
     /// Restore the factory's object dictionary.
     Defaults(defaults::Args),
+    /// Put everything known of a unit on one page of HTML.
+    Report(report::Args),
     /// Check an image, upload it, and verify the new banner.
     Load(load::Args),
     /// A plain terminal: keys out, bytes in.
@@ -160,6 +164,7 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Dictionary(args)) => dictionary::run(args, global, output),
         Some(Command::Diagnostics(args)) => diagnostics::run(args, global, output),
         Some(Command::Defaults(args)) => defaults::run(args, global, output),
+        Some(Command::Report(args)) => report::run(&args, global, output),
         Some(Command::Load(args)) => load::run(args, global, output),
         Some(Command::Terminal(args)) => terminal::run(args, global, output),
         Some(Command::Eds(args)) => eds::run(args, output),

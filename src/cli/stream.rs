@@ -232,14 +232,17 @@ impl Stream {
 
 /// A stream that was on before we came.
 #[derive(Clone, Copy, Debug)]
-struct Found {
+pub struct Found {
     source: Source,
     /// Time between its rows, as far as two were seen.
     period: Option<Duration>,
 }
 
 /// Looks for a stream that runs already.
-fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
+///
+/// # Errors
+/// If the link is lost or the user interrupts.
+pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
     let mut first: Option<(Instant, Source)> = None;
     let mut last = None;
     let mut rows = 0u32;
@@ -262,7 +265,15 @@ fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
 }
 
 /// Puts the stream back to what it was.
-fn leave_as_found(talk: &mut Talk, was_on: bool, found: Option<Found>, output: &mut Output) -> Result<(), CliError> {
+///
+/// # Errors
+/// If the unit does not do as asked.
+pub fn leave_as_found(
+    talk: &mut Talk,
+    was_on: bool,
+    found: Option<Found>,
+    output: &mut Output,
+) -> Result<(), CliError> {
     match (was_on, found) {
         (false, _) => {
             let outcome = talk.ask(Command::StreamOff)?;

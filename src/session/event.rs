@@ -43,7 +43,7 @@ pub enum Command {
         pages: Option<u32>,
     },
     /// In a recording: understand all that goes by, as it goes by. A dictionary that was walked through is told of by
-    /// [`Outcome::DictionaryRead`] as often as that happened.
+    /// [`Event::Overheard`], as often as that happened.
     Overhear,
     /// Upload new software.
     Load(Box<LoadOrder>),
@@ -151,6 +151,8 @@ pub enum Event {
         /// Its lines, as printed.
         lines: Vec<Text>,
     },
+    /// In a recording: somebody has walked through the object dictionary.
+    Overheard(Box<DictionaryReading>),
     /// What is known of the unit has changed: see `Session::facts`.
     FactsChanged,
     /// The unit has stopped us (XOFF) or lets us go on (XON).

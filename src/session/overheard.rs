@@ -168,9 +168,10 @@ impl Work for Everything {
             Signal::Over => {
                 let page = self.diagnostics.page.complete(desk);
                 page.map(|page| self.diagnostics.page(page, desk));
-                let is_there = self.dictionary.collector.count() > 0;
-                let read = is_there.then(|| self.dictionary.handle(signal, desk)).flatten();
-                return Some(read.unwrap_or(Outcome::Done(Job::Overhear)));
+                if let Some(Outcome::DictionaryRead(read)) = self.dictionary.handle(signal, desk) {
+                    desk.events.push_back(Event::Overheard(read));
+                }
+                return Some(Outcome::Done(Job::Overhear));
             }
             _ => {}
         }
@@ -181,7 +182,7 @@ impl Work for Everything {
         // A walk that has seen everything need not wait for the recording's end.
         if matches!(signal, Signal::Heard(_, Message::MenuKey(_))) && self.dictionary.collector.has_all() {
             let read = self.dictionary.collector.take(true);
-            desk.events.push_back(Event::Finished(Outcome::DictionaryRead(Box::new(read))));
+            desk.events.push_back(Event::Overheard(Box::new(read)));
         }
         None
     }

@@ -128,6 +128,7 @@ impl View {
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         match event {
             Event::Heard { .. } => {}
+            Event::Overheard(reading) => self.dictionary_read(now, reading),
             Event::EntriesRead(count) => self.entries_read = *count,
             Event::Row { .. } | Event::Page { .. } => {
                 let product = self.product();

@@ -401,6 +401,51 @@ fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
 }
 
 #[test]
+fn a_report_tells_all_of_a_unit_and_its_recording_tells_the_same() {
+    let mut bench = Bench::new();
+    let args = ["report", "--out", "unit.html", "--seconds", "2"];
+    let unasked = bench.run(&args);
+    assert_eq!(unasked.code, Some(2), "it halts the unit: {}", unasked.err);
+    assert!(!bench.world.path("unit.html").exists());
+    assert_eq!(bench.version(), "1.1.0", "it has started");
+    let unit = bench.unit.as_mut().expect("it runs");
+    unit.input(b"open 3\nwrite 6110:2 2\nread 6110:2\n");
+    unit.wait_out("6110:02 = 2 (type K)");
+    let ran = bench.run(&[&args[..], &["--yes", "--record", "said.cast"]].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let page = |name: &str| fs::read_to_string(bench.world.path(name)).expect("a page");
+    let live = page("unit.html");
+    for said in [
+        "<td>AXTC4CO</td>",
+        "<td class=\"bad\">open circuit</td>",
+        "TC3: open circuit",
+        "1 not as the factory made them",
+        "<td class=\"mark\">type K</td>",
+        "Supply Voltage",
+        "<polyline",
+        "Main Menu",
+    ] {
+        assert!(live.contains(said), "no {said} in\n{live}");
+    }
+    assert_eq!(bench.run(&["stream", "--off", "--json"]).code, Some(0));
+
+    let replay = ["report", "--out", "again.html", "--port", "replay:said.cast"];
+    let ran = bench.world.run(&replay, b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let again = page("again.html");
+    let section = |page: &str, name: &str| {
+        let text = page.split(&format!("<h2>{name}</h2>")).nth(1).and_then(|text| text.split("<h2>").next());
+        text.unwrap_or_else(|| panic!("no {name} in\n{page}")).to_owned()
+    };
+    for name in ["Object dictionary", "Diagnostics"] {
+        assert_eq!(section(&again, name), section(&live, name), "{name}");
+    }
+    let ran = bench.world.run(&["report", "--out", "nowhere/unit.html", "--port", "replay:said.cast"], b"");
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("cannot write 'nowhere/unit.html'"), "{}", ran.err);
+}
+
+#[test]
 fn an_interrupt_in_the_middle_of_a_dump_leaves_the_view() {
     let world = World::new();
     let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1"]);

@@ -20,7 +20,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("session", &["canopen", "device", "endpoint", "image", "record", "secret", "time", "version", "wire"]),
     ("dump", &["canopen", "device", "session", "wire"]),
     ("monitor", &["device", "endpoint", "record", "session", "time", "wire"]),
-    ("report", &["device", "dump", "monitor", "session", "time", "wire"]),
+    ("report", &["device", "dump", "monitor", "record", "session", "time", "wire"]),
     ("emulator", &["canopen", "device", "endpoint", "image", "rng", "time", "version", "wire"]),
     ("host", &["canopen", "device", "emulator", "endpoint", "image", "record", "rng", "telnet", "time", "version"]),
     (

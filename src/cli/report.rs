@@ -1,0 +1,144 @@
+//! `axcon report`: everything known of a unit on one page.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use jiff::tz::TimeZone;
+
+use super::Global;
+use super::confirm::confirm;
+use super::error::{CliError, Kind};
+use super::output::Output;
+use super::stream::{leave_as_found, watch};
+use super::talk::{Ended, Talk};
+use super::{files, link};
+use crate::device::Product;
+use crate::dump::Dump;
+use crate::host::clock;
+use crate::monitor::{Monitor, Scrollback};
+use crate::report::Contents;
+use crate::session::{Command, DictionaryReading, Event, Outcome, Session};
+use crate::time::Duration;
+use crate::wire::stream::Source;
+
+/// Arguments of `axcon report`.
+///
+/// Of a unit: values are read for some seconds, then a page of diagnostics and the object dictionary; the stream is left
+/// as it was found. Of a recording: what somebody asked then.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The page, HTML.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// How long values are read.
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    seconds: u64,
+    /// Leave the object dictionary out: while it is read, the unit may halt scanning and CAN.
+    #[arg(long)]
+    no_dictionary: bool,
+}
+
+/// Time between rows, where the stream is not on already.
+const PERIOD: Duration = Duration::from_millis(500);
+
+/// What is being found out.
+#[derive(Default)]
+struct Findings {
+    monitor: Monitor,
+    reading: Option<DictionaryReading>,
+    missing: Vec<String>,
+}
+
+/// Makes the report.
+///
+/// # Errors
+/// If nobody said yes, no unit answers, or the file cannot be written. What a unit that answers does not show is missing
+/// in the report, which says so.
+pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let is_recording = link::is_recording(global);
+    if !is_recording && !args.no_dictionary {
+        confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
+    }
+    let mut talk = Talk::open(global, output)?;
+    talk.find_application()?;
+    let mut findings = Findings::default();
+    if is_recording {
+        findings.ask(&mut talk, Command::Overhear, "the recording")?;
+    } else {
+        findings.watch_values(&mut talk, args.seconds, output)?;
+        findings.ask(&mut talk, Command::Diagnostics { pages: Some(1) }, "diagnostics")?;
+        if !args.no_dictionary {
+            findings.ask(&mut talk, Command::ReadDictionary, "the object dictionary")?;
+        }
+    }
+    talk.close(output);
+    let facts = talk.session().facts().clone();
+    let product = facts.product.as_ref().and_then(|known| Product::named(&known.value));
+    let dump = findings.reading.as_ref().map(|reading| Dump::of(reading, product, &facts));
+    let mut transcript = Scrollback::default();
+    transcript.follow(talk.session().record());
+    let start = talk.calendar().at(crate::time::Instant::ZERO);
+    let made = talk.calendar().at(talk.now()).to_zoned(TimeZone::system()).strftime("%Y-%m-%d %H:%M").to_string();
+    let contents = Contents {
+        link: talk.port(),
+        made: &made,
+        facts: &facts,
+        monitor: &findings.monitor,
+        dump: dump.as_ref(),
+        missing: &findings.missing,
+        transcript: &transcript,
+        start_of_day: clock::time_of_day(start.as_millisecond()),
+    };
+    files::write_whole(&args.out, contents.html().as_bytes())?;
+    output.remark(&format!("axcon: the report is in {}", args.out.display()));
+    Ok(())
+}
+
+impl Findings {
+    fn fold(&mut self, session: &Session, event: &Event) {
+        let product = session.facts().product.as_ref().and_then(|known| Product::named(&known.value));
+        self.monitor.fold(event, product);
+        if let Event::Overheard(reading) = event {
+            self.reading = Some((**reading).clone());
+        }
+    }
+
+    /// Watches the stream for some seconds; one that is off is switched on for as long.
+    fn watch_values(&mut self, talk: &mut Talk, seconds: u64, output: &mut Output) -> Result<(), CliError> {
+        let found = watch(talk)?;
+        if found.is_none() {
+            self.ask(talk, Command::StreamOn { source: Source::FieldValue, period: PERIOD }, "the stream")?;
+        }
+        let until = talk.now() + Duration::from_secs(seconds);
+        let whole = talk.listen(until, |session, event| {
+            self.fold(session, event);
+            Ok(ControlFlow::Continue(()))
+        })?;
+        if found.is_none() {
+            leave_as_found(talk, false, found, output)?;
+        }
+        if whole { Ok(()) } else { Err(CliError::message(Kind::Interrupted, "interrupted")) }
+    }
+
+    /// Asks for something that the report can do without.
+    fn ask(&mut self, talk: &mut Talk, command: Command, what: &str) -> Result<(), CliError> {
+        let ended = talk.run(command, |session, event| {
+            self.fold(session, event);
+            Ok(())
+        })?;
+        match ended {
+            Ended::Finished { interrupted: true, .. } => Err(CliError::message(Kind::Interrupted, "interrupted")),
+            Ended::Lost { error, .. } => Err(error),
+            Ended::Finished { outcome: Outcome::DictionaryRead(reading), .. } => {
+                self.reading = Some(*reading);
+                Ok(())
+            }
+            Ended::Finished { outcome, .. } => {
+                if let Err(error) = talk.expect_done(outcome) {
+                    self.missing.push(format!("Not found out: {what}. {error}."));
+                }
+                Ok(())
+            }
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! A unit's service report: everything known of it on one page of HTML, for whoever was not there.
+//!
+//! The page needs nothing but itself: no script, no picture from elsewhere, no font. All text that a device has sent is
+//! escaped, control characters made visible. It prints on paper.
+
+mod curve;
+mod page;
+
+use crate::dump::Dump;
+use crate::monitor::{Fault, FaultKind, Monitor, Scrollback};
+use crate::session::{Facts, Known, Origin, UnitState};
+use crate::time::{Duration, Instant};
+use crate::wire::stream::{Reading, Source};
+use page::Page;
+
+/// Lines of the transcript at most, the newest.
+const MOST_LINES: usize = 3000;
+
+/// What a report is made of.
+pub struct Contents<'a> {
+    /// The link, as the user named it.
+    pub link: &'a str,
+    /// When the report was made: local date and time.
+    pub made: &'a str,
+    /// What is known of the unit.
+    pub facts: &'a Facts,
+    /// What it has shown.
+    pub monitor: &'a Monitor,
+    /// Its object dictionary, if it was read.
+    pub dump: Option<&'a Dump>,
+    /// What could not be found out, a sentence each.
+    pub missing: &'a [String],
+    /// The text of the line.
+    pub transcript: &'a Scrollback,
+    /// Local time of day at the start of time.
+    pub start_of_day: Duration,
+}
+
+impl Contents<'_> {
+    /// The page.
+    pub fn html(&self) -> String {
+        let product = self.facts.product.as_ref().map_or("unit", |known| known.value.as_str());
+        let mut page = Page::new(&format!("Service report: {product}"));
+        page.paragraph(&format!("{}, {}. Made by axcon {}.", self.made, self.link, env!("CARGO_PKG_VERSION")));
+        self.unit(&mut page);
+        self.faults(&mut page);
+        self.values(&mut page);
+        self.diagnostics(&mut page);
+        self.dictionary(&mut page);
+        self.transcript(&mut page);
+        page.end()
+    }
+
+    fn time(&self, at: Instant) -> String {
+        let seconds = (self.start_of_day + at.since_start()).as_secs() % 86_400;
+        format!("{:02}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
+    }
+
+    fn unit(&self, page: &mut Page) {
+        let facts = self.facts;
+        page.section("Unit");
+        let state = match facts.state {
+            UnitState::Silent => "silent",
+            UnitState::Unknown => "talks, says nothing known",
+            UnitState::Application => "application runs",
+            UnitState::Loader => "in its loader, waits for a file",
+        };
+        page.table(
+            &["", "", "known from"],
+            [
+                row("State", state.into(), ""),
+                known("Product", &facts.product, Clone::clone),
+                known("Software version", &facts.version, ToString::to_string),
+                known("Node-ID", &facts.node_id, ToString::to_string),
+                known("CAN bit rate", &facts.can_kbps, |rate| format!("{rate} kbit/s")),
+                known("CANopen state", &facts.nmt_state, Clone::clone),
+            ],
+        );
+        for sentence in self.missing {
+            page.remark(sentence);
+        }
+    }
+
+    fn faults(&self, page: &mut Page) {
+        page.section("Faults");
+        let listed: Vec<&str> = self.dump.into_iter().flat_map(Dump::errors).collect();
+        if listed.is_empty() && self.monitor.faults.is_empty() {
+            return page.paragraph("None seen.");
+        }
+        let seen = self.monitor.faults.iter().map(|fault| self.fault(fault));
+        let listed = listed.into_iter().map(|words| {
+            ["unit's list 1003h".to_owned(), words.to_owned(), String::new(), String::new()].map(Cell::bad)
+        });
+        page.table(&["Channel", "Fault", "since", "until"], seen.chain(listed));
+    }
+
+    fn fault(&self, fault: &Fault) -> [Cell; 4] {
+        let kind = match fault.kind {
+            FaultKind::Open => "open circuit",
+            FaultKind::Short => "short circuit",
+            FaultKind::Failed => "no reading",
+        };
+        let until = fault.until.map_or_else(|| "still there".to_owned(), |at| self.time(at));
+        let cells = [fault.channel.clone(), kind.to_owned(), self.time(fault.since), until];
+        if fault.until.is_none() { cells.map(Cell::bad) } else { cells.map(Cell::plain) }
+    }
+
+    fn values(&self, page: &mut Page) {
+        let stream = &self.monitor.stream;
+        page.section("Values");
+        let (Some(source), Some(newest)) = (stream.source, stream.newest) else {
+            return page.paragraph("The stream has shown none.");
+        };
+        let (what, decimals) = match source {
+            Source::FieldValue => ("field values (6100h) in °C", 3),
+            Source::ProcessValue => ("process values (7130h) in counts", 0),
+        };
+        page.paragraph(&format!("{} rows, the last at {}: {what}.", stream.rows, self.time(newest)));
+        let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
+        let rows = stream.channels.iter().map(|channel| {
+            let state = match channel.reading {
+                Reading::Value(_) => Cell::plain("ok"),
+                Reading::Disabled => Cell::plain("disabled"),
+                Reading::Open => Cell::bad("open circuit"),
+                Reading::Short => Cell::bad("short circuit"),
+                Reading::Error => Cell::bad("no reading"),
+            };
+            let [value, min, max, mean] = [channel.reading.value(), channel.min, channel.max, channel.mean()]
+                .map(|value| Cell::number(show(value)));
+            [Cell::plain(&channel.name), value, state, min, max, mean]
+        });
+        page.table(&["Channel", "Value", "State", "Min", "Max", "Mean"], rows);
+        for channel in &stream.channels {
+            let samples = channel.samples(channel.begun().unwrap_or(newest), newest);
+            if let Some(picture) = curve::draw(&channel.name, &samples, |at| self.time(at)) {
+                page.picture(&picture);
+            }
+        }
+    }
+
+    fn diagnostics(&self, page: &mut Page) {
+        page.section("Diagnostics");
+        let diagnostics = &self.monitor.diagnostics;
+        match diagnostics.at {
+            None => page.paragraph("None seen."),
+            Some(at) => {
+                page.paragraph(&format!("As the unit printed them at {}.", self.time(at)));
+                page.text(diagnostics.lines.iter().map(String::as_str));
+            }
+        }
+    }
+
+    fn dictionary(&self, page: &mut Page) {
+        page.section("Object dictionary");
+        let Some(dump) = self.dump else { return page.paragraph("It was not read.") };
+        let complete = if dump.complete { "" } else { " The unit did not show all of it." };
+        let deviations = dump.deviations();
+        page.paragraph(&format!(
+            "{} entries, {deviations} not as the factory made them (marked).{complete}",
+            dump.entries.len()
+        ));
+        let rows = dump.entries.iter().map(|entry| {
+            let address = format!("{}:{:02X}", entry.index, entry.subindex);
+            let unit = entry.unit.as_deref().unwrap_or_default();
+            let value = if entry.value.is_some() { format!("{} {unit}", entry.shown()) } else { entry.text.clone() };
+            let meaning = entry.meaning.clone().unwrap_or_default();
+            let cells = [address, entry.name.clone(), value, meaning, entry.shown_default()];
+            if entry.deviates { cells.map(Cell::marked) } else { cells.map(Cell::plain) }
+        });
+        page.table(&["Address", "Name", "Value", "Meaning", "Factory"], rows);
+    }
+
+    fn transcript(&self, page: &mut Page) {
+        page.section("Transcript");
+        let lines = self.transcript.lines();
+        let left_out = lines.len().saturating_sub(MOST_LINES);
+        if left_out > 0 {
+            page.remark(&format!("{left_out} earlier lines are left out: the recording has them."));
+        }
+        let shown: Vec<String> = lines
+            .skip(left_out)
+            .map(|line| {
+                let mark = match line.origin {
+                    crate::monitor::Origin::Unit => " ",
+                    crate::monitor::Origin::Us => "»",
+                    crate::monitor::Origin::Console => "─",
+                };
+                format!("{} {mark} {}", self.time(line.at), line.text)
+            })
+            .collect();
+        page.text(shown.iter().map(String::as_str));
+    }
+}
+
+/// What stands in a place of a table, and how.
+pub struct Cell {
+    text: String,
+    look: &'static str,
+}
+
+impl Cell {
+    fn plain(text: impl Into<String>) -> Self {
+        Cell { text: text.into(), look: "" }
+    }
+
+    fn bad(text: impl Into<String>) -> Self {
+        Cell { text: text.into(), look: "bad" }
+    }
+
+    fn marked(text: impl Into<String>) -> Self {
+        Cell { text: text.into(), look: "mark" }
+    }
+
+    fn number(text: impl Into<String>) -> Self {
+        Cell { text: text.into(), look: "n" }
+    }
+}
+
+fn row(label: &str, value: String, origin: &str) -> [Cell; 3] {
+    [label.to_owned(), value, origin.to_owned()].map(Cell::plain)
+}
+
+fn known<T>(label: &str, fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -> [Cell; 3] {
+    match fact {
+        None => row(label, "not known".into(), ""),
+        Some(known) => {
+            let origin = match known.origin {
+                Origin::Banner => "banner",
+                Origin::Menu => "menu",
+                Origin::Dictionary => "object dictionary",
+            };
+            row(label, show(&known.value), origin)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Span;
+    use crate::session::Event;
+    use crate::wire::Text;
+    use crate::wire::stream::Row;
+
+    #[test]
+    fn nothing_a_device_sends_is_more_than_text() {
+        let evil = "<script>alert(1)</script>&\"'\u{1b}[2J";
+        let mut monitor = Monitor::default();
+        let text = Text { text: evil.into(), span: Span::default() };
+        monitor.fold(&Event::Page { at: Instant::ZERO, lines: vec![text] }, None);
+        let known = Known { value: evil.to_owned(), origin: Origin::Banner, span: Span::default() };
+        let facts = Facts { product: Some(known.clone()), nmt_state: Some(known), ..Facts::default() };
+        let mut transcript = Scrollback::default();
+        transcript.note(Instant::ZERO, evil.into());
+        let contents = Contents {
+            link: evil,
+            made: "2026-01-31 12:00",
+            facts: &facts,
+            monitor: &monitor,
+            dump: None,
+            missing: &[evil.to_owned()],
+            transcript: &transcript,
+            start_of_day: Duration::ZERO,
+        };
+        let html = contents.html();
+        assert!(!html.contains("<script") && !html.contains('\u{1b}'), "{html}");
+        assert_eq!(
+            html.matches("&lt;script&gt;alert(1)").count(),
+            7,
+            "title, heading, link, facts, remark, page, line"
+        );
+        assert!(!html.contains("http"), "nothing from elsewhere");
+    }
+
+    #[test]
+    fn a_curve_has_gaps_where_nothing_was_measured_and_faults_their_times() {
+        let mut monitor = Monitor::default();
+        for second in 0..20u64 {
+            let reading = if (8..12).contains(&second) { Reading::Open } else { Reading::Value(second as f64) };
+            let row = Row { source: Source::FieldValue, readings: vec![reading; 5] };
+            let at = Instant::from_millis(1000 * second);
+            monitor.fold(&Event::Row { at, span: Span::default(), row }, None);
+        }
+        let contents = Contents {
+            link: "u0",
+            made: "2026-01-31 12:00",
+            facts: &Facts::default(),
+            monitor: &monitor,
+            dump: None,
+            missing: &[],
+            transcript: &Scrollback::default(),
+            start_of_day: Duration::from_secs(12 * 3600),
+        };
+        let html = contents.html();
+        assert_eq!(html.matches("<polyline").count(), 10, "two stretches for each of five channels");
+        assert!(html.contains("<td>12:00:08</td><td>12:00:12</td>"), "{html}");
+    }
+}
