@@ -266,8 +266,8 @@ mod tests {
         assert!(!html.contains("<script") && !html.contains('\u{1b}'), "{html}");
         assert_eq!(
             html.matches("&lt;script&gt;alert(1)").count(),
-            7,
-            "title, heading, link, facts, remark, page, line"
+            8,
+            "title, heading, link, two facts, remark, page, line"
         );
         assert!(!html.contains("http"), "nothing from elsewhere");
     }
