@@ -21,6 +21,7 @@ use crate::device::Product;
 use crate::device::dictionary::{Entry, Object};
 use crate::dump::Dump;
 use crate::endpoint::Transmit;
+use crate::image::make;
 use crate::record::Span;
 use crate::session::{
     DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, Verdict,
@@ -263,22 +264,19 @@ fn axtc4co() -> &'static Product {
 }
 
 fn good_image() -> ImageFacts {
-    ImageFacts {
-        path: "/home/service/images/AXTC4CO_V1.2.0.elf.S".into(),
-        ok: true,
-        product: Some("AXTC4CO".into()),
-        version: Some(Version::new(1, 2, 0)),
-        records: 3074,
-        characters: 242_846,
-        defects: Vec::new(),
-        checked: None,
-    }
+    let recipe =
+        make::Recipe { target: &axtc4co().target(), version: Version::new(1, 2, 0), words: 0xC000, flaw: None };
+    let file = make::make(&recipe).expect("an image of the usual size");
+    let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
+    let report = crate::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
+    ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report)
 }
 
 fn bad_image() -> ImageFacts {
     let defects =
         (1..=40).map(|n| format!("line {}, column 43: the checksum is A{:X}, it should be 5C", n * 7, n % 16));
-    ImageFacts { path: "/home/service/images/bad.S".into(), ok: false, defects: defects.collect(), ..good_image() }
+    let path = "/home/service/images/bad.S".into();
+    ImageFacts { path, ok: false, defects: defects.collect(), checked: None, ..good_image() }
 }
 
 fn progress() -> Progress {

@@ -12,6 +12,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::Scene;
+use crate::monitor::{Origin, TextLine};
 use crate::session::{Job, LoadReport, Phase, Progress, UnitNow, Verdict};
 use crate::time::Duration;
 use crate::tui::action::Action;
@@ -584,7 +585,15 @@ fn gauge_and_numbers(scene: Scene, progress: &Progress, columns: usize) -> Vec<L
             ),
         ),
         lines::labelled(theme, "Line", line),
+        lines::labelled(theme, "Last heard", Span::raw(last_heard(scene, columns))),
     ]
+}
+
+/// The unit's last words: what a loader says while it takes a file, its dots too.
+fn last_heard(scene: Scene, columns: usize) -> String {
+    let said = |line: &&TextLine| line.origin == Origin::Unit && !line.text.trim().is_empty();
+    let text = scene.scrollback.lines().rev().find(said).map_or("nothing yet", |line| line.text.trim());
+    format::keep_end(text, columns.saturating_sub(lines::LABEL_COLUMNS + 4))
 }
 
 fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line<'static>> {
