@@ -53,8 +53,6 @@ pub enum Input {
     Gone(LinkError),
     /// The process got a signal (its number).
     Signal(i32),
-    /// A key, a paste, a new size: the user at the terminal, as far as it is in raw mode.
-    Terminal(ratatui::crossterm::event::Event),
     /// Bytes from standard input, where it is read as such.
     Typed(Vec<u8>),
     /// Standard input has ended.

@@ -93,8 +93,7 @@ impl Pump {
                 }
                 Ok(Input::Gone(error)) => return Err(PumpError::Link(error)),
                 Ok(Input::Signal(signal)) => return Err(PumpError::Interrupted(signal)),
-                Ok(Input::Terminal(_) | Input::Typed(_) | Input::TypedEnd | Input::Wake)
-                | Err(RecvTimeoutError::Timeout) => {}
+                Ok(Input::Typed(_) | Input::TypedEnd | Input::Wake) | Err(RecvTimeoutError::Timeout) => {}
                 // The connection's threads hold the other end as long as it lives.
                 Err(RecvTimeoutError::Disconnected) => {
                     let port = self.connection.port().to_owned();

@@ -6,7 +6,7 @@
 use std::io::{self, IsTerminal, Write, stdout};
 use std::panic;
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::mpsc::SyncSender;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Once};
 use std::thread;
 
@@ -37,6 +37,9 @@ const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1000l";
 /// Raw mode only, for the plain terminal. Gives the terminal back when dropped.
 #[derive(Debug)]
 pub struct RawMode(());
+
+/// Keys that wait at most; the terminal keeps the others.
+const KEYS: usize = 64;
 
 /// What of the terminal is ours at the moment.
 static TAKEN: AtomicU8 = AtomicU8::new(NOTHING);
@@ -115,12 +118,14 @@ impl Drop for RawMode {
     }
 }
 
-/// Delivers what the user does at the terminal as [`Input::Terminal`], from a thread that lives as long as the
-/// process: nothing ends a read of the terminal. Started once, behind [`Screen::enter`].
+/// Delivers what the user does at the terminal on a channel of its own, from a thread that lives as long as the process:
+/// nothing ends a read of the terminal. Whoever waits for `inputs` is woken. Keys do not queue behind what a port floods
+/// that channel with. Started once, behind [`Screen::enter`].
 ///
 /// # Errors
 /// If the system gives no thread.
-pub fn listen(inputs: SyncSender<Input>) -> io::Result<()> {
+pub fn listen(inputs: SyncSender<Input>) -> io::Result<Receiver<event::Event>> {
+    let (keys, typed) = sync_channel(KEYS);
     thread::Builder::new().name("keys".into()).spawn(move || {
         // An error means that the terminal is gone; then a hang-up signal comes as well.
         while let Ok(event) = event::read() {
@@ -128,12 +133,16 @@ pub fn listen(inputs: SyncSender<Input>) -> io::Result<()> {
             if matches!(&event, event::Event::Key(key) if key.kind == event::KeyEventKind::Release) {
                 continue;
             }
-            if inputs.send(Input::Terminal(event)).is_err() {
+            if keys.send(event).is_err() {
+                return;
+            }
+            // A full channel wakes its owner by itself.
+            if let Err(TrySendError::Disconnected(_)) = inputs.try_send(Input::Wake) {
                 return;
             }
         }
     })?;
-    Ok(())
+    Ok(typed)
 }
 
 /// Whether reading standard input is harmless: a background job that reads its terminal is stopped by the system.

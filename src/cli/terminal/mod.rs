@@ -235,7 +235,7 @@ impl Conversation {
                 }
                 Ok(Input::Gone(error)) => self.lost(link::link_error(error), output)?,
                 Ok(Input::Signal(_)) => return Err(CliError::reported(Kind::Interrupted)),
-                Ok(Input::Terminal(_) | Input::Wake) | Err(RecvTimeoutError::Timeout) => {}
+                Ok(Input::Wake) | Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
         }

@@ -78,7 +78,7 @@ pub fn run(world: World) -> io::Result<End> {
     let (sender, inputs) = host::channel();
     let mut screen = Screen::enter()?;
     let _signals = Signals::start(sender.clone())?;
-    terminal::listen(sender.clone())?;
+    let keys = terminal::listen(sender.clone())?;
     let size = screen.terminal.size()?;
     let app = App::new(Options {
         link: world.link.clone(),
@@ -100,6 +100,7 @@ pub fn run(world: World) -> io::Result<End> {
         world,
         clock,
         inputs,
+        keys,
         sender,
         answer,
         answers,
@@ -125,6 +126,8 @@ struct Console {
     world: World,
     clock: Clock,
     inputs: Receiver<host::Input>,
+    /// What the user does comes before anything else.
+    keys: Receiver<TerminalEvent>,
     sender: SyncSender<host::Input>,
     /// Where threads put what they found out; they wake the loop behind it.
     answer: Sender<Input>,
@@ -155,6 +158,7 @@ impl Console {
 
     fn serve(&mut self, screen: &mut Screen) -> io::Result<End> {
         let mut next_frame = Instant::ZERO;
+        let mut hurry = false;
         let effects = self.app.start();
         if self.perform(effects) {
             return Ok(End::Quit);
@@ -162,11 +166,14 @@ impl Console {
         loop {
             // Of the clock, also while a recording has a time of its own.
             let now = self.clock.now();
-            if self.app.is_dirty() && now >= next_frame {
+            // What a key changes is seen at once: a frame early, which the next one pays for.
+            let due = if hurry { Instant::ZERO + next_frame.since_start().saturating_sub(FRAME) } else { next_frame };
+            if self.app.is_dirty() && now >= due {
                 screen.terminal.draw(|frame| self.app.draw(frame))?;
                 self.app.drawn();
                 screen.set_mouse(self.app.wants_mouse())?;
-                next_frame = now + FRAME;
+                next_frame = next_frame.max(now) + FRAME;
+                hurry = false;
             }
             // A flood of inputs must not keep a timer from expiring.
             if self.timer_at().is_some_and(|due| due <= now) && self.handle(Input::Timeout) {
@@ -176,22 +183,21 @@ impl Console {
                 self.look_for_link();
             }
             self.play();
-            let due = self.app.is_dirty().then_some(next_frame);
+            if let Ok(event) = self.keys.try_recv() {
+                hurry = true;
+                if is_suspend(&event) && !self.app.passes_keys() {
+                    suspend(screen)?;
+                } else if self.handle(Input::Terminal(event)) {
+                    return Ok(End::Quit);
+                }
+                continue;
+            }
+            let due = self.app.is_dirty().then_some(due);
             let played = self.player.as_ref().and_then(|player| player.wake_at(now));
             let wake = [due, self.retry, played, self.timer_at()].into_iter().flatten().min();
             let wake = wake.unwrap_or(Instant::NEVER);
             let Some(input) = self.next_input(wake) else { continue };
             let leaves = match input {
-                host::Input::Terminal(event) => {
-                    // What a key changes is seen at once.
-                    next_frame = Instant::ZERO;
-                    if is_suspend(&event) && !self.app.passes_keys() {
-                        suspend(screen)?;
-                        false
-                    } else {
-                        self.handle(Input::Terminal(event))
-                    }
-                }
                 host::Input::Bytes { bytes, .. } => self.handle(Input::Bytes(bytes)),
                 host::Input::Gone(error) => {
                     let failure = (self.world.explain)(error);
