@@ -240,6 +240,12 @@ impl Dictionary {
         lines::draw(frame, head, heading.into_iter().chain([Line::styled(heads, theme.quiet())]));
         if rows.is_empty() {
             let text = match (view.product(), &view.dictionary) {
+                (_, Some(_)) if self.only == Only::Deviations && self.words.is_empty() => {
+                    "Nothing differs from the factory's. Esc shows everything again."
+                }
+                (_, Some(_)) if self.only == Only::Differences && self.words.is_empty() => {
+                    "Nothing differs between the two. Esc shows everything again."
+                }
                 (None, None) => {
                     "Nothing to show: the unit has not said what it is. V reads its dictionary all the same."
                 }

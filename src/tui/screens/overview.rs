@@ -246,7 +246,11 @@ pub fn without_values(scene: Scene) -> Vec<&'static str> {
             "Nothing has been heard from the unit.",
             "Check power and cable, then press M to ask again, or switch the unit off and on.",
         ],
-        (UnitState::Unknown | UnitState::Application, None) => {
+        (UnitState::Unknown, None) => vec![
+            "Something talks, but nothing that is known. Press 3 to see what it says.",
+            "Signs like ‹9b› mean another baud rate: the units have 115200, 8 data bits, no parity.",
+        ],
+        (UnitState::Application, None) => {
             vec!["The stream is off, so the unit sends no values.", "Press T to switch it on."]
         }
     }
