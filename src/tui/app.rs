@@ -642,7 +642,7 @@ impl App {
         }
         self.session = None;
         self.popup = Some(Popup::Waiting(format!("Opening {}.", super::visible::text(&link))));
-        self.view.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
+        self.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
         effects.push(Effect::OpenLink(link));
     }
 
@@ -650,8 +650,19 @@ impl App {
         effects.push(Effect::CloseLink);
         self.scrollback.note(self.now, "link closed".into());
         self.session = None;
-        self.view.begin_link(Link::default());
+        self.begin_link(Link::default());
         self.view.tell(Tone::Quiet, "The link is closed.");
+    }
+
+    /// Another link. Rows that go to a file go on if it is the same link again.
+    fn begin_link(&mut self, link: Link) {
+        let is_same = self.view.link.name == link.name;
+        let export = self.view.export.take();
+        self.view.begin_link(link);
+        self.view.export = export;
+        if !is_same {
+            self.end_export(None);
+        }
     }
 
     fn link_opened(&mut self, now: Instant, info: LinkInfo, effects: &mut Vec<Effect>) {
@@ -677,7 +688,7 @@ impl App {
         let session = if info.read_only { Session::of_recording } else { Session::new };
         self.session = Some(session(info.baud));
         self.start_of_day = info.start_of_day;
-        self.view.begin_link(Link {
+        self.begin_link(Link {
             name: Some(info.link),
             baud: info.baud,
             recording: info.recording,
@@ -811,7 +822,7 @@ impl App {
         self.dirty = true;
         if self.view.link.state == LinkState::Opening {
             self.session = None;
-            self.view.begin_link(Link::default());
+            self.begin_link(Link::default());
             self.popup = Some(Popup::Failed { title: "Not connected", failure });
         }
     }

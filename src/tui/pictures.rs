@@ -844,6 +844,24 @@ fn a_click_is_the_key_it_stands_on_and_the_wheel_moves() {
 }
 
 #[test]
+fn rows_go_on_to_their_file_when_the_same_link_is_back_and_end_with_another() {
+    let row = b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n";
+    let appended = |stage: &mut Stage| {
+        stage.wait(1000).bytes(row);
+        stage.asked().iter().any(|effect| matches!(effect, Effect::AppendFile { .. }))
+    };
+    let mut stage = Stage::streaming(SMALL);
+    stage.keys("6e").press(KeyCode::Enter).asked();
+    assert!(appended(&mut stage));
+    stage.lost().keys("c").opened("/dev/ttyUSB0");
+    assert!(appended(&mut stage), "the same link");
+    stage.wait(10_000).keys("1").press(KeyCode::Down).press(KeyCode::Enter);
+    assert!(stage.shows("rows are in axtc4co-stream-"), "{}", stage.picture());
+    stage.opened("/dev/ttyUSB1");
+    assert!(!appended(&mut stage), "another unit's rows are not mixed in");
+}
+
+#[test]
 fn only_an_emulated_unit_is_given_orders() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("9");
