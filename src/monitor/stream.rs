@@ -62,23 +62,12 @@ pub struct Channel {
 pub struct Fault {
     /// The channel's name.
     pub channel: String,
-    /// Open or short circuit.
-    pub kind: FaultKind,
+    /// Open or short circuit, or another reason why there is no value.
+    pub kind: Reading,
     /// First row that showed it.
     pub since: Instant,
     /// First row that did not.
     pub until: Option<Instant>,
-}
-
-/// What is wrong with a sensor's circuit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FaultKind {
-    /// Open circuit.
-    Open,
-    /// Short circuit.
-    Short,
-    /// The unit has no value for another reason.
-    Failed,
 }
 
 impl Stream {
@@ -105,13 +94,7 @@ impl Stream {
         self.late = false;
         for (channel, &reading) in self.channels.iter_mut().zip(&row.readings) {
             channel.read(at, reading);
-            let fault = match reading {
-                Reading::Open => Some(FaultKind::Open),
-                Reading::Short => Some(FaultKind::Short),
-                Reading::Error => Some(FaultKind::Failed),
-                Reading::Value(_) | Reading::Disabled => None,
-            };
-            note_fault(faults, &channel.name, fault, at);
+            note_fault(faults, &channel.name, Some(reading).filter(|reading| reading.is_fault()), at);
         }
     }
 
@@ -226,7 +209,7 @@ fn channel_names(product: Option<&Product>, count: usize) -> Vec<String> {
     }
 }
 
-fn note_fault(faults: &mut VecDeque<Fault>, channel: &str, seen: Option<FaultKind>, at: Instant) {
+fn note_fault(faults: &mut VecDeque<Fault>, channel: &str, seen: Option<Reading>, at: Instant) {
     let open = faults.iter_mut().find(|fault| fault.until.is_none() && fault.channel == channel);
     if open.as_ref().map(|fault| fault.kind) == seen {
         return;
@@ -266,7 +249,7 @@ mod tests {
         }
         let seen: Vec<_> = monitor.faults.iter().map(|f| (f.kind, f.since, f.until)).collect();
         let at = Instant::from_millis;
-        assert_eq!(seen, [(FaultKind::Short, at(3000), Some(at(4000))), (FaultKind::Open, at(1000), Some(at(3000)))]);
+        assert_eq!(seen, [(Reading::Short, at(3000), Some(at(4000))), (Reading::Open, at(1000), Some(at(3000)))]);
         assert_eq!((monitor.stream.channels[0].min, monitor.stream.channels[0].max), (Some(20.0), Some(21.0)));
     }
 

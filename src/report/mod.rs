@@ -7,10 +7,10 @@ mod curve;
 mod page;
 
 use crate::dump::Dump;
-use crate::monitor::{Fault, FaultKind, Monitor, Scrollback};
+use crate::monitor::{Fault, Monitor, Scrollback};
 use crate::session::{Facts, Known, Origin, UnitState};
 use crate::time::{Duration, Instant};
-use crate::wire::stream::{Reading, Source};
+use crate::wire::stream::Source;
 use page::Page;
 
 /// Lines of the transcript at most, the newest.
@@ -95,11 +95,7 @@ impl Contents<'_> {
     }
 
     fn fault(&self, fault: &Fault) -> [Cell; 4] {
-        let kind = match fault.kind {
-            FaultKind::Open => "open circuit",
-            FaultKind::Short => "short circuit",
-            FaultKind::Failed => "no reading",
-        };
+        let kind = fault.kind.words();
         let until = fault.until.map_or_else(|| "still there".to_owned(), |at| self.time(at));
         let cells = [fault.channel.clone(), kind.to_owned(), self.time(fault.since), until];
         if fault.until.is_none() { cells.map(Cell::bad) } else { cells.map(Cell::plain) }
@@ -118,13 +114,8 @@ impl Contents<'_> {
         page.paragraph(&format!("{} rows, the last at {}: {what}.", stream.rows, self.time(newest)));
         let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
         let rows = stream.channels.iter().map(|channel| {
-            let state = match channel.reading {
-                Reading::Value(_) => Cell::plain("ok"),
-                Reading::Disabled => Cell::plain("disabled"),
-                Reading::Open => Cell::bad("open circuit"),
-                Reading::Short => Cell::bad("short circuit"),
-                Reading::Error => Cell::bad("no reading"),
-            };
+            let words = channel.reading.words();
+            let state = if channel.reading.is_fault() { Cell::bad(words) } else { Cell::plain(words) };
             let [value, min, max, mean] = [channel.reading.value(), channel.min, channel.max, channel.mean()]
                 .map(|value| Cell::number(show(value)));
             [Cell::plain(&channel.name), value, state, min, max, mean]
@@ -240,7 +231,7 @@ mod tests {
     use crate::record::Span;
     use crate::session::Event;
     use crate::wire::Text;
-    use crate::wire::stream::Row;
+    use crate::wire::stream::{Reading, Row};
 
     #[test]
     fn nothing_a_device_sends_is_more_than_text() {

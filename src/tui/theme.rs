@@ -5,6 +5,8 @@
 
 use ratatui::style::{Color, Modifier, Style};
 
+use crate::wire::stream::Reading;
+
 /// How things look.
 #[derive(Clone, Copy, Debug)]
 pub struct Theme {
@@ -60,6 +62,15 @@ impl Theme {
     /// A message that must not be overlooked, such as a lost link.
     pub fn alarm(self) -> Style {
         self.bad().add_modifier(Modifier::REVERSED)
+    }
+
+    /// A channel's state.
+    pub fn state(self, reading: Reading) -> Style {
+        match reading {
+            Reading::Value(_) => self.good(),
+            Reading::Disabled => self.quiet(),
+            Reading::Open | Reading::Short | Reading::Error => self.bad(),
+        }
     }
 
     /// What we sent, in the terminal.

@@ -159,6 +159,22 @@ impl Reading {
         }
     }
 
+    /// In words for a person: `ok` or what is wrong.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Reading::Value(_) => "ok",
+            Reading::Disabled => "disabled",
+            Reading::Open => "open circuit",
+            Reading::Short => "short circuit",
+            Reading::Error => "no reading",
+        }
+    }
+
+    /// Whether something is wrong with the channel.
+    pub const fn is_fault(self) -> bool {
+        matches!(self, Reading::Open | Reading::Short | Reading::Error)
+    }
+
     /// As files name it: `ok` or why there is no number.
     pub const fn state(self) -> &'static str {
         match self {

@@ -19,7 +19,7 @@ use crate::tui::popup::Question;
 use crate::tui::view::View;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
-use crate::wire::stream::{Reading, Source};
+use crate::wire::stream::Source;
 
 /// Name on the tab.
 pub const TITLE: &str = "Bench";
@@ -237,13 +237,7 @@ impl Bench {
                 format!("{value:.*}", super::overview::decimals(scene.view, source))
             },
         );
-        let state = channel.map_or("", |channel| match channel.reading {
-            Reading::Value(_) => "ok",
-            Reading::Disabled => "disabled",
-            Reading::Open => "open circuit",
-            Reading::Short => "short circuit",
-            Reading::Error => "no reading",
-        });
+        let state = channel.map_or("", |channel| channel.reading.words());
         let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, place + 1);
         Line::from(vec![
             Span::styled(name, if is_chosen { theme.strong() } else { Style::new() }),

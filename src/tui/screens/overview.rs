@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::{Scene, terminal};
-use crate::monitor::{Channel, Fault, FaultKind};
+use crate::monitor::{Channel, Fault};
 use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
 use crate::tui::action::Action;
@@ -16,7 +16,7 @@ use crate::tui::visible;
 use crate::tui::widgets::chart::{self, Curve};
 use crate::tui::widgets::spark::sparkline;
 use crate::tui::widgets::{format, lines};
-use crate::wire::stream::{Reading, Source};
+use crate::wire::stream::Source;
 
 /// Name on the tab.
 pub const TITLE: &str = "Overview";
@@ -270,13 +270,11 @@ fn value_row(
         Source::FieldValue => " °C",
         Source::ProcessValue => "   ",
     };
-    let (value, state, style) = match channel.reading {
-        Reading::Value(value) => (format!("{}{unit}", number(Some(value))), "ok", theme.good()),
-        Reading::Disabled => ("-   ".into(), "disabled", theme.quiet()),
-        Reading::Open => ("-   ".into(), "open circuit", theme.bad()),
-        Reading::Short => ("-   ".into(), "short circuit", theme.bad()),
-        Reading::Error => ("-   ".into(), "no reading", theme.bad()),
+    let value = match channel.reading.value() {
+        Some(value) => format!("{}{unit}", number(Some(value))),
+        None => "-   ".into(),
     };
+    let (state, style) = (channel.reading.words(), theme.state(channel.reading));
     let span = LEAST_SPAN[usize::from(source == Source::ProcessValue)];
     let newest = channel.history.len().saturating_sub(room);
     let values: Vec<_> = channel.history.range(newest..).map(|&(_, reading)| reading.value()).collect();
@@ -345,11 +343,7 @@ fn listed(scene: Scene) -> Vec<Line<'static>> {
 fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
     let theme = scene.theme;
     let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
-    let kind = match fault.kind {
-        FaultKind::Open => "open circuit",
-        FaultKind::Short => "short circuit",
-        FaultKind::Failed => "no reading",
-    };
+    let kind = fault.kind.words();
     let name = Span::raw(format!("    {:<8}", fault.channel));
     match fault.until {
         None => Line::from(vec![

@@ -238,14 +238,7 @@ impl Stream {
 
 /// A reading's state as a person reads it.
 fn state(theme: Theme, reading: Option<Reading>) -> (&'static str, Style) {
-    match reading {
-        None => ("not kept", theme.quiet()),
-        Some(Reading::Value(_)) => ("ok", theme.good()),
-        Some(Reading::Disabled) => ("disabled", theme.quiet()),
-        Some(Reading::Open) => ("open circuit", theme.bad()),
-        Some(Reading::Short) => ("short circuit", theme.bad()),
-        Some(Reading::Error) => ("no reading", theme.bad()),
-    }
+    reading.map_or(("not kept", theme.quiet()), |reading| (reading.words(), theme.state(reading)))
 }
 
 /// What has to be said below the table: where rows go, or that none come.
