@@ -287,4 +287,11 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn every_explanation_fits_on_the_help_page_at_80_columns() {
+        let all = ScreenId::ALL.iter().flat_map(|screen| screen.bindings()).chain(MENU).chain(EVERYWHERE);
+        let long: Vec<&str> = all.map(|binding| binding.long).filter(|long| long.chars().count() > 62).collect();
+        assert_eq!(long, [""; 0]);
+    }
 }

@@ -64,7 +64,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('/'))],
         cmd: Cmd::Type,
         short: "order",
-        long: "type any order, as on the input of axcon emulate: fault, nmt, write, heal ...",
+        long: "type any order of axcon emulate: fault, nmt, write, heal ...",
     },
 ];
 

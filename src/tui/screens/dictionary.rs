@@ -36,13 +36,13 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('/'))],
         cmd: Cmd::Find,
         short: "find",
-        long: "show only what has these words in address, name, value or meaning",
+        long: "only what has these words in address, name, value, meaning",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('o'))],
         cmd: Cmd::Only,
         short: "only",
-        long: "everything, only what differs from the factory's, only what differs from the other dump",
+        long: "everything, only deviations, only what differs from the dump",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('w'))],

@@ -39,13 +39,13 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Enter)],
         cmd: Cmd::Accept,
         short: "go on",
-        long: "open the folder, check the file, start the upload, close the report",
+        long: "open the folder, check the file, start the upload, go back",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Esc), Press::Plain(KeyCode::Backspace)],
         cmd: Cmd::Back,
         short: "back",
-        long: "folder above, other file; while loading: cancel, after a question",
+        long: "folder above, other file; while loading: cancel",
     },
     Binding { keys: &[Press::Plain(KeyCode::Char('p'))], cmd: Cmd::Type, short: "path", long: "type a path" },
     Binding {

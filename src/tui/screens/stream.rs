@@ -31,19 +31,19 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('z'))],
         cmd: Cmd::Zoom,
         short: "zoom",
-        long: "the chart's time: 1 minute, 10 minutes, 1 hour, 8 hours, everything",
+        long: "the chart's time: 1 or 10 minutes, 1 or 8 hours, everything",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char(' '))],
         cmd: Cmd::Pause,
         short: "pause",
-        long: "hold the picture, or let it follow again; rows are taken in meanwhile",
+        long: "hold the picture, or let it follow; rows come in meanwhile",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Left)],
         cmd: Cmd::Left,
         short: "",
-        long: "hold the picture, and move the cursor to an earlier moment",
+        long: "hold the picture, cursor to an earlier moment",
     },
     Binding { keys: &[Press::Plain(KeyCode::Right)], cmd: Cmd::Right, short: "", long: "cursor to a later moment" },
     Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "", long: "follow the newest row again" },
@@ -63,7 +63,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('e'))],
         cmd: Cmd::Export,
         short: "export",
-        long: "write the rows kept and all that come to a CSV file; again: stop",
+        long: "write rows kept and all that come to a CSV file; again: stop",
     },
 ];
 
