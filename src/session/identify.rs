@@ -79,6 +79,11 @@ impl Work for Identify {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
             Signal::Begin => {
+                // Among noise there is an XOFF sooner or later, and nobody who would take it back.
+                if desk.facts.state == UnitState::Unknown && desk.transmitter.held_since().is_some() {
+                    desk.transmitter.hold(desk.now, false);
+                    desk.events.push_back(Event::Held(false));
+                }
                 desk.facts.state = UnitState::Silent;
                 self.ask(desk);
                 None

@@ -37,6 +37,25 @@ fn a_unit_that_stands_in_a_dialogue_is_found_all_the_same() {
 }
 
 #[test]
+fn an_xoff_in_noise_keeps_nobody_from_asking_again() {
+    let mut session = Session::new(115_200);
+    let mut now = Instant::from_millis(1);
+    for round in 1..=2 {
+        session.command(now, Command::Identify).expect("taken");
+        // Held by it, the rest of the questions waits, but the next time it is asked at once.
+        let question = session.poll_transmit();
+        assert!(question.is_some(), "round {round}");
+        session.handle_bytes(now, b"\xf3\x13\xe1zq#\r\n");
+        while session.job().is_some() {
+            while session.poll_transmit().is_some() {}
+            now = session.poll_timeout().expect("a question has its time").max(now);
+            session.handle_timeout(now);
+        }
+        assert_eq!(session.facts().state, UnitState::Unknown, "round {round}");
+    }
+}
+
+#[test]
 fn the_stream_is_switched_on_read_and_switched_off() {
     for source in [Source::FieldValue, Source::ProcessValue] {
         let mut bench = Bench::new();
