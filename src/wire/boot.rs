@@ -121,11 +121,16 @@ fn error(line: &str, words: &Words) -> Option<LoaderError> {
     let code = words.iter().nth(1)?;
     let digits = code.strip_prefix("0x").unwrap_or(code);
     if line.contains(':') {
-        u16::from_str_radix(digits, 16).ok().map(LoaderError::Status)
+        // Four digits, no less: "Error: bad" is a word.
+        let status = u16::from_str_radix(digits, 16).ok().filter(|_| digits.len() == STATUS_DIGITS);
+        status.map(LoaderError::Status)
     } else {
         number(code).and_then(|code| u32::try_from(code).ok()).map(LoaderError::Number)
     }
 }
+
+/// Hexadecimal digits of a status word.
+const STATUS_DIGITS: usize = 4;
 
 #[cfg(test)]
 mod tests {
@@ -156,6 +161,8 @@ mod tests {
             ("Error count 0", None),
             ("Error register 00h", None),
             ("Errors: 3", None),
+            ("Error: Bad password", None),
+            ("Error: 3", None),
             ("AXTC4CO V1.1.0", None),
         ];
         for (line, expected) in table {

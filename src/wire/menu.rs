@@ -106,17 +106,69 @@ pub(super) fn software(words: &Words, products: &[&str]) -> Option<SoftwareName>
         .iter()
         .find(|product| words.iter().any(|word| word.eq_ignore_ascii_case(product)))
         .map(|product| (*product).to_owned());
-    let other = ["hardware", "loader", "bootloader", "boot", "protocol", "canopen", "profile", "manual", "board"];
-    let own = ["software", "firmware", "application", "program", "fw", "sw"];
-    let version = words.iter().find_map(|word| word.parse::<Version>().ok());
-    let speaks_of_other = words.has_any(&other) && !words.has_any(&own) && product.is_none();
-    let version = version.filter(|_| !speaks_of_other);
-    let confidence = match (&product, words.has_any(&own)) {
-        (Some(_), _) => Confidence::WithProduct,
-        (None, true) => Confidence::Named,
-        (None, false) => Confidence::Bare,
+    let mut found: Option<(Confidence, Version)> = None;
+    for (at, word) in words.iter().enumerate() {
+        let Ok(version) = word.parse::<Version>() else { continue };
+        let own = match subject(words, at, product.as_deref()) {
+            Some(Subject::Other) => continue,
+            Some(Subject::Own) => true,
+            Some(Subject::Product) | None => false,
+        };
+        let confidence = match (&product, own) {
+            (Some(_), _) => Confidence::WithProduct,
+            (None, true) => Confidence::Named,
+            (None, false) => Confidence::Bare,
+        };
+        // "AXTC4CO 2.0.1, software 1.2.0": what is called software wins, else what comes first.
+        if own {
+            found = Some((confidence, version));
+            break;
+        }
+        found = found.or(Some((confidence, version)));
+    }
+    let confidence = match (found, &product) {
+        (Some((confidence, _)), _) => confidence,
+        (None, Some(_)) => Confidence::WithProduct,
+        (None, None) => return None,
     };
-    (product.is_some() || version.is_some()).then_some(SoftwareName { product, version, confidence })
+    Some(SoftwareName { product, version: found.map(|(_, version)| version), confidence })
+}
+
+/// What a version is that of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Subject {
+    /// The application.
+    Own,
+    /// Whatever has the product's name.
+    Product,
+    /// Something else.
+    Other,
+}
+
+/// What the version at this place in a line is that of: what was named last before it, or first behind it.
+fn subject(words: &Words, version_at: usize, product: Option<&str>) -> Option<Subject> {
+    let own = ["software", "firmware", "application", "program", "fw", "sw"];
+    let other = ["hardware", "hw", "loader", "bootloader", "boot", "protocol", "profile", "manual", "board"];
+    let of = |word: &str| {
+        let any = |beginnings: &[&str]| beginnings.iter().any(|beginning| word.starts_with(beginning));
+        if product.is_some_and(|product| product.eq_ignore_ascii_case(word)) {
+            Some(Subject::Product)
+        } else if any(&own) {
+            Some(Subject::Own)
+        // Beside a product's name it says what kind of product that is.
+        } else if any(&other) || (product.is_none() && word.starts_with("canopen")) {
+            Some(Subject::Other)
+        } else {
+            None
+        }
+    };
+    let before = || words.iter().take(version_at).filter_map(of).last();
+    let behind = || words.iter().skip(version_at + 1).find_map(of);
+    // "V1.0.0 boot loader, V1.2.0 application": where a version comes first, each is that of what stands behind it.
+    let leads = words
+        .iter()
+        .find_map(|word| if word.parse::<Version>().is_ok() { Some(true) } else { of(word).map(|_| false) });
+    if leads == Some(true) { behind().or_else(before) } else { before().or_else(behind) }
 }
 
 /// Network variables a line names.
@@ -137,9 +189,32 @@ pub(super) fn network(line: &str, words: &Words) -> Option<Network> {
 
 /// Whether the unit says no to what was typed.
 pub(super) fn is_refusal(words: &Words) -> bool {
-    words.has_any(&["wrong", "invalid", "incorrect", "denied", "refused", "illegal", "rejected"])
-        || (words.has_any(&["not", "only"]) && words.has_any(&["allowed", "accepted", "available", "possible", "pre"]))
+    if words.has_any(&["wrong", "invalid", "incorrect", "denied", "refused", "illegal", "rejected"]) {
+        return true;
+    }
+    if words.iter().any(|word| matches!(word, "cancelled" | "canceled" | "aborted" | "unchanged")) {
+        return true;
+    }
+    // "Not in pre-operational state", "only available in ...": close by, or it is said of something else ("Do not switch
+    // off, preparing to restart").
+    let list: Vec<&str> = words.iter().collect();
+    let denies = |word: &str| {
+        matches!(word, "allowed" | "accepted" | "available" | "possible" | "permitted" | "pre")
+            || word.starts_with("preop")
+    };
+    list.iter().enumerate().any(|(at, word)| {
+        let behind = list[at + 1..].iter().take(REFUSAL_REACH);
+        let before = list[..at].iter().rev().take(REFUSAL_REACH);
+        match *word {
+            "not" => behind.into_iter().any(|word| denies(word)),
+            "only" => behind.chain(before).any(|word| denies(word)),
+            _ => false,
+        }
+    })
 }
+
+/// Words behind "not", and on either side of "only", within which it is said what is not so.
+const REFUSAL_REACH: usize = 3;
 
 fn speaks_of_serial_line(words: &Words) -> bool {
     words.has_any(&["rs", "rs232", "serial", "uart", "115200"])
@@ -227,6 +302,15 @@ mod tests {
             ("Boot loader V1.0.0", None),
             ("CANopen stack 4.2.0", None),
             ("Node-ID 127", None),
+            ("AXTC4CO Hardware V2.0.1", Some((Some("AXTC4CO"), None, Confidence::WithProduct))),
+            ("AXTC4CO Boot V1.0.0", Some((Some("AXTC4CO"), None, Confidence::WithProduct))),
+            ("AXTC4CO CANopen scanner 1.1.0", Some((Some("AXTC4CO"), Some((1, 1, 0)), Confidence::WithProduct))),
+            (
+                "AXTC4CO Hardware 2.0.1 Software 1.2.0",
+                Some((Some("AXTC4CO"), Some((1, 2, 0)), Confidence::WithProduct)),
+            ),
+            ("AXTC4CO 2.0.1 (software 1.2.0)", Some((Some("AXTC4CO"), Some((1, 2, 0)), Confidence::WithProduct))),
+            ("V1.0.0 boot loader, V1.2.0 application", Some((None, Some((1, 2, 0)), Confidence::Named))),
         ];
         for (line, expected) in table {
             let found =
@@ -235,6 +319,30 @@ mod tests {
                 (product.map(String::from), version.map(|(a, b, c)| Version::new(a, b, c)), confidence)
             });
             assert_eq!(found, expected, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn a_refusal_says_close_by_what_is_not_so() {
+        for line in [
+            "Wrong password",
+            "Not in pre-operational state",
+            "Only in Pre-Operational state!",
+            "This is not allowed now",
+            "View is not currently possible",
+            "Available only in preoperational state",
+            "The dictionary shows in Pre-Operational state only",
+            "Cancelled, the dictionary is unchanged.",
+        ] {
+            assert!(is_refusal(&Words::of(line)), "{line:?}");
+        }
+        for line in [
+            "Password accepted. Do not switch off",
+            "Do not switch off, preparing bootloader",
+            "Note: press Enter for the next object",
+            "The previous object is not shown",
+        ] {
+            assert!(!is_refusal(&Words::of(line)), "{line:?}");
         }
     }
 

@@ -19,7 +19,7 @@ pub use framer::{Framer, Item, LONGEST_LINE, Text, XOFF, XON};
 pub use menu::{Confidence, MenuKey, Network, NmtState, SoftwareName};
 pub use prompt::{Prompt, SourceKeys};
 
-use stream::{Layout, Row};
+use stream::{Layout, Row, Source};
 
 /// What a line means.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,6 +86,14 @@ impl Vocabulary<'_> {
             return Message::Network(network);
         }
         Message::Text
+    }
+
+    /// A row without a number that looks the same from either source, as one of `source`.
+    pub fn row_as(&self, line: &str, row: &Row, source: Source) -> Option<Row> {
+        if row.source == source || row.readings.iter().any(|reading| reading.value().is_some()) {
+            return None;
+        }
+        self.layouts.iter().find_map(|layout| layout.parse_as(source, line))
     }
 
     /// Whether a text without a line end asks for the password. Asked with every byte that comes, so cheap where it does

@@ -39,7 +39,8 @@ pub(super) fn recognise(text: &str, words: &Words) -> Option<Prompt> {
         Some(_) => return None,
         None => {}
     }
-    if words.has_any(&["password", "passcode", "pwd"]) {
+    // The echo of the key may stand before it: "lPassword:".
+    if words.iter().any(|word| ["password", "passcode", "pwd"].iter().any(|asked| word.contains(asked))) {
         return Some(Prompt::Password);
     }
     let joined = Words::joined(text);
@@ -135,6 +136,7 @@ mod tests {
         let table = [
             ("Password: ", Some(Prompt::Password)),
             ("Enter the password >", Some(Prompt::Password)),
+            ("lPassword: ", Some(Prompt::Password)),
             ("(F)ield value or (P)rocess value? ", keys('f', 'p')),
             ("1=FV 6100h, 2=PV 7130h: ", keys('1', '2')),
             ("Send field value (1) or process value (2)? ", keys('1', '2')),

@@ -122,7 +122,8 @@ impl Layout {
         }
     }
 
-    fn parse_as(&self, source: Source, line: &str) -> Option<Row> {
+    /// Reads a line as a row of this source, if it is exactly one.
+    pub(super) fn parse_as(&self, source: Source, line: &str) -> Option<Row> {
         let format = self.format(source);
         let fields: Vec<&str> = line.split(';').collect();
         if fields.len() != self.channels.len() {
