@@ -199,6 +199,11 @@ impl Product {
         }
     }
 
+    /// The same with another loader than the product is believed to have.
+    pub fn target_with(&self, loader: LoaderKind) -> Target {
+        Target { outside: loader.outside(), ..self.target() }
+    }
+
     /// What the upload file of a version is called.
     pub fn file_name(&self, version: Version) -> String {
         self.loader.file_name.replace("{version}", &version.to_string())

@@ -121,13 +121,15 @@ pub enum DefectId {
     UnknownProduct,
     /// The image is for another product.
     WrongProduct,
+    /// The unit runs newer software.
+    Downgrade,
     /// The file's name says something else than its content.
     FileName,
 }
 
 impl DefectId {
     /// All defects, in the order of the documentation.
-    pub const ALL: [DefectId; 48] = [
+    pub const ALL: [DefectId; 49] = [
         DefectId::EmptyFile,
         DefectId::NotSRecord,
         DefectId::TooLarge,
@@ -175,6 +177,7 @@ impl DefectId {
         DefectId::IdentityCrc,
         DefectId::UnknownProduct,
         DefectId::WrongProduct,
+        DefectId::Downgrade,
         DefectId::FileName,
     ];
 
@@ -228,6 +231,7 @@ impl DefectId {
             DefectId::IdentityCrc => "identity-crc",
             DefectId::UnknownProduct => "unknown-product",
             DefectId::WrongProduct => "wrong-product",
+            DefectId::Downgrade => "downgrade",
             DefectId::FileName => "file-name",
         }
     }
@@ -282,7 +286,8 @@ impl DefectId {
             | DefectId::IdentityMalformed
             | DefectId::IdentityCrc
             | DefectId::UnknownProduct
-            | DefectId::WrongProduct => Severity::Error,
+            | DefectId::WrongProduct
+            | DefectId::Downgrade => Severity::Error,
         }
     }
 

@@ -64,6 +64,7 @@ pub fn flaws() -> impl Iterator<Item = DefectId> {
                 | DefectId::MissingEntry
                 | DefectId::DuplicateEntry
                 | DefectId::WrongProduct
+                | DefectId::Downgrade
                 | DefectId::FileName
         )
     })
@@ -298,6 +299,7 @@ impl Draft {
             | DefectId::MissingEntry
             | DefectId::DuplicateEntry
             | DefectId::WrongProduct
+            | DefectId::Downgrade
             | DefectId::FileName => {}
         }
     }

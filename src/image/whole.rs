@@ -122,7 +122,7 @@ impl Whole<'_> {
 }
 
 /// What the image is judged for.
-struct Judged {
+pub(super) struct Judged {
     product: Option<String>,
     flash: Option<super::FlashMap>,
     boot: Option<AddressRange>,
@@ -135,12 +135,7 @@ fn target(request: &Request<'_>, identity: Option<&Identity>) -> Judged {
     let claimed = claim(request).map(|(product, _)| product);
     let names = [identity.map(|identity| identity.product.as_str()), request.expected, claimed];
     match names.into_iter().flatten().find_map(|name| named(request.targets, name)) {
-        Some(target) => Judged {
-            product: Some(target.product.clone()),
-            flash: Some(target.flash),
-            boot: target.boot,
-            outside: target.outside,
-        },
+        Some(target) => Judged::of(target),
         None => {
             let largest = request.targets.iter().max_by_key(|target| target.flash.program_words);
             let flash = largest.map(|target| target.flash);
@@ -254,17 +249,27 @@ fn overlaps(content: &Content, by_address: &[Piece], column: usize, findings: &m
 }
 
 impl Judged {
+    /// A product's own flash and loader.
+    pub(super) fn of(target: &Target) -> Self {
+        Judged {
+            product: Some(target.product.clone()),
+            flash: Some(target.flash),
+            boot: target.boot,
+            outside: target.outside,
+        }
+    }
+
     /// Whether the address carries a mark for data memory: the linker's, or the one of a loader that knows such.
-    fn is_data_memory(&self, piece: &Piece) -> bool {
+    pub(super) fn is_data_memory(&self, address: u32) -> bool {
         let mark_of_loader = match self.outside {
-            Outside::Folds | Outside::Unknown => piece.address >> 16 == DATA_HIGH_HALF,
+            Outside::Folds | Outside::Unknown => address >> 16 == DATA_HIGH_HALF,
             Outside::Refuses => false,
         };
-        piece.address >> 24 == DATA_MEMORY >> 24 || mark_of_loader
+        address >> 24 == DATA_MEMORY >> 24 || mark_of_loader
     }
 
     /// What becomes of data outside of the program flash, from this address on.
-    fn fate(&self, start: u64, flash_end: u64) -> String {
+    pub(super) fn fate(&self, start: u64, flash_end: u64) -> String {
         let folded = address(start % flash_end);
         match self.outside {
             Outside::Folds if start >> 16 < u64::from(DATA_HIGH_HALF) => {
@@ -278,7 +283,7 @@ impl Judged {
 }
 
 fn data_memory(content: &Content, target: &Judged, column: usize, findings: &mut Findings) {
-    let flagged = content.pieces.iter().copied().filter(|piece| target.is_data_memory(piece));
+    let flagged = content.pieces.iter().copied().filter(|piece| target.is_data_memory(piece.address));
     runs(content, flagged, |line, run| {
         findings.note(DefectId::DataMemory, line, column, || {
             format!(
@@ -295,7 +300,7 @@ fn elsewhere(content: &Content, target: &Judged, flash_end: u64, column: usize, 
     let in_boot = |span: &AddressRange| target.boot.is_some_and(|boot| span.start < boot.end && boot.start < span.end);
     let outside = |piece: &Piece| {
         let span = span(content, piece);
-        span.end > flash_end && span.end <= ADDRESSES && !target.is_data_memory(piece)
+        span.end > flash_end && span.end <= ADDRESSES && !target.is_data_memory(piece.address)
     };
     let pieces = || content.pieces.iter().copied().filter(outside);
     runs(content, pieces().filter(|piece| in_boot(&span(content, piece))), |line, run| {

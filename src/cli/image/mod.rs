@@ -104,11 +104,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 
 fn check(args: &CheckArgs, output: &mut Output) -> Result<(), CliError> {
     let expected = args.product.map(|product| product.name.as_str());
-    let mut targets = targets();
-    if let Some(loader) = args.loader {
-        targets.iter_mut().for_each(|target| target.outside = loader.outside());
-    }
-    let report = read_for(&args.file, &targets, expected, &args.allow)?;
+    let report = read_for(&args.file, &targets_with(args.loader), expected, &args.allow)?;
     let name = shown(&args.file);
     if output.json {
         output.object(&ImageObject::new(&report, &name))?;
@@ -156,7 +152,16 @@ pub fn read(path: &Path, expected: Option<&str>, allow: &[DefectId]) -> Result<R
     read_for(path, &targets(), expected, allow)
 }
 
-fn read_for(path: &Path, targets: &[Target], expected: Option<&str>, allow: &[DefectId]) -> Result<Report, CliError> {
+/// The same, judged for these units and their loaders.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_for(
+    path: &Path,
+    targets: &[Target],
+    expected: Option<&str>,
+    allow: &[DefectId],
+) -> Result<Report, CliError> {
     if path == Path::new("-") {
         return checked(io::stdin().lock(), path, targets, expected, allow);
     }
@@ -194,7 +199,12 @@ fn unreadable(path: &Path, error: io::Error) -> CliError {
 }
 
 fn targets() -> Vec<Target> {
-    Product::all().iter().map(Product::target).collect()
+    targets_with(None)
+}
+
+/// All products, with this loader instead of their own if one is given.
+pub fn targets_with(loader: Option<LoaderKind>) -> Vec<Target> {
+    Product::all().iter().map(|product| product.target_with(loader.unwrap_or(product.loader.kind))).collect()
 }
 
 pub(super) fn product(name: &str) -> Result<&'static Product, String> {

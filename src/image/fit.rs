@@ -1,0 +1,165 @@
+//! Whether a sound image is right for the unit it is about to be sent to.
+//!
+//! A file is checked before anybody knows the unit: for the product it names, or for whatever it may be. The unit's own
+//! flash, its loader, and the software that runs in it now are known later, and decide.
+
+use super::defect::DefectId;
+use super::report::{AddressRange, CheckedImage};
+use super::whole::Judged;
+use super::{AddressUnit, Target};
+use crate::version::Version;
+
+/// Why an image should not be sent to a unit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Misfit {
+    /// Its name, by which it can be allowed.
+    pub id: DefectId,
+    /// What is wrong, in words.
+    pub message: String,
+}
+
+impl CheckedImage {
+    /// What speaks against sending this image to such a unit, which runs `version` now if that is known. Each kind of
+    /// misfit once; those that were allowed when the file was checked are none.
+    pub fn misfits(&self, unit: &Target, version: Option<Version>) -> Vec<Misfit> {
+        let mut misfits: Vec<Misfit> = Vec::new();
+        let mut note = |id: DefectId, message: &dyn Fn() -> String| {
+            if !self.overridden().contains(&id) && misfits.iter().all(|misfit| misfit.id != id) {
+                misfits.push(Misfit { id, message: message() });
+            }
+        };
+        let product = &unit.product;
+        if let Some(identity) = self.identity() {
+            let is_known_stranger = self.overridden().contains(&DefectId::UnknownProduct);
+            if !identity.product.eq_ignore_ascii_case(product) && !is_known_stranger {
+                note(DefectId::WrongProduct, &|| {
+                    format!("the image is for {}, the unit is an {product}", identity.product)
+                });
+            }
+            if let Some(runs) = version.filter(|&runs| identity.version < runs) {
+                note(DefectId::Downgrade, &|| {
+                    format!("the image is V{}, older than the V{runs} that the unit runs", identity.version)
+                });
+            }
+        }
+        let image = self.image();
+        if image.address_unit != unit.flash.address_unit {
+            note(DefectId::AddressUnit, &|| {
+                let (seen, wanted) = match image.address_unit {
+                    AddressUnit::Byte => ("bytes", "words"),
+                    AddressUnit::Word => ("words", "bytes"),
+                };
+                format!("the image's addresses count {seen}, the {product}'s count {wanted}")
+            });
+            return misfits;
+        }
+        let judged = Judged::of(unit);
+        let end = unit.flash.end();
+        for block in &image.blocks {
+            let start = u64::from(block.address);
+            let range = AddressRange { start, end: start + image.address_unit.addresses(block.data.len()) };
+            let is_boot = unit.boot.is_some_and(|boot| range.start < boot.end && boot.start < range.end);
+            let id = if judged.is_data_memory(block.address) {
+                DefectId::DataMemory
+            } else if range.end <= end {
+                continue;
+            } else if is_boot {
+                DefectId::BootFlash
+            } else {
+                DefectId::OutOfRange
+            };
+            note(id, &|| {
+                let first = if range.start < end { end } else { range.start };
+                format!("address 0x{first:X} is outside the {product}'s program flash; {}", judged.fate(first, end))
+            });
+        }
+        misfits
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{FlashMap, Outside, check, make};
+
+    /// A unit with so much flash and its boot flash behind it.
+    fn unit(product: &str, program_words: u32, outside: Outside) -> Target {
+        let start = u64::from(program_words) * 2;
+        Target {
+            product: product.into(),
+            flash: FlashMap { address_unit: AddressUnit::Word, program_words, page_words: 256 },
+            file_name: format!("{product}_V{{version}}.elf.S"),
+            boot: Some(AddressRange { start, end: start + 0x1000 }),
+            outside,
+        }
+    }
+
+    fn small() -> Target {
+        unit("AXSMALL", 0x1_0000, Outside::Folds)
+    }
+
+    fn large() -> Target {
+        unit("AXLARGE", 0x4_0000, Outside::Refuses)
+    }
+
+    fn image(target: &Target, words: u32, allow: &[DefectId]) -> CheckedImage {
+        let recipe = make::Recipe { target, version: Version::new(1, 2, 0), words, flaw: None };
+        let file = make::make(&recipe).expect("an image");
+        let report = check(file.as_slice(), None, &[small(), large()], Some("AXSMALL"), allow).expect("a slice");
+        report.image().unwrap_or_else(|| panic!("{:?}", report.defects))
+    }
+
+    fn ids(misfits: &[Misfit]) -> Vec<&'static str> {
+        misfits.iter().map(|misfit| misfit.id.name()).collect()
+    }
+
+    const OTHER: &[DefectId] = &[DefectId::WrongProduct];
+
+    #[test]
+    fn an_image_fits_its_own_product_and_no_smaller_flash() {
+        assert_eq!(image(&small(), 600, &[]).misfits(&small(), None), []);
+        assert_eq!(ids(&image(&small(), 600, &[]).misfits(&large(), None)), ["wrong-product"]);
+        let large_one = image(&large(), 0x1_2000, OTHER);
+        assert_eq!(
+            ids(&large_one.misfits(&small(), None)),
+            ["out-of-range"],
+            "the other product was allowed, this not"
+        );
+        assert_eq!(large_one.misfits(&large(), None), []);
+    }
+
+    #[test]
+    fn what_the_loader_would_do_is_said_of_the_loader_the_unit_has() {
+        let image = image(&large(), 0x2_0010, OTHER);
+        let said = |outside, id| {
+            let misfits = image.misfits(&unit("AXSMALL", 0x1_0000, outside), None);
+            misfits.into_iter().find(|misfit| misfit.id == id).map(|misfit| misfit.message)
+        };
+        let of = |address: &str, fate: &str| {
+            Some(format!("address {address} is outside the AXSMALL's program flash; the loader {fate}"))
+        };
+        assert_eq!(
+            said(Outside::Folds, DefectId::OutOfRange),
+            of("0x10000", "folds that to 0x0000 over the program, silently")
+        );
+        assert_eq!(
+            said(Outside::Folds, DefectId::BootFlash),
+            of("0x20000", "folds that to 0x0000 over the program, silently")
+        );
+        assert_eq!(
+            said(Outside::Refuses, DefectId::OutOfRange),
+            of("0x10000", "stops there, with the old program erased")
+        );
+    }
+
+    #[test]
+    fn older_software_than_what_runs_is_told() {
+        let image = image(&small(), 600, &[]);
+        for (major, minor, patch, expected) in
+            [(1, 1, 9, &[][..]), (1, 2, 0, &[]), (1, 2, 1, &["downgrade"]), (2, 0, 0, &["downgrade"])]
+        {
+            let runs = Version::new(major, minor, patch);
+            assert_eq!(ids(&image.misfits(&small(), Some(runs))), expected, "{runs}");
+        }
+    }
+}
