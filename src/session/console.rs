@@ -16,6 +16,10 @@ const ANSWER: Duration = Duration::from_millis(1500);
 const KEY_ALONE: Duration = Duration::from_millis(400);
 /// How long after T a line without a question means "switched off".
 const NO_QUESTION: Duration = Duration::from_millis(400);
+/// How long after T rows may still come that were on their way: those an adapter and the unit's own buffer held.
+const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
+/// How often T is pressed to switch the stream off: it may be lost on the line.
+const MOST_TOGGLES: u32 = 3;
 /// No values come for 3 s after power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO): rows may take that long.
 const FIRST_VALUES: Duration = Duration::from_secs(6);
 /// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
@@ -145,15 +149,25 @@ impl Work for StreamOn {
 /// Switches the stream off.
 #[derive(Debug, Default)]
 pub(super) struct StreamOff {
+    toggled_at: Instant,
+    toggles: u32,
     deadline: Option<Instant>,
+}
+
+impl StreamOff {
+    fn toggle(&mut self, desk: &mut Desk<'_>) {
+        desk.send(b"t");
+        self.toggled_at = desk.now;
+        self.toggles += 1;
+        self.deadline = Some(desk.now + ANSWER);
+    }
 }
 
 impl Work for StreamOff {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
             Signal::Begin => {
-                desk.send(b"t");
-                self.deadline = Some(desk.now + ANSWER);
+                self.toggle(desk);
                 None
             }
             // A question: it was off already, and shall stay so.
@@ -162,7 +176,15 @@ impl Work for StreamOff {
                 desk.facts.stream = None;
                 Some(Outcome::Done(Job::StreamOff))
             }
-            Signal::Heard(_, Message::Row(_)) => None,
+            Signal::Heard(_, Message::Row(_)) if desk.now < self.toggled_at + ROWS_ON_THEIR_WAY => None,
+            Signal::Heard(_, Message::Row(_)) if self.toggles < MOST_TOGGLES => {
+                self.toggle(desk);
+                None
+            }
+            Signal::Heard(text, Message::Row(_)) => {
+                let awaited = "that the stream is off";
+                Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: Some(text.span) })
+            }
             Signal::Heard(..) => {
                 let soon = desk.now + NO_QUESTION;
                 self.deadline = self.deadline.map(|deadline| deadline.min(soon));
@@ -217,6 +239,10 @@ impl Work for RestoreDefaults {
                         self.confirmed = true;
                         self.deadline = Some(desk.now + RESET);
                         None
+                    }
+                    Message::Refusal if self.confirmed => {
+                        let reason = "the unit did not restore its defaults".into();
+                        Some(Outcome::Refused { job: Job::RestoreDefaults, reason, heard: self.heard })
                     }
                     // Only the banner shows that the unit has reset itself.
                     Message::Software(name) if self.confirmed && name.product.is_some() => {

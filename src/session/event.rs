@@ -5,7 +5,7 @@
 use super::flaw::Flaw;
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::LoaderKind;
-use crate::image::CheckedImage;
+use crate::image::{CheckedImage, DefectId};
 use crate::record::Span;
 use crate::secret::Secret;
 use crate::time::{Duration, Instant};
@@ -65,6 +65,8 @@ pub struct LoadOrder {
     pub loader: Option<LoaderKind>,
     /// Send long records instead of the file's: fewer characters for the same words.
     pub packed: bool,
+    /// Defects of the image that do not matter, for this unit: those the user knows of and wants all the same.
+    pub allowed: Vec<DefectId>,
     /// A defect on purpose, to prove the proof.
     #[doc(hidden)]
     pub flaw: Option<Flaw>,
@@ -73,7 +75,7 @@ pub struct LoadOrder {
 impl LoadOrder {
     /// An upload in the file's own records, to whatever is at the other end.
     pub fn new(image: CheckedImage, password: Secret) -> Self {
-        LoadOrder { image, password, product: None, loader: None, packed: false, flaw: None }
+        LoadOrder { image, password, product: None, loader: None, packed: false, allowed: Vec::new(), flaw: None }
     }
 }
 
@@ -248,6 +250,15 @@ pub struct Facts {
     pub unrecognised_lines: u64,
 }
 
+impl Facts {
+    /// The loader talks: what the application said of itself is history. The product stays what it is.
+    pub(super) fn enter_loader(&mut self) {
+        let product = self.product.take();
+        let unrecognised_lines = self.unrecognised_lines;
+        *self = Facts { state: UnitState::Loader, product, unrecognised_lines, ..Facts::default() };
+    }
+}
+
 /// A fact and where it comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known<T> {
@@ -331,6 +342,8 @@ pub struct LoadReport {
     pub phase: Phase,
     /// What is at the other end now.
     pub unit: UnitNow,
+    /// It was waiting in its loader when it was found: what software it has was not known before either.
+    pub found_in_loader: bool,
     /// Product, as far as known.
     pub product: Option<String>,
     /// Version before, if the unit said it.
@@ -349,6 +362,10 @@ pub struct LoadReport {
     pub what: String,
     /// The text the verdict rests on, as printed (control characters made visible), shortened.
     pub heard: String,
+    /// What speaks against the image for this unit, if that is why it was refused; it can be allowed by this name.
+    pub misfit: Option<DefectId>,
+    /// What the loader has shown to be otherwise than believed, in one sentence.
+    pub remark: Option<String>,
 }
 
 /// Verdict on an upload.

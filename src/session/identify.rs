@@ -53,10 +53,10 @@ impl Identify {
         match message {
             Message::MenuKey(key) => self.menu |= 1 << key_number(*key),
             Message::Software(_) => self.software = true,
-            Message::Loader(
-                LoaderText::Waiting | LoaderText::Error(_) | LoaderText::Restarting | LoaderText::AnyKey,
-            )
-            | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => self.loader = true,
+            // What else a loader says an application may say as well: "press any key", "restarting".
+            Message::Loader(LoaderText::Waiting | LoaderText::Error(_)) | Message::Prompt(Prompt::WaitingForFile) => {
+                self.loader = true;
+            }
             _ => {}
         }
         self.alive = true;
@@ -67,7 +67,10 @@ impl Identify {
     }
 
     fn conclude(&self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        if !self.is_answered() && desk.facts.state != UnitState::Application {
+        if self.loader && desk.facts.state != UnitState::Application {
+            // It may have had nothing to say but its error.
+            desk.facts.enter_loader();
+        } else if !self.is_answered() && desk.facts.state != UnitState::Application {
             let alive = self.alive || desk.pending.is_some();
             desk.facts.state = if alive { UnitState::Unknown } else { UnitState::Silent };
         }

@@ -13,9 +13,7 @@ pub mod flaw;
 mod identify;
 mod job;
 mod overheard;
-mod records;
 mod redactor;
-mod transfer;
 mod transmitter;
 mod upload;
 
@@ -27,9 +25,10 @@ use zeroize::Zeroizing;
 
 use crate::device::Product;
 use crate::endpoint::{Endpoint, Secrecy, Transmit};
-use crate::record::{Direction, Record, Span};
+use crate::record::{Direction, REDACTED, Record, Span};
 use crate::time::character_time;
 use crate::time::{Duration, Instant};
+use crate::wire::stream::Source;
 use crate::wire::{Confidence, Framer, Item, LoaderText, Message, NmtState, Prompt, Text, Vocabulary};
 use job::{Desk, Signal, Work};
 use redactor::Redactor;
@@ -44,6 +43,9 @@ const LONGEST_PROMPT: usize = 200;
 
 /// How long bytes that may be the beginning of the password wait for the next ones.
 const ECHO_QUIET: Duration = Duration::from_millis(30);
+
+/// How long behind the question for the menu what comes is its answer.
+const MENU_ANSWER: Duration = Duration::from_millis(1500);
 
 /// A conversation with one unit.
 pub struct Session {
@@ -76,8 +78,12 @@ pub struct Session {
     passive: bool,
     /// Lines are looked at for what they mean.
     recognises: bool,
-    /// The last thing that was sent was the question for the menu.
-    asked_for_menu: bool,
+    /// When the menu was asked for last.
+    menu_asked_at: Option<Instant>,
+    /// Where in what was received the last echo of a secret begins and ends.
+    echo: (u64, u64),
+    /// What the stream was asked to send, or was last seen to.
+    source: Option<Source>,
 }
 
 /// The job that runs, and which it is.
@@ -135,7 +141,9 @@ impl Session {
             echo_due: None,
             passive: false,
             recognises: true,
-            asked_for_menu: false,
+            menu_asked_at: None,
+            echo: (0, 0),
+            source: None,
         }
     }
 
@@ -195,6 +203,7 @@ impl Session {
                 if !(Duration::from_millis(1)..=Duration::from_secs(60)).contains(&period) {
                     return Err(Refusal::Period(period));
                 }
+                self.source = Some(source);
                 (Job::StreamOn, Box::new(console::StreamOn::new(source, period)))
             }
             Command::StreamOff => (Job::StreamOff, Box::new(console::StreamOff::default())),
@@ -249,7 +258,7 @@ impl Session {
     pub fn handle_sent(&mut self, now: Instant, bytes: &[u8]) {
         self.now = self.now.max(now);
         self.record.push(self.now, Direction::ToUnit, Secrecy::Open, bytes);
-        self.asked_for_menu = bytes.iter().any(|key| matches!(key, b'm' | b'M'));
+        self.note_menu_key(bytes);
         self.signal(Signal::Typed(bytes));
         self.cut_line();
     }
@@ -393,7 +402,17 @@ impl Session {
         }
     }
 
+    /// What is printed soon is the menu that was asked for, and no banner.
+    fn note_menu_key(&mut self, sent: &[u8]) {
+        self.menu_asked_at = sent.iter().any(|key| matches!(key, b'm' | b'M')).then_some(self.now);
+    }
+
     fn take_in(&mut self, bytes: &[u8], secrecy: Secrecy) {
+        if secrecy == Secrecy::Secret {
+            let from = self.record.received();
+            let begins = if self.echo.1 == from { self.echo.0 } else { from };
+            self.echo = (begins, from + bytes.len() as u64);
+        }
         self.record.push(self.now, Direction::FromUnit, secrecy, bytes);
         self.frame(bytes);
     }
@@ -412,7 +431,8 @@ impl Session {
                     if self.prompt.was(&text) {
                         continue;
                     }
-                    let message = self.vocabulary.line(&text.text);
+                    let message = self.understand(&text.text);
+                    self.conceal(&mut text);
                     self.heard(text, message);
                 }
                 Item::Hold(held) => {
@@ -440,11 +460,31 @@ impl Session {
         self.prompt.seen = text.span.end;
         let message = match self.vocabulary.prompt(&text.text) {
             Some(prompt) => Message::Prompt(prompt),
-            None => self.vocabulary.line(&text.text),
+            None => self.understand(&text.text),
         };
+        self.conceal(&mut text);
         if message != Message::Text {
             self.prompt.heard = Some(text.clone());
             self.heard(text, message);
+        }
+    }
+
+    /// What a line means. A row without a number looks the same from either source: it is one of what was asked for.
+    fn understand(&self, line: &str) -> Message {
+        match self.vocabulary.line(line) {
+            Message::Row(row) => {
+                let other = self.source.and_then(|source| self.vocabulary.row_as(line, &row, source));
+                Message::Row(other.unwrap_or(row))
+            }
+            other => other,
+        }
+    }
+
+    /// Makes a text unreadable that may be an echo of the password, in whatever form the unit or the line gave it.
+    fn conceal(&self, text: &mut Text) {
+        if text.span.start < self.echo.1 && self.echo.0 < text.span.end {
+            let star = |c: char| if c.is_whitespace() { c } else { char::from(REDACTED) };
+            text.text = text.text.chars().map(star).collect();
         }
     }
 
@@ -472,7 +512,8 @@ impl Session {
     /// Folds a message into the facts.
     fn learn(&mut self, span: Span, message: &Message) {
         let before = self.facts.clone();
-        let asked = self.asked_for_menu || self.job() == Some(Job::Identify);
+        let asked = self.menu_asked_at.is_some_and(|at| self.now <= at + MENU_ANSWER);
+        let asked = asked || self.job() == Some(Job::Identify);
         let origin = if asked { Origin::Menu } else { Origin::Banner };
         let facts = &mut self.facts;
         match message {
@@ -481,10 +522,14 @@ impl Session {
             Message::Row(row) => {
                 facts.state = UnitState::Application;
                 facts.stream = Some(row.source);
+                if row.readings.iter().any(|reading| reading.value().is_some()) {
+                    self.source = Some(row.source);
+                }
             }
             Message::MenuKey(_) | Message::FirstStart => facts.state = UnitState::Application,
             Message::Loader(text) => {
-                if matches!(text, LoaderText::Waiting | LoaderText::AnyKey | LoaderText::Restarting) {
+                // "Press any key" and "restarting" an application may say as well.
+                if matches!(text, LoaderText::Waiting) {
                     facts.enter_loader();
                 }
             }
@@ -526,6 +571,10 @@ impl Session {
         let lost = matches!(signal, Signal::LinkLost);
         let before = self.facts.clone();
         let pending = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric));
+        let pending = pending.map(|mut text| {
+            self.conceal(&mut text);
+            text
+        });
         let mut desk = Desk {
             now: self.now,
             transmitter: &mut self.transmitter,
@@ -565,15 +614,6 @@ impl Session {
     }
 }
 
-impl Facts {
-    /// The loader talks: what the application said of itself is history. The product stays what it is.
-    fn enter_loader(&mut self) {
-        let product = self.product.take();
-        let unrecognised_lines = self.unrecognised_lines;
-        *self = Facts { state: UnitState::Loader, product, unrecognised_lines, ..Facts::default() };
-    }
-}
-
 impl Endpoint for Session {
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.now = self.now.max(now);
@@ -597,6 +637,9 @@ impl Endpoint for Session {
             return None;
         }
         let transmit = self.transmitter.poll(self.now)?;
+        if transmit.secrecy == Secrecy::Open {
+            self.note_menu_key(&transmit.bytes);
+        }
         self.record.push(self.now, Direction::ToUnit, transmit.secrecy, &transmit.bytes);
         Some(transmit)
     }

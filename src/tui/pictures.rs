@@ -306,6 +306,9 @@ fn report(verdict: Verdict, unit: UnitNow) -> LoadReport {
         duration: Duration::from_secs(11),
         what: "The loader reported error 0004 (wrong checksum) and restarted.".into(),
         heard: "Error # 0004\u{1b}[2J Restarting.".into(),
+        found_in_loader: false,
+        misfit: None,
+        remark: None,
     }
 }
 

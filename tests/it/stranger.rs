@@ -5,6 +5,7 @@
 use std::collections::VecDeque;
 
 use axcon::endpoint::Endpoint;
+use axcon::image::DefectId;
 use axcon::secret::Secret;
 use axcon::session::{Command, LoadReport, Outcome, UnitNow, UnitState, Verdict};
 use axcon::time::{Duration, Instant};
@@ -194,6 +195,7 @@ fn visit() -> Visit<Stranger> {
 fn load(bench: &mut Visit<Stranger>, password: &str) -> LoadReport {
     let mut order = order(small_image("AXTC4CO", "1.2.0"));
     order.password = Secret::new(password.as_bytes().to_vec());
+    order.allowed = vec![DefectId::Downgrade]; // It runs V2.10.7.
     match bench.ask(Command::Load(Box::new(order))) {
         Outcome::Loaded(report) => *report,
         other => panic!("{other:?}"),

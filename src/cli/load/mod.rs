@@ -61,7 +61,8 @@ const SECONDS_PER_PAGE: f64 = 0.026;
 /// As the exit codes say: see the report.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let name = image_cli::shown(&args.image);
-    let report = image_cli::read(&args.image, args.product.map(|product| product.name.as_str()), &args.allow)?;
+    let expected = args.product.map(|product| product.name.as_str());
+    let report = image_cli::read_for(&args.image, &image_cli::targets_with(args.loader), expected, &args.allow)?;
     let Some(image) = report.image() else {
         return refuse(&report, &name, output);
     };
@@ -134,7 +135,7 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     plan(report, image, name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
     if args.dry_run {
         talk.close(output);
-        return check_product(image, &facts);
+        return check_fit(image, &facts, args);
     }
     if !global.yes && !agreed("Upload", output)? {
         talk.close(output);
@@ -145,8 +146,13 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     let noted = journal.note.as_ref().map(|note| note.product.clone());
     let product = args.product.map(|product| product.name.clone()).or(noted);
     journal.begin(&facts, product.as_deref(), name, &talk, output);
-    let order =
-        LoadOrder { product, loader: args.loader, packed: args.pack, ..LoadOrder::new(image.clone(), password) };
+    let order = LoadOrder {
+        product,
+        loader: args.loader,
+        packed: args.pack,
+        allowed: args.allow.clone(),
+        ..LoadOrder::new(image.clone(), password)
+    };
     let ended = talk.run(Command::Load(Box::new(order)), |_, event| {
         if let Event::Progress(progress) = event {
             meter.show(progress, output);
@@ -167,16 +173,19 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     result
 }
 
-/// What the upload itself would say of an image for another product.
-fn check_product(image: &CheckedImage, facts: &Facts) -> Result<(), CliError> {
-    let made_for = image.identity().map(|identity| identity.product.as_str());
-    let unit = facts.product.as_ref().map(|known| known.value.as_str());
-    match made_for.zip(unit) {
-        Some((made_for, unit)) if !made_for.eq_ignore_ascii_case(unit) => {
-            let message = format!("the image is for {made_for}, the unit is an {unit}: it would be refused");
-            Err(CliError::message(Kind::ImageRefused, message).hint("use an image that is made for this unit"))
+/// What the upload itself would say of this image for this unit.
+fn check_fit(image: &CheckedImage, facts: &Facts, args: &Args) -> Result<(), CliError> {
+    let said = facts.product.as_ref().and_then(|known| Product::named(&known.value));
+    let Some(product) = said.or(args.product) else { return Ok(()) };
+    let unit = product.target_with(args.loader.unwrap_or(product.loader.kind));
+    let misfits = image.misfits(&unit, facts.version.as_ref().map(|known| known.value));
+    match misfits.into_iter().find(|misfit| !args.allow.contains(&misfit.id)) {
+        None => Ok(()),
+        Some(misfit) => {
+            let message = format!("{}: it would be refused", misfit.message);
+            let allow = format!("if it is wanted all the same: --allow {}", misfit.id);
+            Err(CliError::message(Kind::ImageRefused, message).hint(allow))
         }
-        Some(_) | None => Ok(()),
     }
 }
 
@@ -236,6 +245,7 @@ fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliErr
             seconds: 0.0,
             what: "the image has errors; nothing has been sent",
             heard: "",
+            remark: None,
             next: "use an image without errors",
             defects: image_cli::defect_objects(report),
         })?;
@@ -313,6 +323,7 @@ struct LoadObject<'a> {
     seconds: f64,
     what: &'a str,
     heard: &'a str,
+    remark: Option<&'a str>,
     next: &'a str,
     defects: Vec<DefectObject<'a>>,
 }
@@ -345,6 +356,7 @@ fn conclude(
             seconds: (report.duration.as_secs_f64() * 1000.0).round() / 1000.0,
             what: &report.what,
             heard: &report.heard,
+            remark: report.remark.as_deref(),
             next,
             defects: image_cli::defect_objects(image),
         });
@@ -353,6 +365,9 @@ fn conclude(
     let Some(kind) = kind else {
         let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));
         let seconds = report.duration.as_secs_f64();
+        if let Some(remark) = &report.remark {
+            output.remark(&format!("note: {remark}"));
+        }
         return output
             .data(format!("done: {}{before}; {} records in {seconds:.1} s\n", report.what, report.records).as_bytes());
     };
@@ -363,6 +378,12 @@ fn conclude(
     }
     if !report.heard.is_empty() {
         error = error.hint(format!("last heard: \"{}\"", report.heard));
+    }
+    if let Some(remark) = &report.remark {
+        error = error.hint(remark.clone());
+    }
+    if let Some(misfit) = report.misfit {
+        error = error.hint(format!("if it is wanted all the same: --allow {misfit}"));
     }
     if let Some(lost) = lost {
         error = error.hint(format!("the port: {lost}"));
@@ -399,12 +420,18 @@ pub fn next_step(report: &LoadReport) -> &'static str {
         (Verdict::Refused, _) if report.product.is_none() => {
             "look at the label of the unit and say its product: --product AXTC4CO"
         }
+        (Verdict::Refused, _) if report.misfit == Some(DefectId::Downgrade) => {
+            "take newer software, unless the old one is wanted"
+        }
         (Verdict::Refused, _) => "take the image that is made for this unit",
         (Verdict::UnitRefused, UnitNow::Application) => {
             "the unit runs as before: check the password (upper and lower case matter) and try again"
         }
         (Verdict::NoAnswer, _) => {
             "nothing has been changed: look at power, cable and port, then run the same command again"
+        }
+        (_, UnitNow::Loader) if report.records == 0 && report.found_in_loader => {
+            "the unit waits in its loader, as it was found: run the same command again"
         }
         (_, UnitNow::Loader) if report.records == 0 => {
             "the unit waits in its loader, its old software intact: upload, or switch it off and on"

@@ -19,6 +19,8 @@ use crate::wire::{Message, Prompt, Text};
 const ANSWER: Duration = Duration::from_millis(1200);
 /// Silence behind lines that ends an answer: longer than an adapter's latency and a prompt's.
 const QUIET: Duration = Duration::from_millis(120);
+/// How long an answer may go on: text that is none of it may come without end.
+const LONGEST_ANSWER: Duration = Duration::from_millis(4000);
 /// Answers without an entry behind which the walk counts as over: a unit may print a title or a last sentence.
 const IDLE_ANSWERS: u32 = 3;
 /// Keys that are pressed at most; the largest product has 40 objects behind its first block.
@@ -41,6 +43,7 @@ pub(super) struct ReadDictionary {
     idle: u32,
     steps: u32,
     menu: u32,
+    asked_at: Instant,
     deadline: Option<Instant>,
     heard: Option<Span>,
 }
@@ -65,6 +68,7 @@ impl ReadDictionary {
             idle: 0,
             steps: 0,
             menu: 0,
+            asked_at: Instant::ZERO,
             deadline: None,
             heard: None,
         }
@@ -84,6 +88,7 @@ impl ReadDictionary {
         (self.fresh, self.answered) = (false, false);
         desk.send(b"\r");
         self.stage = Stage::Walking;
+        self.asked_at = desk.now;
         self.deadline = Some(desk.now + ANSWER);
         desk.events.push_back(Event::EntriesRead(self.collector.count()));
     }
@@ -95,6 +100,7 @@ impl ReadDictionary {
             Stage::Opening | Stage::Walking => 1,
         };
         self.menu = 0;
+        self.asked_at = desk.now;
         desk.send(b"x");
         self.stage = Stage::Leaving { exits, asked: false, then };
         self.deadline = Some(desk.now + QUIET);
@@ -113,7 +119,8 @@ impl ReadDictionary {
         if let (Some(text), Stage::Opening | Stage::Walking) = (desk.pending, &self.stage)
             && self.collector.reads(text)
         {
-            if self.unended.replace(text.span.end) != Some(text.span.end) {
+            let moves = self.unended.replace(text.span.end) != Some(text.span.end);
+            if moves && desk.now < self.asked_at + LONGEST_ANSWER {
                 self.deadline = Some(desk.now + QUIET);
                 return None;
             }
@@ -154,6 +161,7 @@ impl ReadDictionary {
             Stage::Leaving { then, .. } if menu_is_back => Some(then.clone()),
             Stage::Leaving { asked: asked @ false, .. } => {
                 *asked = true;
+                self.asked_at = desk.now;
                 desk.send(b"m");
                 self.deadline = Some(desk.now + ANSWER);
                 None
@@ -174,24 +182,27 @@ impl Work for ReadDictionary {
             Signal::Begin => {
                 self.collector.product = desk.facts.product.as_ref().and_then(|known| Product::named(&known.value));
                 desk.send(b"v");
+                self.asked_at = desk.now;
                 self.deadline = Some(desk.now + ANSWER);
                 None
             }
             Signal::Heard(_, Message::Row(_)) => None,
             Signal::Heard(text, message) => {
                 self.heard = Some(text.span);
-                self.deadline = Some(desk.now + QUIET);
+                self.deadline = Some((desk.now + QUIET).min(self.asked_at + LONGEST_ANSWER));
                 match (message, &self.stage) {
                     (Message::MenuKey(key), _) => self.menu |= 1 << (*key as u32),
                     (_, Stage::Leaving { .. }) => {}
                     (Message::Refusal, Stage::Opening) if self.collector.count() == 0 => {
                         let reason = format!("the unit does not show its object dictionary: {}", text.text.trim());
                         let heard = Some(text.span);
-                        return Some(Outcome::Refused { job: Job::ReadDictionary, reason, heard });
+                        // The view may have opened all the same, and X does nothing at the menu.
+                        self.leave(desk, Outcome::Refused { job: Job::ReadDictionary, reason, heard });
                     }
                     (Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults | Prompt::Source(_)), _) => {
                         desk.leave_dialogue();
-                        return Some(self.no_answer("the object dictionary"));
+                        let outcome = self.no_answer("the object dictionary");
+                        self.leave(desk, outcome);
                     }
                     (_, Stage::Opening | Stage::Walking) => {
                         desk.understood = self.take(text);

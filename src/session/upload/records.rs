@@ -1,8 +1,10 @@
 //! The records of an upload, built anew from the image: upper case, CR behind each (the newer loaders take nothing
 //! else), a four-byte header address, whole words, no count records.
 
+use std::ops::RangeInclusive;
+
+use crate::image::Image;
 use crate::image::srecord::{self, Kind, Record};
-use crate::image::{FlashMap, Image};
 
 /// Data bytes of a packed record: as many as fit one, less two (facts: 250, so that address, count and sum do).
 pub(super) const LONGEST: usize = 250;
@@ -25,10 +27,8 @@ pub(super) fn longest_acknowledged(window: usize, late: usize) -> usize {
 pub(super) struct Outgoing {
     /// The text with its line end.
     pub(super) text: Vec<u8>,
-    /// Address of a data record.
-    pub(super) address: Option<u32>,
-    /// Its data goes on in another flash page than the data before it ended in: a loader that keeps one page stops us.
-    pub(super) crosses: bool,
+    /// Addresses of the first and the last word of a data record.
+    pub(super) words: Option<RangeInclusive<u32>>,
 }
 
 /// How many data bytes a record gets.
@@ -44,7 +44,7 @@ pub(super) enum Size {
 pub(super) const LINE_END: &[u8] = b"\r";
 
 /// All records: header, data, end.
-pub(super) fn build(image: &Image, flash: &FlashMap, size: Size, line_end: &[u8]) -> Vec<Outgoing> {
+pub(super) fn build(image: &Image, size: Size, line_end: &[u8]) -> Vec<Outgoing> {
     let line = |write: &dyn Fn(&mut Vec<u8>)| {
         let mut text = Vec::new();
         write(&mut text);
@@ -53,33 +53,28 @@ pub(super) fn build(image: &Image, flash: &FlashMap, size: Size, line_end: &[u8]
     };
     let header = header(image);
     let header = line(&|text| srecord::write_header(&header, text));
-    let mut records = vec![Outgoing { text: header, address: None, crosses: false }];
-    let mut page = None;
+    let mut records = vec![Outgoing { text: header, words: None }];
     let mut push = |address: u32, data: &[u8]| {
-        let words = data.len().div_ceil(2) as u32;
-        let first = address / flash.page_words;
-        let last = address.saturating_add(words.saturating_sub(1)) / flash.page_words;
-        let crosses = page.is_some_and(|page| page != first) || first != last;
-        page = Some(last);
+        let last = address.saturating_add((data.len().div_ceil(2) as u32).saturating_sub(1));
         let mut data = data.to_vec();
         if data.len() % 2 == 1 {
             data.push(0xFF); // Half a word is filled up as erased flash reads.
         }
         let record = Record { kind: Kind::Data32, address, data: &data };
-        records.push(Outgoing { text: line(&|text| record.write(text)), address: Some(address), crosses });
+        records.push(Outgoing { text: line(&|text| record.write(text)), words: Some(address..=last) });
     };
     match size {
         Size::AsInFile => image.blocks.iter().for_each(|block| push(block.address, &block.data)),
         Size::Packed(bytes) => {
             for (address, data) in runs(image) {
                 for (number, piece) in data.chunks(bytes).enumerate() {
-                    push(address + (number * bytes / 2) as u32, piece);
+                    push(address.wrapping_add((number * bytes / 2) as u32), piece);
                 }
             }
         }
     }
     let end = Record { kind: Kind::Start32, address: image.entry, data: &[] };
-    records.push(Outgoing { text: line(&|text| end.write(text)), address: None, crosses: false });
+    records.push(Outgoing { text: line(&|text| end.write(text)), words: None });
     records
 }
 
@@ -123,13 +118,10 @@ mod tests {
         }
     }
 
-    const FLASH: FlashMap = FlashMap { address_unit: AddressUnit::Word, program_words: 0x10000, page_words: 256 };
-
     fn words(records: &[Outgoing]) -> Vec<(u32, u8)> {
         let mut words = Vec::new();
-        for record in records.iter().filter(|record| record.address.is_some()) {
+        for (record, address) in records.iter().filter_map(|record| Some((record, *record.words.as_ref()?.start()))) {
             let text = std::str::from_utf8(&record.text).expect("ASCII").trim_end();
-            let address = record.address.expect("data");
             let data = &text[12..text.len() - 2];
             for at in 0..data.len() / 4 {
                 words.push((address + at as u32, u8::from_str_radix(&data[at * 4..at * 4 + 2], 16).expect("hex")));
@@ -143,17 +135,13 @@ mod tests {
         let blocks: Vec<(u32, usize)> =
             (0..20).map(|number| (number * 16, 32)).chain([(0x400, 32), (0x410, 7)]).collect();
         let image = image(&blocks);
-        let plain = words(&build(&image, &FLASH, Size::AsInFile, LINE_END));
+        let plain = words(&build(&image, Size::AsInFile, LINE_END));
         for bytes in [SHORTEST, 54, LONGEST] {
-            let packed = build(&image, &FLASH, Size::Packed(bytes), LINE_END);
+            let packed = build(&image, Size::Packed(bytes), LINE_END);
             assert_eq!(words(&packed), plain, "{bytes}");
             assert!(packed.iter().all(|record| record.text.len() <= AROUND + 2 * bytes));
         }
-        assert_eq!(
-            build(&image, &FLASH, Size::Packed(LONGEST), LINE_END).len(),
-            2 + 3 + 1,
-            "header, end, 640 and 39 bytes"
-        );
+        assert_eq!(build(&image, Size::Packed(LONGEST), LINE_END).len(), 2 + 3 + 1, "header, end, 640 and 39 bytes");
     }
 
     #[test]
@@ -169,14 +157,5 @@ mod tests {
                 "{late}"
             );
         }
-    }
-
-    #[test]
-    fn a_record_that_leaves_its_page_crosses_wherever_in_it_that_is() {
-        let image = image(&[(0, 500), (250, 500), (512, 10)]);
-        let crossing: Vec<bool> =
-            build(&image, &FLASH, Size::Packed(LONGEST), LINE_END).iter().map(|record| record.crosses).collect();
-        // Words 0-124, 125-249, 250-374 (page 0 to 1), 375-499, 512-516 (page 1 to 2).
-        assert_eq!(crossing, [false, false, false, true, false, true, false]);
     }
 }

@@ -18,12 +18,14 @@
 //! That the XOFF may be shown late by an adapter (16 ms are 184 characters) does not matter either way: it is awaited,
 //! not reacted to. Which generation a unit has is believed, not known. A loader that stops us behind the header is a g3
 //! whatever the product's file says, and one that stops us neither there nor behind the first data is sent to as a g1.
+//! How many words a page has is believed as well: see [`Pages`].
 
 use std::collections::VecDeque;
 
-use super::flaw::Flaw;
+use super::super::flaw::Flaw;
+use super::super::transmitter::Transmitter;
+use super::pages::{self, Pages};
 use super::records::{self, Outgoing, Size};
-use super::transmitter::Transmitter;
 use crate::device::{PROGRAM_TIME, Pacing, RING, longest_erase};
 use crate::endpoint::Transmit;
 use crate::image::{FlashMap, Image};
@@ -44,6 +46,14 @@ const LONGEST_HOLD: Duration = Duration::from_secs(4);
 /// The same, if nothing at all has been heard since the crossing before: a unit that lost its power is worth a moment,
 /// and not one more record, since what comes back may be its menu.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
+/// How long behind each record a hold may take while nobody knows where the loader stops its sender: an adapter of 20 ms
+/// there and back, and a busy computer.
+const WATCHED: Duration = Duration::from_millis(120);
+/// How much earlier than reckoned a record may have left: a line that is 2 % quick.
+const EARLY: Duration = Duration::from_millis(2);
+/// Words that may leave, from the header on, without any sign of life: the largest pages of such parts have 512, and twice
+/// that is looked at, the record that crosses included.
+const MOST_UNHEARD: u32 = 1280;
 /// Characters on their way to a ring of [`RING`] at most: six records of 32 data bytes, and 50 to spare for keys that
 /// were pressed before. More than the 372 that a line carries in the 32 ms an adapter makes of the way there and back.
 const WINDOW: usize = RING - 50;
@@ -63,7 +73,6 @@ pub(super) enum Stall {
 #[derive(Debug)]
 pub(super) struct Transfer {
     image: Image,
-    flash: FlashMap,
     size: Size,
     flaw: Option<Flaw>,
     records: Vec<Outgoing>,
@@ -82,6 +91,18 @@ pub(super) struct Transfer {
     acknowledged: bool,
     /// No hold came behind the header where none was expected.
     header_passed: bool,
+    /// Nor behind the last data, where nothing has shown yet that holds come where they should.
+    end_passed: bool,
+    /// Words of a page by the product's file.
+    believed: u32,
+    /// Where a loader that keeps a page stops us.
+    pages: Pages,
+    /// It has done so elsewhere than believed.
+    surprised: bool,
+    /// Records before this one left before the loader was watched.
+    watched_from: usize,
+    /// Words let go without a sign of life.
+    unheard_words: u32,
     /// Everything is being sent once more.
     again: bool,
     /// Since when a loader that stops us behind every record does so. The transmitter's own knowledge will not do: it
@@ -89,7 +110,7 @@ pub(super) struct Transfer {
     stopped_since: Option<Instant>,
     /// How long it may erase behind the header.
     longest_erase: Duration,
-    /// Behind a record that crosses: when its last character has left.
+    /// Behind a record that the loader may stop us behind: when its last character has left.
     crossing: Option<Instant>,
     /// Something has been heard since the crossing before, or since the record taken last.
     alive: bool,
@@ -104,11 +125,10 @@ impl Transfer {
     pub(super) fn new(image: &Image, flash: &FlashMap, pacing: Pacing, packed: bool, flaw: Option<Flaw>) -> Self {
         let size = if packed { Size::Packed(records::LONGEST) } else { Size::AsInFile };
         let line_end = if flaw == Some(Flaw::SendsCrLf) { b"\r\n" } else { records::LINE_END };
-        let records = records::build(image, flash, size, line_end);
+        let records = records::build(image, size, line_end);
         let bytes_total = records.iter().map(|record| record.text.len()).sum();
         Transfer {
             image: image.clone(),
-            flash: *flash,
             size,
             flaw,
             records,
@@ -121,6 +141,12 @@ impl Transfer {
             window: Some(WINDOW),
             acknowledged: false,
             header_passed: false,
+            end_passed: false,
+            believed: flash.page_words,
+            pages: Pages::Words(flash.page_words),
+            surprised: false,
+            watched_from: 0,
+            unheard_words: 0,
             again: false,
             stopped_since: None,
             longest_erase: longest_erase(flash),
@@ -177,18 +203,28 @@ impl Transfer {
 
     /// The loader has sent XOFF (`true`) or XON.
     pub(super) fn hold(&mut self, now: Instant, held: bool) {
-        if self.pacing == Pacing::Pages && held && self.crossing.is_none() && self.taken == 0 && self.sent > 0 {
-            // Nothing was to be written yet: this is the hold behind the header.
+        self.unheard_words = 0;
+        if self.pacing == Pacing::Pages && held && self.is_behind_the_header() {
             self.pacing = Pacing::Records;
         }
         match self.pacing {
+            Pacing::Pages if self.sent == 0 => {}
+            Pacing::Pages if held => {
+                self.alive = true;
+                // Not where it was expected, or before that record can have come: its pages have another size, or the
+                // line made an XOFF of something.
+                if self.crossing.is_none_or(|left_at| now + EARLY < left_at) {
+                    self.watch();
+                    self.crossing = Some(now);
+                }
+            }
             Pacing::Pages if self.crossing.is_none() => {}
-            Pacing::Pages if held => self.alive = true,
             Pacing::Pages => {
                 // XON alone will do: it comes when the page is written, and the XOFF may have been lost on the line.
                 self.crossing = None;
                 self.alive = false;
                 self.acknowledged = true;
+                self.see(true);
                 self.take_all_sent();
             }
             Pacing::Records => {
@@ -218,13 +254,48 @@ impl Transfer {
         let late = now.since(left_at).as_nanos() / self.character_time.as_nanos().max(1);
         let late = usize::try_from(late).unwrap_or(usize::MAX);
         self.size = Size::Packed(records::longest_acknowledged(WINDOW, late));
-        self.records = records::build(&self.image, &self.flash, self.size, records::LINE_END);
+        self.records = records::build(&self.image, self.size, records::LINE_END);
         self.bytes_total = self.records.iter().map(|record| record.text.len()).sum();
     }
 
     /// The loader has printed something.
     pub(super) fn heard(&mut self) {
         self.alive = true;
+        self.unheard_words = 0;
+    }
+
+    /// Whether it has stopped us where it was not expected to, or has not where it was.
+    pub(super) fn is_surprised(&self) -> bool {
+        self.surprised
+    }
+
+    /// Whether sending record by record may help against an overrun: a loader that keeps pages of another size than
+    /// believed gets records while it has no place for them.
+    pub(super) fn may_go_slower(&self) -> bool {
+        self.pacing == Pacing::Pages && !self.again
+    }
+
+    /// How the loader differs from what was believed of it.
+    pub(super) fn remark(&self) -> Option<String> {
+        let words = match (self.surprised, self.pacing, &self.pages) {
+            (true, Pacing::Pages, Pages::Words(words)) => format!("pages of {words} words"),
+            (true, Pacing::Pages, Pages::Watched { .. }) => "pages of unknown size".into(),
+            (true, Pacing::Pages, Pages::Unheld) => return Some("the loader stops its sender nowhere (XOFF)".into()),
+            (false, _, _) | (true, Pacing::Records, _) => return None,
+        };
+        let twice = if self.again { "; everything was sent twice" } else { "" };
+        (self.pages != Pages::Words(self.believed))
+            .then(|| format!("the loader keeps {words}, and not of {} as believed{twice}", self.believed))
+    }
+
+    /// Everything once more from the header on, with no belief about pages.
+    pub(super) fn start_over_slowly(&mut self) {
+        self.start_over();
+        self.watch();
+        self.header_passed = false;
+        self.end_passed = false;
+        self.crossing = None;
+        self.stopped_since = None;
     }
 
     /// Whether the loader has shown by its flow control that it takes the records.
@@ -266,7 +337,7 @@ impl Transfer {
 
     /// Address of the data record let go last.
     pub(super) fn address(&self) -> Option<u32> {
-        self.records[..self.sent].iter().rev().find_map(|record| record.address)
+        self.records[..self.sent].iter().rev().find_map(|record| Some(*record.words.as_ref()?.start()))
     }
 
     /// When the first record was let go.
@@ -288,7 +359,17 @@ impl Transfer {
         match self.pacing {
             // The header may be what an unexpected g3 stops us behind; its ring is soon full.
             Pacing::Pages if self.sent == 1 && !self.header_passed => Some(*self.left_at.back()? + HEADER_HOLD),
-            Pacing::Pages => Some(self.crossing? + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE }),
+            Pacing::Pages => match (self.crossing, &self.pages) {
+                (Some(crossing), Pages::Watched { .. } | Pages::Unheld) => Some(crossing + WATCHED),
+                (Some(crossing), Pages::Words(_)) => {
+                    Some(crossing + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE })
+                }
+                // No hold has come yet, so the last data may have crossed where nobody knows.
+                (None, _) if self.sent + 1 == self.records.len() && !self.acknowledged && !self.end_passed => {
+                    Some(*self.left_at.back()? + WATCHED)
+                }
+                (None, _) => None,
+            },
             Pacing::Records => {
                 let &left_at = self.left_at.back()?;
                 let next = self.records.get(self.sent)?;
@@ -305,14 +386,66 @@ impl Transfer {
     /// Lets the next record go.
     fn let_go(&mut self, now: Instant, transmitter: &mut Transmitter) {
         let record = &self.records[self.sent];
+        if let Some(words) = &record.words {
+            self.unheard_words += words.clone().count() as u32;
+        }
         // The piece is let go in this same step, so it leaves behind what has been let go before.
         let left_at = transmitter.free_at().max(now) + transmitter.time_for(record.text.len());
         transmitter.push_piece(Transmit::open(record.text.clone()));
         self.left_at.push_back(left_at);
-        if record.crosses && self.pacing == Pacing::Pages {
+        let may_hold = record
+            .words
+            .as_ref()
+            .is_some_and(|words| self.pages.may_hold(self.believed, self.last_word(self.sent), words));
+        if may_hold && self.pacing == Pacing::Pages {
             self.crossing = Some(left_at);
         }
         self.sent += 1;
+    }
+
+    /// From the header on, one record at a time.
+    fn start_over(&mut self) {
+        self.again = true;
+        self.window = None;
+        (self.sent, self.taken, self.bytes_taken) = (0, 0, 0);
+        self.left_at.clear();
+        self.alive = false;
+        self.unheard_words = 0;
+    }
+
+    /// The belief about pages is given up: where they end shows record by record from here on.
+    fn watch(&mut self) {
+        self.surprised = true;
+        self.pages = Pages::watched();
+        self.watched_from = self.sent;
+    }
+
+    /// Whether the loader has stopped us behind the record let go last, which was alone on its way.
+    fn see(&mut self, held: bool) {
+        let last = self.sent.saturating_sub(1);
+        if last >= self.watched_from
+            && let Some(words) = &self.records[last].words
+        {
+            self.pages.seen(self.last_word(last), words, held);
+        }
+    }
+
+    /// The last word of the data before a record.
+    fn last_word(&self, record: usize) -> Option<u32> {
+        self.records[..record].iter().rev().find_map(|record| Some(*record.words.as_ref()?.end()))
+    }
+
+    /// Whether the loader has done as the product's file says.
+    fn is_believed(&self) -> bool {
+        matches!(self.pages, Pages::Words(_))
+    }
+
+    /// Whether a hold can only be the one behind the header: no page can have been full since.
+    fn is_behind_the_header(&self) -> bool {
+        self.sent > 0
+            && self.taken == 0
+            && self.crossing.is_none()
+            && pages::fit_any_page(self.records[..self.sent].iter().filter_map(|record| record.words.as_ref()))
     }
 
     fn take_one(&mut self) {
@@ -333,15 +466,33 @@ impl Transfer {
                 self.header_passed = true;
                 return Ok(());
             }
+            // The header was acknowledged, and the first data is not: a g3 may have lost it, or a hold behind the header
+            // was something else. The second time round it was something else.
+            Pacing::Records if self.taken < PROVEN && !self.again => {
+                self.start_over();
+                return Ok(());
+            }
+            Pacing::Records if self.taken < PROVEN => {
+                self.pacing = Pacing::Pages;
+                self.header_passed = true;
+                self.watch();
+            }
+            Pacing::Pages if self.crossing.is_none() => {
+                self.end_passed = true;
+                return Ok(());
+            }
+            Pacing::Pages if self.unheard_words < MOST_UNHEARD && !(self.acknowledged && self.is_believed()) => {
+                // Its pages may be larger than believed, and it has nothing to say before the first one is full.
+                match self.pages {
+                    Pages::Words(_) if self.alive => {}
+                    Pages::Words(_) => self.watch(),
+                    Pages::Watched { .. } | Pages::Unheld => self.see(false),
+                }
+            }
             _ if !self.alive => return Err(Stall::Silent),
             Pacing::Records if self.again => return Err(Stall::Unacknowledged),
-            Pacing::Records if self.taken < PROVEN => self.pacing = Pacing::Pages,
             Pacing::Records => {
-                self.again = true;
-                self.window = None;
-                (self.sent, self.taken, self.bytes_taken) = (0, 0, 0);
-                self.left_at.clear();
-                self.alive = false;
+                self.start_over();
                 return Ok(());
             }
             Pacing::Pages => {}

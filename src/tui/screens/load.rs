@@ -644,6 +644,9 @@ fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line<'static>> 
     if !report.heard.is_empty() {
         paragraph("Heard", &report.heard);
     }
+    if let Some(remark) = &report.remark {
+        paragraph("Note", remark);
+    }
     paragraph("What next", advice(report));
     rows.push(Line::default());
     rows.push(Line::from(vec![

@@ -3,7 +3,8 @@
 //! Every byte travels at the moment it would travel on a real line at 115,200 baud, plus the latency of an adapter.
 //! A middleman sits on the way to the unit and may change, lose or double a byte.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Mutex;
 
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
@@ -268,6 +269,20 @@ pub fn axtc4co() -> &'static Product {
 /// The product with eight channels, more flash and another loader.
 pub fn axrtd8co() -> &'static Product {
     named("AXRTD8CO")
+}
+
+/// A unit of this product whose flash has pages of so many words, whatever the product's file says.
+pub fn with_pages(product: &'static Product, page_words: u32) -> &'static Product {
+    static MADE: Mutex<BTreeMap<(String, u32), &'static Product>> = Mutex::new(BTreeMap::new());
+    if product.flash.page_words == page_words {
+        return product;
+    }
+    let mut made = MADE.lock().expect("no panic");
+    made.entry((product.name.clone(), page_words)).or_insert_with(|| {
+        let mut product = product.clone();
+        product.flash.page_words = page_words;
+        Box::leak(Box::new(product))
+    })
 }
 
 fn named(product: &str) -> &'static Product {

@@ -1,0 +1,214 @@
+//! The way into the loader: who is there and may have this image, L, the password, a key where one is wanted, the prompt.
+
+use super::super::event::{Facts, Outcome, UnitNow, UnitState, Verdict};
+use super::super::identify::Identify;
+use super::super::job::{Desk, Signal, Work};
+use super::{FILLER, Stage, Transfer, Unheard, Upload, shows_application};
+use crate::device::{Product, longest_erase};
+use crate::time::{Duration, Instant};
+use crate::wire::{LoaderText, Message, Prompt};
+
+/// How long the unit may take to ask for the password.
+const PASSWORD_PROMPT: Duration = Duration::from_millis(2500);
+/// How long a reset into the loader may take, or the refusal of a password.
+const LOADER_PROMPT: Duration = Duration::from_secs(8);
+/// Silence behind the loader's prompt before the first record: whatever else it prints should be out.
+const SETTLE: Duration = Duration::from_millis(80);
+/// How long it may go on printing behind its prompt, before what talks there is taken to be something else.
+const LONGEST_SETTLE: Duration = Duration::from_secs(3);
+/// How long a loader that was found waiting may take to call what we asked it an error.
+const CLEAR_LINE: Duration = Duration::from_millis(300);
+/// How long behind the password a loader that wants a key may take to ask for it, before it gets one unasked. Less than
+/// the 10 s for which it wants one (errata E-I12).
+const UNASKED_KEY: Duration = Duration::from_millis(3000);
+/// The same behind its header.
+const UNASKED_KEY_BEHIND_HEADER: Duration = Duration::from_millis(1000);
+/// Keys it gets at most: the reset may take longer than expected, and the line may lose one.
+const MOST_KEYS: u32 = 3;
+/// How long a loader may take behind the longest erasing until it says something.
+const BEHIND_THE_ERASE: Duration = Duration::from_secs(4);
+
+impl Upload {
+    /// Decides, once it is known who is there, whether the image may be sent.
+    pub(super) fn checked(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let facts: Facts = desk.facts.clone();
+        self.version_before = facts.version.as_ref().map(|known| known.value);
+        let said = facts.product.as_ref().map(|known| known.value.clone());
+        match facts.state {
+            UnitState::Silent if self.may_come_back(desk) => {
+                let mut identify = Identify::default();
+                let outcome = identify.handle(Signal::Begin, desk);
+                self.deadline = identify.deadline();
+                self.stage = Stage::Check(identify);
+                return outcome.and_then(|_| self.checked(desk));
+            }
+            UnitState::Silent => {
+                return self.end(desk, Verdict::NoAnswer, UnitNow::Unknown, "nothing answers on this port");
+            }
+            UnitState::Unknown => {
+                let what = "something talks on this port, but it is not a unit this program knows";
+                return self.end(desk, Verdict::NoAnswer, UnitNow::Unknown, what);
+            }
+            UnitState::Application | UnitState::Loader => {}
+        }
+        self.found_in_loader = facts.state == UnitState::Loader;
+        let unit = if self.found_in_loader { UnitNow::Loader } else { UnitNow::Application };
+        let ordered = self.order.product.clone();
+        if let (Some(said), Some(ordered)) = (&said, &ordered)
+            && !said.eq_ignore_ascii_case(ordered)
+        {
+            let what = format!("the unit is an {said}, not an {ordered}");
+            return self.end(desk, Verdict::Refused, unit, what);
+        }
+        let Some(product) = said.or(ordered) else {
+            let what = "the unit does not say which product it is";
+            return self.end(desk, Verdict::Refused, unit, what);
+        };
+        let Some(known) = Product::named(&product) else {
+            let what = format!("{product} is not a product this program knows");
+            return self.end(desk, Verdict::Refused, unit, what);
+        };
+        self.product = Some(known.name.clone());
+        let loader = self.order.loader.unwrap_or(known.loader.kind);
+        let misfits = self.order.image.misfits(&known.target_with(loader), self.version_before);
+        if let Some(misfit) = misfits.into_iter().find(|misfit| !self.order.allowed.contains(&misfit.id)) {
+            self.misfit = Some(misfit.id);
+            return self.end(desk, Verdict::Refused, unit, misfit.message);
+        }
+        let (packed, flaw) = (self.order.packed, self.order.flaw);
+        self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash, loader.pacing(), packed, flaw));
+        self.mark = desk.received;
+        if self.found_in_loader {
+            // The question who is there may still lie in its line buffer: Enter makes an error of it, which is over
+            // before the first record.
+            desk.send(b"\r");
+            self.stage = Stage::Settle { until: desk.now + LONGEST_SETTLE };
+            self.deadline = Some(desk.now + CLEAR_LINE);
+        } else {
+            desk.send(b"l");
+            self.stage = Stage::AskedForLoader;
+            self.deadline = Some(desk.now + PASSWORD_PROMPT);
+        }
+        self.report_progress(desk);
+        None
+    }
+
+    /// Something was heard while a loader is being asked for.
+    pub(super) fn entering(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let password_sent = matches!(self.stage, Stage::PasswordSent);
+        match message {
+            // Some units ask for no password.
+            Message::Loader(LoaderText::Waiting) | Message::Prompt(Prompt::WaitingForFile) => {
+                return self.entered(desk);
+            }
+            Message::Prompt(Prompt::Password) if !password_sent => {
+                desk.send_secret(self.order.password.reveal());
+                self.stage = Stage::PasswordSent;
+                self.deadline = Some(desk.now + LOADER_PROMPT);
+                self.unheard = self.asks_for_key().then_some((desk.now + UNASKED_KEY, Unheard::Key));
+            }
+            Message::Prompt(Prompt::AnyKey) | Message::Loader(LoaderText::AnyKey) => self.send_key(desk),
+            Message::Loader(LoaderText::Header) if password_sent && self.asks_for_key() => {
+                self.unheard = Some((desk.now + UNASKED_KEY_BEHIND_HEADER, Unheard::Key));
+            }
+            Message::Refusal | Message::MenuKey(_) | Message::Prompt(Prompt::Password) if password_sent => {
+                let what = "the unit did not accept the password";
+                if matches!(message, Message::Prompt(_)) {
+                    desk.leave_dialogue();
+                }
+                return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+            }
+            Message::Prompt(_) if !password_sent => {
+                desk.leave_dialogue();
+                let what = "the unit asks something else than the password";
+                return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+            }
+            Message::Refusal => {
+                let what = "the unit refuses to load new software";
+                return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// The loader asks for a file.
+    pub(super) fn entered(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.unheard = None;
+        if self.cancelled {
+            return self.end(desk, Verdict::Interrupted, UnitNow::Loader, "cancelled; nothing has been sent");
+        }
+        self.stage = Stage::Settle { until: desk.now + LONGEST_SETTLE };
+        self.deadline = Some(desk.now + SETTLE);
+        None
+    }
+
+    /// More is printed behind the prompt: the silence begins anew.
+    pub(super) fn settling(&mut self, message: &Message, until: Instant, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if shows_application(message) || matches!(message, Message::Prompt(Prompt::Password)) {
+            let what = "the unit left its loader before the file was sent";
+            return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+        }
+        if desk.now >= until {
+            let what = "the loader asks for the file, but does not stop talking";
+            return self.end(desk, Verdict::UnitRefused, UnitNow::Unknown, what);
+        }
+        let quiet = desk.now + SETTLE;
+        self.deadline = Some(self.deadline.map_or(quiet, |deadline| deadline.max(quiet)).min(until));
+        None
+    }
+
+    /// A loader that wants a key gets it, and another one should it be lost or come too early.
+    pub(super) fn send_key(&mut self, desk: &mut Desk<'_>) {
+        if self.keys_sent < MOST_KEYS {
+            self.keys_sent += 1;
+            desk.send(b"\r");
+            self.unheard = Some((desk.now + UNASKED_KEY_BEHIND_HEADER, Unheard::Key));
+        }
+    }
+
+    /// The loader has not asked for the file in time: who is there is asked once more.
+    pub(super) fn ask_who(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.unheard = None;
+        let mut identify = Identify::default();
+        let outcome = identify.handle(Signal::Begin, desk);
+        self.deadline = identify.deadline();
+        self.stage = Stage::AskWho(identify);
+        outcome.and_then(|_| self.who_is_there(desk))
+    }
+
+    /// What has become of a unit that took the password and did not show its loader.
+    pub(super) fn who_is_there(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let (unit, what) = match desk.facts.state {
+            UnitState::Loader => return self.entered(desk),
+            UnitState::Application => {
+                (UnitNow::Application, "the unit did not go into its loader; perhaps it did not accept the password")
+            }
+            UnitState::Silent | UnitState::Unknown => {
+                (UnitNow::Unknown, "the password was sent, but no loader asks for the file")
+            }
+        };
+        self.end(desk, Verdict::UnitRefused, unit, what)
+    }
+
+    /// Whether the silent unit may be a loader: one that has lost its place in a record of an upload before this one, and
+    /// takes every question for the rest of it, or one that erases its flash and listens to nobody. That somebody says
+    /// which product it is speaks for it.
+    fn may_come_back(&mut self, desk: &mut Desk<'_>) -> bool {
+        let Some(product) = self.order.product.as_deref().and_then(Product::named) else { return false };
+        if self.patience.is_none() {
+            self.patience = Some(desk.now + longest_erase(&product.flash) + BEHIND_THE_ERASE);
+            self.fill_up(desk);
+        }
+        self.patience.is_some_and(|until| desk.now < until)
+    }
+
+    pub(super) fn fill_up(&mut self, desk: &mut Desk<'_>) {
+        self.filled = true;
+        desk.send(&FILLER);
+    }
+
+    fn asks_for_key(&self) -> bool {
+        self.product.as_deref().and_then(Product::named).is_some_and(|product| product.loader.asks_for_key)
+    }
+}

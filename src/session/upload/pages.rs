@@ -1,0 +1,145 @@
+//! Where a loader that keeps one page stops its sender.
+//!
+//! The product's file says how many words a page has, which is a belief: no manual does, and the parts that may be in
+//! these units have pages of other sizes. As long as the loader stops us where it should, the belief stands, and only
+//! records that cross are awaited. As soon as it does not, or does elsewhere, every record is awaited until one size of
+//! page explains all that was seen; if none does, that goes on to the end of the file, slow and safe.
+
+use std::ops::RangeInclusive;
+
+/// Sizes a page may have, in words: those of the parts of this kind, and some to spare on either side.
+const SIZES: [u32; 6] = [64, 128, 256, 512, 1024, 2048];
+
+/// Holds that a size has to explain before it is believed.
+const PROOF: u32 = 2;
+
+/// What is known of the pages.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Pages {
+    /// So many words each.
+    Words(u32),
+    /// Nobody knows: any of these, by what was seen so far, and so many holds were seen.
+    Watched { possible: Vec<u32>, holds: u32 },
+    /// It stops nobody, whatever its pages are.
+    Unheld,
+}
+
+impl Pages {
+    /// Nothing is known.
+    pub(super) fn watched() -> Self {
+        Pages::Watched { possible: SIZES.to_vec(), holds: 0 }
+    }
+
+    /// Whether the loader may stop us behind a record of these words, which follow those that end with `before`.
+    /// Pages are believed to have `believed` words.
+    pub(super) fn may_hold(&self, believed: u32, before: Option<u32>, words: &RangeInclusive<u32>) -> bool {
+        match self {
+            Pages::Words(size) => crosses(*size, before, words),
+            Pages::Watched { .. } => true,
+            Pages::Unheld => crosses(believed, before, words),
+        }
+    }
+
+    /// The loader has stopped us behind a record that was alone on its way, or has not.
+    pub(super) fn seen(&mut self, before: Option<u32>, words: &RangeInclusive<u32>, held: bool) {
+        let Pages::Watched { possible, holds } = self else { return };
+        possible.retain(|&size| crosses(size, before, words) == held);
+        *holds += u32::from(held);
+        if let &[size] = possible.as_slice()
+            && *holds >= PROOF
+        {
+            *self = Pages::Words(size);
+        } else if possible.is_empty() && *holds == 0 {
+            *self = Pages::Unheld;
+        }
+    }
+}
+
+/// Whether, with pages of so many words, data goes on in another page than the data before it ended in.
+fn crosses(size: u32, before: Option<u32>, words: &RangeInclusive<u32>) -> bool {
+    let page = |word: u32| word / size.max(1);
+    page(*words.start()) != page(*words.end()) || before.is_some_and(|before| page(before) != page(*words.start()))
+}
+
+/// Whether no page of any size begins among the words of these records, the first of which begins one.
+pub(super) fn fit_any_page<'a>(records: impl Iterator<Item = &'a RangeInclusive<u32>>) -> bool {
+    let mut before = None;
+    for words in records {
+        if crosses(SIZES[0], before, words) {
+            return false;
+        }
+        before = Some(*words.end());
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Records of 16 words from 0 on, held as a loader with pages of this size does.
+    fn watch(size: u32, records: u32) -> (Pages, u32) {
+        let mut pages = Pages::watched();
+        let mut before = None;
+        let mut watched = 0;
+        for number in 0..records {
+            let words = number * 16..=number * 16 + 15;
+            watched += u32::from(matches!(pages, Pages::Watched { .. }));
+            pages.seen(before, &words, crosses(size, before, &words));
+            before = Some(*words.end());
+        }
+        (pages, watched)
+    }
+
+    #[test]
+    fn a_record_that_leaves_its_page_crosses_wherever_in_it_that_is() {
+        let cases = [
+            (None, 0..=124, false),
+            (Some(124), 125..=249, false),
+            (Some(249), 250..=374, true),
+            (Some(374), 375..=499, false),
+            (Some(499), 512..=516, true),
+            (Some(300), 20..=30, true),
+        ];
+        for (before, words, expected) in cases {
+            assert_eq!(Pages::Words(256).may_hold(64, before, &words), expected, "{words:?}");
+        }
+    }
+
+    #[test]
+    fn two_holds_are_enough_to_know_the_size() {
+        for size in SIZES {
+            let (pages, watched) = watch(size, 400);
+            assert_eq!(pages, Pages::Words(size));
+            assert!(watched <= 2 * size / 16 + 2, "{size}: {watched}");
+        }
+    }
+
+    #[test]
+    fn what_no_size_explains_is_watched_for_ever() {
+        let mut pages = Pages::watched();
+        for number in 0..100u32 {
+            pages.seen(Some(number * 16), &(number * 16 + 1..=number * 16 + 16), number % 7 == 3);
+        }
+        assert_eq!(pages, Pages::Watched { possible: Vec::new(), holds: 14 });
+        assert!(pages.may_hold(256, Some(1), &(2..=3)));
+    }
+
+    #[test]
+    fn a_loader_that_stops_nobody_is_not_watched_for_ever() {
+        let mut pages = Pages::watched();
+        let mut watched = 0;
+        for number in 0..200 {
+            watched += u32::from(pages != Pages::Unheld);
+            pages.seen(Some(number * 16), &(number * 16 + 1..=number * 16 + 16), false);
+        }
+        assert_eq!((pages, watched), (Pages::Unheld, 2048 / 16));
+    }
+
+    #[test]
+    fn the_first_words_of_any_page_are_no_reason_to_be_stopped() {
+        assert!(fit_any_page([0..=15, 16..=31, 32..=47, 48..=63].iter()));
+        assert!(!fit_any_page([0..=15, 16..=31, 32..=47, 48..=63, 64..=79].iter()));
+        assert!(!fit_any_page(std::iter::once(&(0..=124))), "a packed record");
+    }
+}

@@ -1,0 +1,151 @@
+//! Behind the end record: what comes back has to say that it is what was sent.
+
+use super::super::event::{Outcome, Phase, UnitNow, Verdict};
+use super::super::flaw::Flaw;
+use super::super::identify::Identify;
+use super::super::job::{Desk, Signal, Work};
+use super::{Stage, Upload};
+use crate::time::Duration;
+use crate::version::Version;
+use crate::wire::{Confidence, LoaderText, Message, Prompt};
+
+/// From the end record to the new banner: the last page, the reset, the first start.
+pub(super) const NEW_BANNER: Duration = Duration::from_secs(20);
+/// A loader that prompts again behind the end record may still hand over to the application after a start delay.
+const SECOND_PROMPT: Duration = Duration::from_secs(3);
+/// Silence behind product and version that ends the banner.
+const BANNER_QUIET: Duration = Duration::from_millis(300);
+/// Silence behind a menu, or rows, without a version before the unit is asked.
+const ASK_VERSION: Duration = Duration::from_millis(1000);
+
+/// What has been heard since the end record.
+#[derive(Default)]
+pub(super) struct After {
+    pub(super) product: Option<String>,
+    pub(super) version: Option<(Confidence, Version)>,
+    application: bool,
+    loader_waits: bool,
+}
+
+impl After {
+    /// Notes what an application says of itself. Gives `false` for everything else.
+    pub(super) fn note(&mut self, message: &Message) -> bool {
+        match message {
+            Message::Software(name) => {
+                self.application = true;
+                if let Some(product) = &name.product {
+                    self.product = Some(product.clone());
+                }
+                if let Some(version) = name.version
+                    && self.version.is_none_or(|(confidence, _)| name.confidence >= confidence)
+                {
+                    self.version = Some((name.confidence, version));
+                }
+                true
+            }
+            // A stream that was on comes back with the application, LSS and the network are reported by it alone.
+            Message::MenuKey(_) | Message::Row(_) | Message::Network(_) => {
+                self.application = true;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn is_complete(&self) -> bool {
+        self.product.is_some() && self.version.is_some()
+    }
+}
+
+impl Upload {
+    /// Something was heard behind the end record. It ends at `end` in the record.
+    pub(super) fn finishing(&mut self, message: &Message, end: u64, desk: &mut Desk<'_>) {
+        if self.order.flaw == Some(Flaw::BelievesTheLoader)
+            && matches!(message, Message::Loader(LoaderText::Loaded | LoaderText::Started))
+            && let Some(identity) = self.order.image.identity()
+        {
+            self.after.product = Some(identity.product.clone());
+            self.after.version = Some((Confidence::WithProduct, identity.version));
+            self.deadline = Some(desk.now);
+        }
+        match message {
+            Message::Loader(LoaderText::Error(error)) => {
+                let what = format!("the loader reports error {error} at the end of the file");
+                self.fail(desk, end, what, UnitNow::Loader, self.was_too_fast(message));
+            }
+            Message::Loader(LoaderText::Waiting | LoaderText::AnyKey)
+            | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
+                self.after = After { loader_waits: true, ..After::default() };
+                self.deadline = Some(desk.now + SECOND_PROMPT);
+            }
+            Message::Loader(LoaderText::Loaded) => {
+                if let Some(transfer) = &mut self.transfer {
+                    transfer.take_all_sent();
+                }
+            }
+            _ if self.after.is_complete() => {
+                if self.after.note(message) && matches!(message, Message::Software(_)) {
+                    self.deadline = Some(desk.now + BANNER_QUIET);
+                }
+            }
+            _ if self.after.note(message) => {
+                let (complete, asking) = (self.after.is_complete(), matches!(self.stage, Stage::AskVersion(_)));
+                let patience = if complete { BANNER_QUIET } else { ASK_VERSION };
+                let is_menu = matches!(message, Message::MenuKey(_));
+                let by_then = desk.now + patience;
+                // Rows may come faster than that: the unit is asked between them.
+                self.deadline = match self.deadline {
+                    Some(deadline) if !complete && !is_menu => Some(deadline.min(by_then)),
+                    _ if complete || is_menu => Some(by_then),
+                    deadline => deadline,
+                };
+                debug_assert!(!asking || self.deadline.is_some());
+            }
+            _ => {}
+        }
+    }
+
+    /// The banner is complete, or its time is over.
+    pub(super) fn judge(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let image = self.order.image.identity().cloned();
+        let version = self.after.version.map(|(_, version)| version);
+        if self.after.loader_waits && !self.after.application {
+            let what = "the loader took the file but waits for another: it does not start what was sent";
+            return self.end(desk, Verdict::Failed, UnitNow::Loader, what);
+        }
+        match (&self.after.product, version) {
+            (Some(product), Some(version)) => {
+                let runs = format!("the unit runs {product} V{version}");
+                let other =
+                    image.filter(|image| !image.product.eq_ignore_ascii_case(product) || image.version != version);
+                if let Some(transfer) = &mut self.transfer {
+                    transfer.take_all_sent();
+                }
+                self.report_progress_of(Phase::Verify, desk);
+                match other {
+                    None => self.end(desk, Verdict::Done, UnitNow::Application, runs),
+                    Some(sent) => {
+                        let what = format!("{runs}, but {} V{} was sent", sent.product, sent.version);
+                        self.end(desk, Verdict::WrongApplication, UnitNow::Application, what)
+                    }
+                }
+            }
+            _ if self.after.application && !matches!(self.stage, Stage::AskVersion(_)) => {
+                let mut identify = Identify::default();
+                let outcome = identify.handle(Signal::Begin, desk);
+                debug_assert!(outcome.is_none(), "a question has to wait for its answer");
+                self.deadline = identify.deadline();
+                self.stage = Stage::AskVersion(identify);
+                None
+            }
+            _ if self.after.application => {
+                let what = "the unit runs, but does not say which software";
+                self.end(desk, Verdict::WrongApplication, UnitNow::Application, what)
+            }
+            _ => {
+                let what = "the file was sent, but the unit has not come back";
+                self.end(desk, Verdict::Failed, UnitNow::Unknown, what)
+            }
+        }
+    }
+}
