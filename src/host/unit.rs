@@ -5,7 +5,9 @@
 //! on its way. So the client's bytes are taken off it no faster than a wire would carry them, never more than a
 //! UART's buffer ahead ([`AHEAD`]); what still lies in the pseudo-terminal counts as not yet sent, and stays there
 //! while the unit holds a client that obeys XOFF. Bytes are counted against the clock in small slices, so a late
-//! wake-up costs no throughput and lets no more bytes slip past an XOFF.
+//! wake-up costs no throughput and lets no more bytes slip past an XOFF. A thread that wakes up much later stops the
+//! unit's time for as long ([`UnitClock`]): what already lies in the pseudo-terminal must not look to the unit as if
+//! the line had been silent meanwhile, which is when a loader begins to write and is deaf.
 
 use std::io::{self, PipeWriter, Read, Write};
 use std::os::fd::AsFd;
@@ -178,8 +180,9 @@ pub const AHEAD: usize = 16;
 /// dry between two of them.
 const TICK: Duration = Duration::from_millis(1);
 
-/// A thread that wakes up later than this does not make up for all of it. While it catches up, bytes reach the unit
-/// faster than a client can answer an XOFF; no more of them may than behind a USB adapter with its 16 ms of latency.
+/// A thread that wakes up later than this does not make up for all of it: the rest has not been for the unit. While it
+/// catches up, bytes reach the unit faster than a client can answer an XOFF; no more of them may than behind a USB
+/// adapter with its 16 ms of latency.
 const CATCH_UP: Duration = Duration::from_millis(16);
 
 /// Bytes taken at once without a line rate, before the unit's own clock is looked at again.
@@ -212,7 +215,7 @@ impl HostedUnit {
         let host = Host {
             plugged: Plugged::new(unit, Line::new(line, Duration::ZERO)),
             pty,
-            clock: Clock::start(),
+            clock: UnitClock { clock: Clock::start(), overslept: Duration::ZERO },
             at: Instant::ZERO,
             line_rate: hosting.line_rate,
             power: hosting.power,
@@ -271,11 +274,38 @@ impl Drop for HostedUnit {
     }
 }
 
+/// The unit's time: the real one, less what this thread has overslept.
+#[derive(Debug)]
+struct UnitClock {
+    clock: Clock,
+    overslept: Duration,
+}
+
+impl UnitClock {
+    /// The time now, for a thread that wanted to be awake at `wanted`, if at any time.
+    fn now(&mut self, wanted: Option<Instant>) -> Instant {
+        let now = self.clock.now() - self.overslept;
+        let late = late_beyond(now, wanted);
+        self.overslept = self.overslept + late;
+        now - late
+    }
+
+    /// How long to sleep until `at`.
+    fn until(&self, at: Instant) -> Duration {
+        self.clock.until(at + self.overslept)
+    }
+}
+
+/// How much later than can be caught up with it is.
+fn late_beyond(now: Instant, wanted: Option<Instant>) -> Duration {
+    wanted.map_or(Duration::ZERO, |wanted| now.since(wanted + CATCH_UP))
+}
+
 /// The thread's own things.
 struct Host<U> {
     plugged: Plugged<U>,
     pty: Pty,
-    clock: Clock,
+    clock: UnitClock,
     /// How far the unit's time has come.
     at: Instant,
     line_rate: LineRate,
@@ -303,7 +333,8 @@ impl<U: Hosted> Host<U> {
         }
         loop {
             self.note_visits()?;
-            self.catch_up(self.clock.now())?;
+            let now = self.clock.now(self.wake_at());
+            self.catch_up(now)?;
 
             // While the line is full or the unit holds the client, bytes that wait must not wake us.
             let input = if self.takes_bytes() && !self.backlog { PollFlags::IN } else { PollFlags::empty() };
@@ -324,7 +355,7 @@ impl<U: Hosted> Host<U> {
 
     fn obey(&mut self, orders: &Receiver<Order>) -> Result<(), HostError> {
         loop {
-            let now = self.clock.now();
+            let now = self.clock.now(self.wake_at());
             self.catch_up(now)?;
             match orders.try_recv() {
                 Ok(Order { verb, answered }) => answered(self.plugged.unit_mut().perform(now, &verb)),
@@ -343,7 +374,7 @@ impl<U: Hosted> Host<U> {
             self.leaving = false;
             if self.power == Power::AtFirstClient {
                 self.power = Power::AtStart;
-                self.plugged.unit_mut().power_on(self.at.max(self.clock.now()));
+                self.plugged.unit_mut().power_on(self.at.max(self.clock.now(None)));
             }
         }
         // Counting would be wrong: events of the same kind melt into one while we sleep.
@@ -360,7 +391,7 @@ impl<U: Hosted> Host<U> {
     /// Lets the unit's time pass until `now`: in slices while bytes queue up, so that each slice sees what the unit
     /// said in the one before; else at once.
     fn catch_up(&mut self, now: Instant) -> Result<(), HostError> {
-        if now.since(self.at) > CATCH_UP {
+        if now.since(self.at) > TICK + CATCH_UP {
             self.at = now - CATCH_UP;
         }
         while self.backlog && self.at + TICK < now {
@@ -373,9 +404,11 @@ impl<U: Hosted> Host<U> {
         self.at = at;
         match self.line_rate {
             LineRate::Real => {
+                // What has arrived makes room first, so that the line never runs dry between two slices: a silence of
+                // half a millisecond is one to a loader.
+                self.advance()?;
                 let ahead = AHEAD + self.plugged.unit().queue();
                 self.take_bytes(ahead.saturating_sub(self.plugged.to_unit().in_flight()))?;
-                self.advance()?;
             }
             LineRate::Off => {
                 let mut burst = 0;
@@ -498,8 +531,8 @@ impl<U: Hosted> Host<U> {
 
     /// Lets the client read what was sent: the hang-up that follows discards it.
     fn farewell(&self) {
-        let until = self.clock.now() + FAREWELL;
-        while self.attended && self.clock.now() < until {
+        let clock = Clock::start();
+        while self.attended && clock.now() < Instant::ZERO + FAREWELL {
             // First a moment: what was just written takes one to reach the client's side.
             thread::sleep(FAREWELL_STEP);
             if self.pty.unread() == 0 {
@@ -532,4 +565,93 @@ pub fn factory_flash(product: &Product) -> Vec<u8> {
     let program = make::program(&make::Recipe { target: &target, version, words, flaw: None });
     flash[..program.len()].copy_from_slice(&program);
     flash
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::endpoint::Transmit;
+
+    /// A unit that only listens.
+    #[derive(Default)]
+    struct Ear(Vec<(Instant, u8)>);
+
+    impl Endpoint for Ear {
+        fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
+            self.0.extend(bytes.iter().map(|&byte| (now, byte)));
+        }
+
+        fn handle_timeout(&mut self, _: Instant) {}
+
+        fn poll_transmit(&mut self) -> Option<Transmit> {
+            None
+        }
+
+        fn poll_timeout(&self) -> Option<Instant> {
+            None
+        }
+    }
+
+    impl Hosted for Ear {
+        fn power_on(&mut self, _: Instant) {}
+
+        fn perform(&mut self, _: Instant, _: &Verb) -> Answer {
+            Ok(None)
+        }
+
+        fn holds_sender(&self) -> bool {
+            false
+        }
+
+        fn poll_store(&mut self) -> Option<Store> {
+            None
+        }
+    }
+
+    #[test]
+    fn a_record_sent_at_once_reaches_the_unit_without_a_gap_however_late_the_slices_come() {
+        let pty = Pty::open(BAUD).expect("a pseudo-terminal");
+        let mut client = std::fs::OpenOptions::new().write(true).open(pty.path()).expect("it opens");
+        let mut host = Host {
+            plugged: Plugged::new(Ear::default(), Line::new(character_time(BAUD), Duration::ZERO)),
+            pty,
+            clock: UnitClock { clock: Clock::start(), overslept: Duration::ZERO },
+            at: Instant::ZERO,
+            line_rate: LineRate::Real,
+            power: Power::AtStart,
+            state: None,
+            replugged: None,
+            cable_is_in: true,
+            garbage: Rng::new(1),
+            attended: true,
+            client: ClientSettings { baud: BAUD, obeys_xoff: false },
+            backlog: false,
+            leaving: false,
+            heard: Vec::new(),
+            counts: Arc::default(),
+        };
+        client.write_all(&[b'S'; 200]).expect("written");
+        // The first slice is not before the system has carried them over.
+        let begun = Clock::start();
+        while !host.backlog {
+            assert!(begun.now() < Instant::from_millis(5_000), "they arrive");
+            host.step(Instant::from_millis(1)).expect("a slice");
+        }
+        for millis in [2, 3, 4, 12, 13, 25] {
+            host.catch_up(Instant::from_millis(millis)).expect("slices");
+        }
+        let arrivals: Vec<Instant> = host.plugged.unit().0.iter().map(|&(at, _)| at).collect();
+        assert_eq!(arrivals.len(), 200);
+        let widest = arrivals.windows(2).map(|pair| pair[1].since(pair[0])).max();
+        assert!(widest < Some(character_time(BAUD) * 2), "{widest:?}");
+    }
+
+    #[test]
+    fn time_stands_still_for_the_unit_while_its_thread_oversleeps() {
+        let at = Instant::from_millis;
+        assert_eq!(late_beyond(at(1_000), None), Duration::ZERO, "nothing was due");
+        assert_eq!(late_beyond(at(1_000), Some(at(2_000))), Duration::ZERO, "something else woke it");
+        assert_eq!(late_beyond(at(1_000), Some(at(990))), Duration::ZERO, "that can be caught up with");
+        assert_eq!(late_beyond(at(1_000), Some(at(900))), Duration::from_millis(84));
+    }
 }
