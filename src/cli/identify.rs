@@ -11,8 +11,6 @@ use super::link;
 use super::output::Output;
 use super::talk::{Talk, no_answer_hints};
 use crate::canopen::ObjectAddress;
-use crate::device::Product;
-use crate::record::Span;
 use crate::session::{Command, Facts, Known, Origin, Outcome, UnitState};
 use crate::time::Duration;
 
@@ -84,13 +82,8 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         UnitState::Application if args.deep => Some(Deep::read(&mut talk)?),
         _ => None,
     };
-    let mut facts = talk.session().facts().clone();
+    let facts = talk.session().facts().clone();
     let deep = deep.unwrap_or_default();
-    if facts.product.is_none()
-        && let Some((name, span)) = deep.product.clone()
-    {
-        facts.product = Some(Known { value: name, origin: Origin::Dictionary, span });
-    }
     if output.json {
         output.object(&object(&facts, &deep))?;
     } else if matches!(facts.state, UnitState::Application | UnitState::Loader) {
@@ -107,8 +100,6 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 /// What only the object dictionary says.
 #[derive(Clone, Debug, Default)]
 struct Deep {
-    /// Product by its code, 1018h sub-index 2, and where it was read.
-    product: Option<(String, Span)>,
     serial_number: Option<u32>,
     revision: Option<u32>,
     /// Day, month and year, their decimal digits in hexadecimal ones (1020h).
@@ -127,15 +118,7 @@ impl Deep {
         };
         let entry = |index, sub| reading.entries.iter().find(|entry| entry.at == ObjectAddress::new(index, sub));
         let bits = |index, sub| entry(index, sub)?.value?.as_integer().and_then(|bits| u32::try_from(bits).ok());
-        let code = bits(0x1018, 2);
-        let product = Product::all().iter().find(|product| Some(product.can.product_code) == code);
-        let span = entry(0x1018, 2).map(|entry| entry.span).unwrap_or_default();
-        Ok(Deep {
-            product: product.map(|product| (product.name.clone(), span)),
-            serial_number: bits(0x1018, 4),
-            revision: bits(0x1018, 3),
-            compiled: bits(0x1020, 1),
-        })
+        Ok(Deep { serial_number: bits(0x1018, 4), revision: bits(0x1018, 3), compiled: bits(0x1020, 1) })
     }
 
     fn compiled(&self) -> Option<String> {

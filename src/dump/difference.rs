@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Dump, DumpEntry};
+use super::{Dump, DumpEntry, rounding};
 
 /// One entry that is not the same on both sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,16 +25,27 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
         dump.entries.iter().map(|entry| ((entry.index.clone(), entry.subindex), entry.clone())).collect()
     };
     let (of_left, of_right) = (by_address(left), by_address(right));
-    let with_factory = left.version.is_none() || right.version.is_none();
+    let with_factory = left.factory || right.factory;
+    // The manual gives its numbers in as few digits as will do, and means them.
+    let rounding =
+        |dump: &Dump, entry: &DumpEntry, value| if dump.factory { 0.0 } else { rounding(&entry.text, value) };
     let mut addresses: Vec<&(String, u8)> = of_left.keys().chain(of_right.keys()).collect();
     addresses.sort();
     addresses.dedup();
     let differs = |address: &(String, u8)| {
-        let (left, right) = (of_left.get(address), of_right.get(address));
-        let same = match (left, right) {
-            (Some(left), Some(right)) => same_number(left.value.as_ref(), right.value.as_ref()),
+        let number = |entry: &DumpEntry| entry.value.as_ref().and_then(serde_json::Number::as_f64);
+        let (of_left, of_right) = (of_left.get(address), of_right.get(address));
+        let same = match (of_left, of_right) {
+            (Some(of_left), Some(of_right)) => match (number(of_left), number(of_right)) {
+                (Some(a), Some(b)) => {
+                    let open = rounding(left, of_left, a).max(rounding(right, of_right, b));
+                    (a - b).abs() <= open.max(b.abs() * f64::from(f32::EPSILON))
+                }
+                (a, b) => a == b,
+            },
             (None, _) | (_, None) => with_factory,
         };
+        let (left, right) = (of_left, of_right);
         let shown = |entry: Option<&DumpEntry>| entry.map(DumpEntry::number);
         let name = left.or(right).map(|entry| entry.name.clone()).unwrap_or_default();
         let (index, subindex) = address.clone();
@@ -43,11 +54,31 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
     addresses.into_iter().filter_map(differs).collect()
 }
 
-/// Equal, as far as a unit's number of digits shows.
-fn same_number(left: Option<&serde_json::Number>, right: Option<&serde_json::Number>) -> bool {
-    match (left.and_then(serde_json::Number::as_f64), right.and_then(serde_json::Number::as_f64)) {
-        (Some(left), Some(right)) if left.fract() == 0.0 && right.fract() == 0.0 => left == right,
-        (Some(left), Some(right)) => (left - right).abs() <= right.abs().max(1.0) * 1e-3,
-        (left, right) => left == right,
+#[cfg(test)]
+mod tests {
+    use super::super::{half_a_unit, rounding};
+
+    #[test]
+    fn a_number_may_be_off_by_half_of_what_is_printed_last() {
+        let table = [
+            ("18.000", 5e-4),
+            ("18", 0.5),
+            ("1.8e1", 0.5),
+            ("-0.25", 5e-3),
+            ("4.37e3", 5.0),
+            ("1e-3", 5e-4),
+            ("7.", 0.5),
+        ];
+        for (numeral, expected) in table {
+            let found = half_a_unit(numeral);
+            assert!((found - expected).abs() < expected * 1e-9, "{numeral}: {found}");
+        }
+    }
+
+    #[test]
+    fn what_is_printed_exactly_is_compared_exactly() {
+        assert!(rounding("6127h sub 2 = 4370.00 uV", 4370.0) < 2.0, "two microvolts are a deviation");
+        assert!(rounding("A = 3.910E-03", f64::from(3.91e-3_f32)) < 1e-5);
+        assert!(rounding("no numeral", 16.0) < 1e-4);
     }
 }

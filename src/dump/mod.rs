@@ -16,7 +16,7 @@ use crate::canopen::{DataType, ObjectAddress, Value};
 use crate::device::dictionary::{Access, Entry, Object};
 use crate::device::emergency::Emergency;
 use crate::device::{Product, eds};
-use crate::session::{DictionaryReading, Facts};
+use crate::session::{DictionaryReading, Facts, ReadEntry};
 use crate::wire::visible;
 
 /// The list of active errors (CiA 301).
@@ -30,8 +30,11 @@ pub struct Dump {
     schema: String,
     /// The product, where known.
     pub product: Option<String>,
-    /// The software's version, where known; a factory's dump has none.
+    /// The software's version, where known.
     pub version: Option<String>,
+    /// These are the factory's values from the manual, and not a unit's.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub factory: bool,
     /// Whether the unit showed all of it.
     pub complete: bool,
     /// Lines of the view in which no entry was recognised.
@@ -113,7 +116,7 @@ impl Dump {
                 value: read.value.and_then(number),
                 text: visible::line(read.text.as_bytes()),
                 default: default.and_then(number),
-                deviates: entry.is_some_and(|entry| deviates(read.at, entry, read.value, default)),
+                deviates: entry.is_some_and(|entry| deviates(read, entry, default)),
                 unit: entry.and_then(|entry| entry.unit.clone()),
                 meaning: entry.zip(read.value).and_then(|(entry, value)| meaning(product?, read.at, entry, value)),
                 bits: entry.is_some_and(is_bits),
@@ -127,6 +130,7 @@ impl Dump {
             schema: SCHEMA.to_owned(),
             product: facts.product.as_ref().map(|known| known.value.clone()),
             version: facts.version.as_ref().map(|known| known.value.to_string()),
+            factory: false,
             complete: reading.complete,
             unrecognised_lines: reading.unrecognised_lines,
             entries: entries.collect(),
@@ -156,6 +160,7 @@ impl Dump {
             schema: SCHEMA.to_owned(),
             product: Some(product.name.clone()),
             version: None,
+            factory: true,
             complete: true,
             unrecognised_lines: 0,
             entries: entries.collect(),
@@ -257,14 +262,33 @@ fn is_bits(entry: &Entry) -> bool {
 }
 
 /// Whether a parameter is not what the factory made it. Measurements and what is a unit's own are no deviations.
-fn deviates(at: ObjectAddress, entry: &Entry, value: Option<Value>, default: Option<Value>) -> bool {
-    let parameter = entry.access == Access::ReadWrite && !matches!(at.index, 0x1003 | 0x1010 | 0x1011);
-    let differs = value.zip(default).is_some_and(|(value, default)| match (value, default) {
-        // The unit prints as many digits as it likes.
-        (Value::Real32(value), Value::Real32(default)) => (value - default).abs() > default.abs().max(1.0) * 1e-3,
+fn deviates(read: &ReadEntry, entry: &Entry, default: Option<Value>) -> bool {
+    let parameter = entry.access == Access::ReadWrite && !matches!(read.at.index, 0x1003 | 0x1010 | 0x1011);
+    let differs = read.value.zip(default).is_some_and(|(value, default)| match (value, default) {
+        (Value::Real32(value), Value::Real32(default)) => {
+            let (value, default) = (f64::from(value), f64::from(default));
+            (value - default).abs() > rounding(&read.text, value)
+        }
         _ => value != default,
     });
     parameter && differs
+}
+
+/// How far a number may be from what a text shows of it: half a unit of the last digit that is printed, and no less than
+/// a REAL32 leaves open.
+fn rounding(text: &str, value: f64) -> f64 {
+    let least = value.abs() * f64::from(f32::EPSILON);
+    let numerals = text.split(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c)));
+    let shown = numerals.filter(|numeral| numeral.parse::<f64>().is_ok_and(|shown| (shown - value).abs() <= least));
+    // Where several look like it, the one with the fewest digits says least.
+    shown.map(half_a_unit).fold(least, f64::max)
+}
+
+/// Half a unit of a numeral's last digit.
+fn half_a_unit(numeral: &str) -> f64 {
+    let (mantissa, exponent) = numeral.split_once(['e', 'E']).unwrap_or((numeral, "0"));
+    let decimals = mantissa.split_once('.').map_or(0, |(_, behind)| behind.len()) as i32;
+    0.5 * 10f64.powi(exponent.parse::<i32>().unwrap_or(0).saturating_sub(decimals).clamp(-40, 40))
 }
 
 fn number(value: Value) -> Option<serde_json::Number> {

@@ -20,6 +20,7 @@ mod lines;
 mod live;
 #[cfg(unix)]
 mod network;
+mod oddities;
 #[cfg(unix)]
 mod ptys;
 #[cfg(unix)]

@@ -2,12 +2,12 @@
 
 use axcon::endpoint::Endpoint;
 use axcon::rng::Rng;
-use axcon::session::{Command, Event, Job, Outcome, Session, UnitState};
+use axcon::session::{Command, Event, Job, Origin, Outcome, Session, UnitState};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::stream::Source;
 
-use crate::support::bench::Bench;
+use crate::support::bench::{Bench, axrtd8co};
 
 #[test]
 fn the_unit_says_who_it_is() {
@@ -171,6 +171,20 @@ fn a_reading_of_the_dictionary_that_is_cancelled_at_any_moment_leaves_the_view()
         assert_eq!(outcome, Outcome::Cancelled(Job::ReadDictionary), "cancelled after {moment_ms} ms");
         assert!(bench.unit.unit().read_object(entry).is_ok(), "after {moment_ms} ms: {}", bench.transcript());
     }
+}
+
+#[test]
+fn a_unit_whose_menu_does_not_name_it_is_known_by_its_product_code() {
+    let mut bench = Bench::in_dialect(axrtd8co(), 42);
+    bench.run_for(Duration::from_secs(7));
+    bench.reconnect();
+    bench.ask(Command::Identify);
+    assert_eq!(bench.session.facts().product, None, "{}", bench.transcript());
+    let Outcome::DictionaryRead(reading) = bench.ask(Command::ReadDictionary) else { panic!("{}", bench.transcript()) };
+    let product = bench.session.facts().product.clone().expect("a product");
+    assert_eq!((product.value.as_str(), product.origin), ("AXRTD8CO", Origin::Dictionary));
+    assert_eq!(reading.entries.len(), axrtd8co().dictionary.entries().count());
+    assert!(reading.entries.iter().all(|entry| entry.known), "all of it is understood, from the first line on");
 }
 
 #[test]

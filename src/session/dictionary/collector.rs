@@ -4,11 +4,15 @@ use std::collections::BTreeMap;
 
 use crate::canopen::ObjectAddress;
 use crate::device::Product;
+use crate::record::Span;
 use crate::session::event::{DictionaryReading, ReadEntry};
 use crate::wire::{Text, dictionary};
 
-/// Entries that are kept at most.
+/// Entries that are kept at most; and lines, as long as nobody knows whose objects they are.
 const MOST_ENTRIES: usize = 20_000;
+
+/// Where an object dictionary says which product it is: its code (manuals, object 1018h).
+const PRODUCT_CODE: ObjectAddress = ObjectAddress::new(0x1018, 2);
 
 /// What has been read so far.
 #[derive(Clone, Default)]
@@ -17,6 +21,8 @@ pub(in crate::session) struct Collector {
     pub(in crate::session) product: Option<&'static Product>,
     entries: BTreeMap<ObjectAddress, ReadEntry>,
     unrecognised_lines: u64,
+    /// All lines, as long as the product is not known: with it they say more.
+    lines: Vec<Text>,
     /// The object whose entries follow.
     heading: Option<u16>,
     /// The last entry that was read: its sub-index tells how the next one is written.
@@ -26,6 +32,9 @@ pub(in crate::session) struct Collector {
 impl Collector {
     /// Takes a line of the view, or something else. Says whether an entry was read from it.
     pub(in crate::session) fn line(&mut self, text: &Text) -> bool {
+        if self.product.is_none() && self.lines.len() < MOST_ENTRIES {
+            self.lines.push(text.clone());
+        }
         let product = self.product;
         let knows = |index| product.is_none_or(|product| product.dictionary.object(index).is_some());
         let Some(line) = dictionary::line(&text.text, knows) else {
@@ -80,7 +89,40 @@ impl Collector {
 
     /// Whether an entry would be read from a line.
     pub(in crate::session) fn reads(&self, text: &Text) -> bool {
-        self.clone().line(text)
+        let fresh = Collector { product: self.product, heading: self.heading, last: self.last, ..Collector::default() };
+        { fresh }.line(text)
+    }
+
+    /// What a unit that has not said its name is, by the product code it has shown; and where it has.
+    pub(in crate::session) fn product_shown(&self) -> Option<(&'static Product, Span)> {
+        let shown = self.entries.get(&PRODUCT_CODE)?;
+        let is_it = |product: &&Product| {
+            let object = product.dictionary.object(PRODUCT_CODE.index);
+            object.zip(object.and_then(|object| object.entry(PRODUCT_CODE.sub))).is_some_and(|(object, entry)| {
+                let value = dictionary::value(&shown.text, entry.data_type, &[&object.name, &entry.name]);
+                matches!(value, Some(dictionary::Shown::Value(value)) if value.as_integer() == Some(product.can.product_code.into()))
+            })
+        };
+        Product::all().iter().find(is_it).map(|product| (product, shown.span))
+    }
+
+    /// Reads what came before it was known whose objects these are once more.
+    fn read_again(&mut self) {
+        let product = self.product.or_else(|| self.product_shown().map(|(product, _)| product));
+        let lines = std::mem::take(&mut self.lines);
+        if product.is_none() || lines.is_empty() {
+            return;
+        }
+        let mut again = Collector { product, ..Collector::default() };
+        for line in &lines {
+            again.line(line);
+        }
+        for (at, entry) in &self.entries {
+            if entry.known || !again.entries.contains_key(at) {
+                again.entries.insert(*at, entry.clone());
+            }
+        }
+        *self = again;
     }
 
     /// The view has been left: a line without an index belongs to nothing read before.
@@ -101,6 +143,7 @@ impl Collector {
 
     /// Gives what was read, in the order of the addresses.
     pub(in crate::session) fn take(&mut self, complete: bool) -> DictionaryReading {
+        self.read_again();
         DictionaryReading {
             entries: std::mem::take(&mut self.entries).into_values().collect(),
             complete,

@@ -8,7 +8,7 @@ mod collector;
 
 pub(super) use collector::Collector;
 
-use super::event::{Event, Job, Outcome};
+use super::event::{Event, Job, Known, Origin, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::device::Product;
 use crate::record::Span;
@@ -106,7 +106,11 @@ impl ReadDictionary {
         self.deadline = Some(desk.now + QUIET);
     }
 
-    fn finished(&mut self, complete: bool) -> Outcome {
+    fn finished(&mut self, complete: bool, desk: &mut Desk<'_>) -> Outcome {
+        // Not every menu names its unit.
+        if let (None, Some((product, span))) = (&desk.facts.product, self.collector.product_shown()) {
+            desk.facts.product = Some(Known { value: product.name.clone(), origin: Origin::Dictionary, span });
+        }
         Outcome::DictionaryRead(Box::new(self.collector.take(complete)))
     }
 
@@ -140,20 +144,20 @@ impl ReadDictionary {
             Stage::Walking => {
                 self.idle = if self.fresh { 0 } else { self.idle + 1 };
                 if menu_is_back && !self.fresh {
-                    return Some(self.finished(true));
+                    return Some(self.finished(true, desk));
                 }
                 if self.idle >= IDLE_ANSWERS || self.steps >= MOST_STEPS {
                     let complete = self.answered && self.steps < MOST_STEPS;
                     let outcome = if self.collector.count() == 0 {
                         self.no_answer("an entry of the object dictionary")
                     } else {
-                        self.finished(complete)
+                        self.finished(complete, desk)
                     };
                     self.leave(desk, outcome);
                     return None;
                 }
                 if menu_is_back {
-                    return Some(self.finished(true));
+                    return Some(self.finished(true, desk));
                 }
                 self.step(desk);
                 None
