@@ -19,13 +19,12 @@ pub struct Difference {
     pub right: Option<String>,
 }
 
-/// Every entry that differs, by index and sub-index. Against the factory only what it defines can differ.
+/// Every entry that differs, by index and sub-index. Against the factory only what it sets can differ.
 pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
     let by_address = |dump: &Dump| -> BTreeMap<(String, u8), DumpEntry> {
         dump.entries.iter().map(|entry| ((entry.index.clone(), entry.subindex), entry.clone())).collect()
     };
     let (of_left, of_right) = (by_address(left), by_address(right));
-    let with_factory = left.factory || right.factory;
     // The manual gives its numbers in as few digits as will do, and means them.
     let rounding =
         |dump: &Dump, entry: &DumpEntry, value| if dump.factory { 0.0 } else { rounding(&entry.text, value) };
@@ -43,7 +42,10 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
                 }
                 (a, b) => a == b,
             },
-            (None, _) | (_, None) => with_factory,
+            // The factory has nothing to say of what it does not set; a unit that does not show what it sets lacks it.
+            (Some(_), None) => right.factory,
+            (None, Some(_)) => left.factory,
+            (None, None) => true,
         };
         let (left, right) = (of_left, of_right);
         let shown = |entry: Option<&DumpEntry>| entry.map(DumpEntry::number);

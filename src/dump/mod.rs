@@ -56,7 +56,7 @@ pub struct DumpEntry {
     pub name: String,
     /// The value, where the unit shows one that fits the entry's type.
     pub value: Option<serde_json::Number>,
-    /// What the unit printed behind index and sub-index.
+    /// The value as the unit printed it; where it is not understood, all that stands behind index and sub-index.
     pub text: String,
     /// The factory's value on this node, where it has one.
     pub default: Option<serde_json::Number>,
@@ -114,7 +114,7 @@ impl Dump {
                 subindex: read.at.sub,
                 name: object.zip(entry).map_or_else(String::new, |(object, entry)| name(object, entry)),
                 value: read.value.and_then(number),
-                text: visible::line(read.text.as_bytes()),
+                text: visible::line(value_text(read).as_bytes()),
                 default: default.and_then(number),
                 deviates: entry.is_some_and(|entry| deviates(read, entry, default)),
                 unit: entry.and_then(|entry| entry.unit.clone()),
@@ -282,6 +282,22 @@ fn rounding(text: &str, value: f64) -> f64 {
     let shown = numerals.filter(|numeral| numeral.parse::<f64>().is_ok_and(|shown| (shown - value).abs() <= least));
     // Where several look like it, the one with the fewest digits says least.
     shown.map(half_a_unit).fold(least, f64::max)
+}
+
+/// The numeral of a value in the text that was read, or all of the text.
+fn value_text(read: &ReadEntry) -> &str {
+    let Some(value) = read.value else { return &read.text };
+    let is_it = |word: &str| match (value, value.as_integer()) {
+        (Value::Real32(real), _) => word.parse::<f32>().is_ok_and(|shown| shown == real),
+        (_, Some(integer)) => {
+            let hexadecimal = word.strip_prefix("0x").or_else(|| word.strip_suffix(['h', 'H'])).unwrap_or(word);
+            word.parse::<i64>().is_ok_and(|shown| shown == integer)
+                || i64::from_str_radix(hexadecimal, 16).is_ok_and(|shown| shown == integer)
+        }
+        (_, None) => false,
+    };
+    let words = read.text.split(|c: char| !(c.is_ascii_alphanumeric() || "+-.".contains(c)));
+    words.filter(|word| is_it(word)).last().unwrap_or(&read.text)
 }
 
 /// Half a unit of a numeral's last digit.

@@ -6,7 +6,10 @@ impl Dump {
     /// For people: a line for each entry, `*` before what differs from the factory's, and what is missing.
     pub fn table(&self) -> String {
         let mut text = String::new();
-        let deviations = self.deviations();
+        let compared = match self.product {
+            Some(_) => format!("{} differ from the factory's (*)", self.deviations()),
+            None => "compared with nothing: the unit does not say which product it is".to_owned(),
+        };
         for entry in &self.entries {
             let DumpEntry { index, subindex, name, unit, meaning, .. } = entry;
             let value = entry.shown();
@@ -17,7 +20,7 @@ impl Dump {
             let factory = factory.map(|default| format!("  (factory {default})")).unwrap_or_default();
             text.push_str(&format!("{mark} {index}:{subindex:02X}  {name:<58} {value:>14}{unit}{meaning}{factory}\n"));
         }
-        text.push_str(&format!("{} entries, {deviations} differ from the factory's (*)\n", self.entries.len()));
+        text.push_str(&format!("{} entries, {compared}\n", self.entries.len()));
         if !self.missing.is_empty() {
             let list: Vec<String> = self.missing.iter().map(|at| format!("{}:{:02X}", at.index, at.subindex)).collect();
             text.push_str(&format!("not shown by the unit: {}\n", list.join(", ")));

@@ -145,11 +145,11 @@ impl Contents<'_> {
         page.section("Object dictionary");
         let Some(dump) = self.dump else { return page.paragraph("It was not read.") };
         let complete = if dump.complete { "" } else { " The unit did not show all of it." };
-        let deviations = dump.deviations();
-        page.paragraph(&format!(
-            "{} entries, {deviations} not as the factory made them (marked).{complete}",
-            dump.entries.len()
-        ));
+        let compared = match dump.product {
+            Some(_) => format!("{} not as the factory made them (marked)", dump.deviations()),
+            None => "compared with nothing: the unit does not say which product it is".to_owned(),
+        };
+        page.paragraph(&format!("{} entries, {compared}.{complete}", dump.entries.len()));
         let rows = dump.entries.iter().map(|entry| {
             let address = format!("{}:{:02X}", entry.index, entry.subindex);
             let unit = entry.unit.as_deref().unwrap_or_default();

@@ -56,8 +56,8 @@ pub enum Command {
 pub struct LoadOrder {
     /// What to send.
     pub image: CheckedImage,
-    /// The password of the menu's L.
-    pub password: Secret,
+    /// The password of the menu's L; a unit that waits in its loader asks for none.
+    pub password: Option<Secret>,
     /// The product, where the user says it or a journal knows it; otherwise the unit is asked.
     pub product: Option<String>,
     /// The loader it has, where the user knows better than the product's file. How it really paces its sender shows
@@ -74,8 +74,16 @@ pub struct LoadOrder {
 
 impl LoadOrder {
     /// An upload in the file's own records, to whatever is at the other end.
-    pub fn new(image: CheckedImage, password: Secret) -> Self {
-        LoadOrder { image, password, product: None, loader: None, packed: false, allowed: Vec::new(), flaw: None }
+    pub fn new(image: CheckedImage, password: impl Into<Option<Secret>>) -> Self {
+        LoadOrder {
+            image,
+            password: password.into(),
+            product: None,
+            loader: None,
+            packed: false,
+            allowed: Vec::new(),
+            flaw: None,
+        }
     }
 }
 

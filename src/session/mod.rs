@@ -211,11 +211,13 @@ impl Session {
             Command::ReadDictionary => (Job::ReadDictionary, Box::new(dictionary::ReadDictionary::new())),
             Command::Diagnostics { pages } => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::new(pages))),
             Command::Load(order) => {
-                let password = order.password.reveal();
-                if password.is_empty() || password.iter().any(u8::is_ascii_control) {
-                    return Err(Refusal::Password);
+                if let Some(password) = &order.password {
+                    let password = password.reveal();
+                    if password.is_empty() || password.iter().any(u8::is_ascii_control) {
+                        return Err(Refusal::Password);
+                    }
+                    self.redactor.look_for(password);
                 }
-                self.redactor.look_for(password);
                 (Job::Load, Box::new(upload::Upload::new(*order)))
             }
         };

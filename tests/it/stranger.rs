@@ -194,7 +194,7 @@ fn visit() -> Visit<Stranger> {
 
 fn load(bench: &mut Visit<Stranger>, password: &str) -> LoadReport {
     let mut order = order(small_image("AXTC4CO", "1.2.0"));
-    order.password = Secret::new(password.as_bytes().to_vec());
+    order.password = Some(Secret::new(password.as_bytes().to_vec()));
     order.allowed = vec![DefectId::Downgrade]; // It runs V2.10.7.
     match bench.ask(Command::Load(Box::new(order))) {
         Outcome::Loaded(report) => *report,

@@ -60,7 +60,7 @@ fn a_wrong_password_is_the_units_refusal_and_changes_nothing() {
     bench.run_for(Duration::from_secs(4));
     let before = bench.unit.unit().flash().to_vec();
     let mut wrong = order(small_image("AXTC4CO", "1.2.0"));
-    wrong.password = Secret::new(b"axio-2010".to_vec());
+    wrong.password = Some(Secret::new(b"axio-2010".to_vec()));
     let report = bench.load(wrong);
     assert_eq!((report.verdict, report.unit), (Verdict::UnitRefused, UnitNow::Application), "{report:?}");
     assert_eq!((report.phase, report.records), (Phase::EnterLoader, 0));

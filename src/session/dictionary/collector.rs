@@ -30,7 +30,7 @@ pub(in crate::session) struct Collector {
 }
 
 impl Collector {
-    /// Takes a line of the view, or something else. Says whether an entry was read from it.
+    /// Takes a line of the view, or something else. Says whether it was understood.
     pub(in crate::session) fn line(&mut self, text: &Text) -> bool {
         if self.product.is_none() && self.lines.len() < MOST_ENTRIES {
             self.lines.push(text.clone());
@@ -60,8 +60,8 @@ impl Collector {
                 let plain = unit.replace('°', "").replace('µ', "u").replace('Ω', "Ohm");
                 dictionary::value(&line.rest, entry.data_type, &[&object.name, &entry.name, unit, &plain])
             }
-            // A heading.
-            (Some(_), Some(_)) => return false,
+            // A heading: no entry, but understood.
+            (Some(_), Some(_)) => return true,
             (Some(_), None) | (None, _) => None,
         };
         match (shown, entry) {
@@ -89,8 +89,9 @@ impl Collector {
 
     /// Whether an entry would be read from a line.
     pub(in crate::session) fn reads(&self, text: &Text) -> bool {
-        let fresh = Collector { product: self.product, heading: self.heading, last: self.last, ..Collector::default() };
-        { fresh }.line(text)
+        let mut trial = Collector { product: self.product, heading: self.heading, last: self.last, ..Self::default() };
+        trial.line(text);
+        trial.count() > 0
     }
 
     /// What a unit that has not said its name is, by the product code it has shown; and where it has.
@@ -137,8 +138,14 @@ impl Collector {
 
     /// Whether every entry that the product has was there.
     pub(in crate::session) fn has_all(&self) -> bool {
-        self.product
-            .is_some_and(|product| product.dictionary.entries().all(|(at, _, _)| self.entries.contains_key(&at)))
+        self.product.is_some() && self.missing() == 0
+    }
+
+    /// Entries that the product has and that were not there, as far as the product is known.
+    pub(in crate::session) fn missing(&self) -> usize {
+        self.product.map_or(0, |product| {
+            product.dictionary.entries().filter(|(at, _, _)| !self.entries.contains_key(at)).count()
+        })
     }
 
     /// Gives what was read, in the order of the addresses.

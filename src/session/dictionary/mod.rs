@@ -27,6 +27,9 @@ const IDLE_ANSWERS: u32 = 3;
 const MOST_STEPS: u32 = 4_000;
 /// Entries of the menu that show that it is there.
 const MENU_ENTRIES: u32 = 3;
+/// Entries in a hundred that may be missing behind a walk for a second one to be worth its time: what a line loses are
+/// single lines; other software may lack whole objects.
+const LOST_ON_THE_LINE: usize = 10;
 /// How often leaving is tried.
 const MOST_EXITS: u32 = 3;
 
@@ -44,6 +47,9 @@ pub(super) struct ReadDictionary {
     steps: u32,
     menu: u32,
     asked_at: Instant,
+    /// The view has been walked through once, and is again.
+    again: bool,
+    most_steps: u32,
     deadline: Option<Instant>,
     heard: Option<Span>,
 }
@@ -69,6 +75,8 @@ impl ReadDictionary {
             steps: 0,
             menu: 0,
             asked_at: Instant::ZERO,
+            again: false,
+            most_steps: MOST_STEPS,
             deadline: None,
             heard: None,
         }
@@ -79,7 +87,8 @@ impl ReadDictionary {
         self.answered = true;
         let before = self.collector.count();
         let understood = self.collector.line(text);
-        self.fresh |= self.collector.count() > before;
+        // The second time round everything has been read before.
+        self.fresh |= self.collector.count() > before || (self.again && understood);
         understood
     }
 
@@ -104,6 +113,23 @@ impl ReadDictionary {
         desk.send(b"x");
         self.stage = Stage::Leaving { exits, asked: false, then };
         self.deadline = Some(desk.now + QUIET);
+    }
+
+    /// Opens the view once more if the line has lost some of it.
+    fn walks_again(&mut self, desk: &mut Desk<'_>) -> bool {
+        let (missing, count) = (self.collector.missing(), self.collector.count());
+        if self.again || missing == 0 || missing * 100 > count * LOST_ON_THE_LINE {
+            return false;
+        }
+        self.again = true;
+        self.most_steps = self.steps + IDLE_ANSWERS;
+        self.collector.interrupt();
+        (self.fresh, self.answered, self.unended, self.idle, self.steps, self.menu) = (false, false, None, 0, 0, 0);
+        desk.send(b"v");
+        self.stage = Stage::Opening;
+        self.asked_at = desk.now;
+        self.deadline = Some(desk.now + ANSWER);
+        true
     }
 
     fn finished(&mut self, complete: bool, desk: &mut Desk<'_>) -> Outcome {
@@ -144,10 +170,10 @@ impl ReadDictionary {
             Stage::Walking => {
                 self.idle = if self.fresh { 0 } else { self.idle + 1 };
                 if menu_is_back && !self.fresh {
-                    return Some(self.finished(true, desk));
+                    return (!self.walks_again(desk)).then(|| self.finished(true, desk));
                 }
-                if self.idle >= IDLE_ANSWERS || self.steps >= MOST_STEPS {
-                    let complete = self.answered && self.steps < MOST_STEPS;
+                if self.idle >= IDLE_ANSWERS || self.steps >= self.most_steps {
+                    let complete = self.again || self.answered && self.steps < self.most_steps;
                     let outcome = if self.collector.count() == 0 {
                         self.no_answer("an entry of the object dictionary")
                     } else {
@@ -157,7 +183,7 @@ impl ReadDictionary {
                     return None;
                 }
                 if menu_is_back {
-                    return Some(self.finished(true, desk));
+                    return (!self.walks_again(desk)).then(|| self.finished(true, desk));
                 }
                 self.step(desk);
                 None

@@ -57,6 +57,7 @@ impl Upload {
         if let (Some(said), Some(ordered)) = (&said, &ordered)
             && !said.eq_ignore_ascii_case(ordered)
         {
+            self.product = Some(said.clone());
             let what = format!("the unit is an {said}, not an {ordered}");
             return self.end(desk, Verdict::Refused, unit, what);
         }
@@ -102,7 +103,12 @@ impl Upload {
                 return self.entered(desk);
             }
             Message::Prompt(Prompt::Password) if !password_sent => {
-                desk.send_secret(self.order.password.reveal());
+                let Some(password) = &self.order.password else {
+                    desk.leave_dialogue();
+                    let what = "the unit asks for its password, and none was given";
+                    return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+                };
+                desk.send_secret(password.reveal());
                 self.stage = Stage::PasswordSent;
                 self.deadline = Some(desk.now + LOADER_PROMPT);
                 self.unheard = self.asks_for_key().then_some((desk.now + UNASKED_KEY, Unheard::Key));
