@@ -354,6 +354,8 @@ pub(super) struct Findings {
     warnings: u64,
     allowed: u64,
     overridden: Vec<DefectId>,
+    /// Kinds of defects that have been found.
+    seen: Vec<DefectId>,
 }
 
 /// What [`Findings`] come to.
@@ -401,8 +403,13 @@ impl Findings {
                 self.overridden.push(id);
             }
         }
-        // Warnings must not crowd out errors, so each has its own share.
-        if *count <= MOST_LISTED {
+        // Warnings must not crowd out errors, so each has its own share; and no kind of defect all the others, so the first
+        // of each is always there.
+        let is_first = !self.seen.contains(&id);
+        if is_first {
+            self.seen.push(id);
+        }
+        if is_first || *count <= MOST_LISTED {
             let column = u32::try_from(column).unwrap_or(u32::MAX);
             self.listed.push(Defect { id, severity, allowed, line, column, message: message() });
         }
@@ -426,6 +433,19 @@ pub(super) const MOST_LISTED: u64 = 1000;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_thousand_of_one_kind_hide_no_other() {
+        let mut findings = Findings::new(&[]);
+        for line in 1..=2_000 {
+            findings.note(DefectId::RefusedType, line, 1, String::new);
+        }
+        findings.note(DefectId::AddressUnit, 3, 5, String::new);
+        let found = findings.conclude();
+        assert_eq!(found.errors, 2_001);
+        assert!(found.listed.iter().any(|defect| defect.id == DefectId::AddressUnit));
+        assert_eq!(found.listed.len() as u64, MOST_LISTED + 1);
+    }
 
     #[test]
     fn names_are_unique_and_read_back() {
