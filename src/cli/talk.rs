@@ -108,7 +108,7 @@ impl Talk {
         } else {
             let clock = Clock::start();
             let connection = link::open(&spec, global, clock, sender.clone())?;
-            comeback = Comeback::of(&spec, &connection, link::options(global));
+            comeback = Comeback::of(&spec, link::options(global));
             let mut recorder = Recorder::start(&link::recording(global), &connection, clock);
             if let Some(warning) = recorder.take_warning() {
                 output.remark(&format!("axcon: {warning}"));
@@ -248,7 +248,10 @@ impl Talk {
     /// If it has not come back within `patience`: the error is the one that it was lost with.
     pub fn reconnect(&mut self, lost: CliError, patience: Duration, output: &mut Output) -> Result<bool, CliError> {
         let Line::Live(pump) = &mut self.line else { return Err(lost) };
-        let Some(comeback) = self.comeback.as_ref().filter(|_| !patience.is_zero()) else { return Err(lost) };
+        let Some(comeback) = self.comeback.as_mut().filter(|_| !patience.is_zero()) else { return Err(lost) };
+        comeback.lost();
+        // An adapter whose old name is still open gets another one when it comes back.
+        pump.disconnect();
         let clock = pump.clock();
         let gone = clock.now();
         self.session.link_lost(gone);

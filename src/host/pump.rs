@@ -18,6 +18,8 @@ use crate::time::{Duration, Instant};
 pub struct Pump {
     /// `None` while a lost link is away.
     connection: Option<Connection>,
+    /// The port as the user named it.
+    port: String,
     inbox: Inbox,
     clock: Clock,
     recorder: Recorder,
@@ -58,7 +60,8 @@ const LONGEST_WAIT: Duration = Duration::from_secs(3600);
 impl Pump {
     /// A pump for an open connection, whose inputs (and signals) come on this channel.
     pub fn new(connection: Connection, inputs: Receiver<Input>, clock: Clock, recorder: Recorder) -> Self {
-        Pump { connection: Some(connection), inbox: Inbox::new(inputs), clock, recorder }
+        let port = connection.port().to_owned();
+        Pump { connection: Some(connection), port, inbox: Inbox::new(inputs), clock, recorder }
     }
 
     /// Runs until `look` breaks with what the command wanted, or `deadline`. `look` sees the endpoint after each step;
@@ -110,6 +113,7 @@ impl Pump {
 
     /// Goes on over another connection, which puts its inputs on the same channel.
     pub fn replace(&mut self, connection: Connection) {
+        self.port = connection.port().to_owned();
         self.connection = Some(connection);
     }
 
@@ -148,8 +152,7 @@ impl Pump {
     }
 
     fn send_error(&self, error: SendError) -> PumpError {
-        let port = self.connection.as_ref().map(Connection::port).unwrap_or_default().to_owned();
-        PumpError::Send { port, error }
+        PumpError::Send { port: self.port.clone(), error }
     }
 }
 

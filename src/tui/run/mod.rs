@@ -363,7 +363,7 @@ impl Console {
         let recording = self.recorder.path().map(|path| path.display().to_string());
         let recording = recording.or_else(|| self.recorder.take_warning());
         let options = link::Options { baud: self.world.baud };
-        self.comeback = spec.and_then(|spec| Comeback::of(&spec, &connection, options));
+        self.comeback = spec.and_then(|spec| Comeback::of(&spec, options));
         self.link = Some(connection);
         let start_of_day = host::clock::day_before(self.clock.time_of_day(), self.skew);
         Input::LinkOpened(LinkInfo {
@@ -453,9 +453,10 @@ impl Console {
             return false;
         }
         let recorder = std::mem::take(&mut self.recorder);
-        let comeback = self.comeback.take();
+        let mut comeback = self.comeback.take();
         self.close_link();
-        if comeback.is_some() {
+        if let Some(comeback) = &mut comeback {
+            comeback.lost();
             self.recorder = recorder;
             self.recorder.mark(self.now(), "link lost");
             self.retry = Some(self.clock.now() + Comeback::RETRY);
