@@ -143,8 +143,25 @@ fn is_alike(one: &Port, other: &Port) -> bool {
 /// The first process that has the port open, apart from the host of a pseudo-terminal itself. `None` also where the
 /// system does not say: other users' processes are not visible.
 pub fn holder(path: &Path) -> Option<Holder> {
-    processes::holder(path)
+    processes::holder(path, |_| true)
 }
+
+/// The same without this process, and without one that it is just starting: until that runs its own program, it has this
+/// one's files.
+pub fn other_holder(path: &Path) -> Option<Holder> {
+    processes::holder(path, |pid| !processes::is_ours(pid))
+}
+
+/// The process that says it has the port by a lock file (`/run/lock/LCK..ttyUSB0`), as terminal programs have done since
+/// UUCP. `None` for one whose process is gone, or this one.
+#[cfg(unix)]
+pub fn lock_holder(path: &Path) -> Option<Holder> {
+    LOCK_FOLDERS.iter().find_map(|folder| locks::holder(Path::new(folder), path))
+}
+
+/// Where systems keep lock files of ports.
+#[cfg(unix)]
+const LOCK_FOLDERS: [&str; 3] = ["/run/lock", "/var/lock", "/var/spool/uucp"];
 
 fn port(info: serialport::SerialPortInfo) -> Port {
     let (kind, usb) = match info.port_type {
@@ -212,14 +229,30 @@ mod processes {
 
     use super::Holder;
 
-    pub fn holder(path: &Path) -> Option<Holder> {
+    /// The first process, of those that count, that uses the port.
+    pub fn holder(path: &Path, counts: impl Fn(u32) -> bool) -> Option<Holder> {
         let target = fs::canonicalize(path).ok()?;
         let mut pids: Vec<u32> =
             fs::read_dir("/proc").ok()?.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).collect();
         pids.sort_unstable();
-        let pid = pids.into_iter().find(|&pid| holds(pid, &target))?;
-        let name = fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
-        Some(Holder { name: name.trim_end().to_owned(), pid })
+        let pid = pids.into_iter().find(|&pid| holds(pid, &target) && counts(pid))?;
+        Some(Holder { name: name(pid).unwrap_or_default(), pid })
+    }
+
+    /// What the system calls a process.
+    pub fn name(pid: u32) -> Option<String> {
+        Some(fs::read_to_string(format!("/proc/{pid}/comm")).ok()?.trim_end().to_owned())
+    }
+
+    /// Whether it is this process, or a child of it that has not begun its own program yet.
+    pub fn is_ours(pid: u32) -> bool {
+        let own = std::process::id();
+        let program = |pid: u32| fs::read_link(format!("/proc/{pid}/exe")).ok();
+        let parent = || {
+            let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+            status.lines().find_map(|line| line.strip_prefix("PPid:"))?.trim().parse::<u32>().ok()
+        };
+        pid == own || (parent() == Some(own) && program(pid) == program(own))
     }
 
     /// Whether the process uses the port. The host of a pseudo-terminal keeps one descriptor of the client's side
@@ -255,8 +288,53 @@ mod processes {
 
     use super::Holder;
 
-    pub fn holder(_path: &Path) -> Option<Holder> {
+    pub fn holder(_path: &Path, _counts: impl Fn(u32) -> bool) -> Option<Holder> {
         None
+    }
+
+    #[cfg(unix)]
+    pub fn name(_pid: u32) -> Option<String> {
+        None
+    }
+
+    pub fn is_ours(pid: u32) -> bool {
+        pid == std::process::id()
+    }
+}
+
+#[cfg(unix)]
+mod locks {
+    //! Lock files, as the Filesystem Hierarchy Standard has them: the process number, ten characters wide.
+
+    use std::fs::File;
+    use std::io::Read;
+    use std::path::Path;
+
+    use super::{Holder, processes};
+
+    /// Bytes of a lock file that are looked at: number, program and user fit.
+    const MOST: u64 = 64;
+
+    pub fn holder(folder: &Path, port: &Path) -> Option<Holder> {
+        // Below `/dev/pts` names are bare numbers, which lock files do not tell from others.
+        let port = std::fs::canonicalize(port).ok().filter(|port| !port.starts_with("/dev/pts"))?;
+        let name = port.file_name()?.to_str()?;
+        let mut text = Vec::new();
+        File::open(folder.join(format!("LCK..{name}"))).ok()?.take(MOST).read_to_end(&mut text).ok()?;
+        let pid = process(&text).filter(|&pid| pid != std::process::id() && is_alive(pid))?;
+        Some(Holder { name: processes::name(pid).unwrap_or_else(|| "a program with a lock file".into()), pid })
+    }
+
+    /// The process that a lock file names: in digits, or as old programs write it, as a number of four bytes.
+    pub(super) fn process(text: &[u8]) -> Option<u32> {
+        let digits = std::str::from_utf8(text).ok().and_then(|text| text.split_whitespace().next()?.parse().ok());
+        digits.or_else(|| text.try_into().ok().map(u32::from_ne_bytes)).filter(|&pid| pid > 0)
+    }
+
+    fn is_alive(pid: u32) -> bool {
+        let pid = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw);
+        // A process of somebody else may not be signalled, but is there.
+        pid.is_some_and(|pid| rustix::process::test_kill_process(pid) != Err(rustix::io::Errno::SRCH))
     }
 }
 
@@ -349,6 +427,28 @@ mod tests {
         let was = adapter("/dev/ttyUSB0", None, "1-1:1.0");
         let alone = adapter("/dev/ttyUSB1", None, "1-2:1.0");
         assert_eq!(again(&[alone], &was, &[]), None, "one that nothing tells from others is not enough");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_file_counts_as_long_as_its_process_lives() {
+        assert_eq!(locks::process(b"      1234\n"), Some(1234));
+        assert_eq!(locks::process(b"      1234 minicom root\n"), Some(1234));
+        assert_eq!(locks::process(&0x0001_02FF_u32.to_ne_bytes()), Some(0x0001_02FF));
+        for nonsense in [&b""[..], b"\xff\xff", b"0", b"minicom", b"\0\0\0\0"] {
+            assert_eq!(locks::process(nonsense), None, "{}", nonsense.escape_ascii());
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let port = folder.path().join("ttyUSB0");
+        std::fs::write(&port, b"").expect("written");
+        let lock = |text: String| {
+            std::fs::write(folder.path().join("LCK..ttyUSB0"), text).expect("written");
+            locks::holder(folder.path(), &port).map(|holder| holder.pid)
+        };
+        let parent = std::os::unix::process::parent_id();
+        assert_eq!(lock(format!("{parent:>10}\n")), Some(parent));
+        assert_eq!(lock(format!("{:>10}\n", std::process::id())), None, "our own");
+        assert_eq!(lock(format!("{:>10}\n", i32::MAX)), None, "left behind by a process that was killed");
     }
 
     #[test]
