@@ -6,7 +6,7 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::Global;
-use super::confirm::confirm;
+use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::output::Output;
 use super::talk::{Ended, Talk};

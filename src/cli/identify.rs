@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use super::Global;
-use super::confirm::confirm;
+use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;

@@ -1,6 +1,6 @@
 //! The command line: what can be asked for, and where each answer is made.
 
-pub mod confirm;
+pub mod ask;
 pub mod console;
 pub mod defaults;
 pub mod diagnostics;

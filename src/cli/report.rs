@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use jiff::tz::TimeZone;
 
 use super::Global;
-use super::confirm::confirm;
+use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::output::Output;
 use super::stream::{leave_as_found, watch};

@@ -2,15 +2,15 @@
 //! unit's place where a command only reads.
 
 use std::ops::ControlFlow;
-use std::sync::mpsc::SyncSender;
+use std::sync::mpsc::{Receiver, SyncSender};
 
 use jiff::Timestamp;
 
-use super::Global;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
 use super::playback::Playback;
+use super::{Global, ask};
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::LinkSpec;
@@ -223,6 +223,26 @@ impl Talk {
             true => Ok(()),
             false => Err(CliError::message(Kind::Interrupted, "interrupted")),
         }
+    }
+
+    /// Listens until somebody who was asked has answered.
+    ///
+    /// # Errors
+    /// If the user interrupts, or the link is lost.
+    pub fn await_answer<T>(&mut self, answer: &Receiver<T>) -> Result<T, CliError> {
+        let step = self.step(Instant::NEVER, |session| {
+            while session.poll_event().is_some() {}
+            answer.try_recv().map_or(ControlFlow::Continue(()), ControlFlow::Break)
+        });
+        step.map_err(|error| match error {
+            PumpError::Interrupted(_) => ask::interrupted(),
+            error => link::pump_error(error),
+        })
+    }
+
+    /// Where inputs for the conversation are put.
+    pub fn inputs(&self) -> SyncSender<Input> {
+        self.inputs.clone()
     }
 
     /// Whether this is a recording, to which nothing can be said.

@@ -400,7 +400,7 @@ fn a_console_that_was_kept_away_in_the_middle_goes_on_where_it_was() {
     // Longer than any answer behind a record may take.
     let away = Duration::from_secs(5);
     for loader in [LoaderKind::G1, LoaderKind::G3] {
-        for moment_ms in (1_500..5_500).step_by(230) {
+        for moment_ms in (1_500..5_500).step_by(470) {
             let flash = factory_flash("1.1.0");
             let mut bench = Bench::of(axtc4co(), loader, flash, Duration::from_millis(1));
             bench.run_for(Duration::from_secs(4));

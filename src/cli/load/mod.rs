@@ -3,7 +3,6 @@
 mod meter;
 mod several;
 
-use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -12,7 +11,7 @@ use super::error::{CliError, Kind};
 use super::image::{self as image_cli, DefectObject};
 use super::output::Output;
 use super::talk::{Ended, Talk, no_answer_hints};
-use super::{Global, link, password};
+use super::{Global, ask, link, password};
 use crate::device::{LoaderKind, Product};
 use crate::host::journal::{Journal, Note};
 use crate::image::{CheckedImage, DefectId, Report};
@@ -74,7 +73,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if !output.json && (report.warnings > 0 || report.allowed > 0) {
         output.remark(image_cli::report_text(&report, &name).trim_end());
     }
-    let interactive = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
+    let interactive = ask::somebody();
     if !args.dry_run && !global.yes && !interactive {
         return Err(CliError::message(Kind::NeedsYes, "an upload replaces the unit's software and nobody said yes")
             .hint("add --yes where nobody can be asked"));
@@ -102,10 +101,10 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
             Ok(())
         }
         several => {
-            if !global.yes && !agreed(&format!("Upload to {} units", several.len()), output)? {
+            if !global.yes && !ask::is_yes(&format!("Upload to {} units? Type yes: ", several.len()), None, output)? {
                 return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
             }
-            let password = prepared.password.take().map_or_else(password::ask, Ok)?;
+            let password = prepared.password.take().map_or_else(|| password::ask(None), Ok)?;
             prepared.password = Some(password);
             several::run(several, &prepared, global, output)
         }
@@ -136,11 +135,11 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         talk.close(output);
         return check_product(image, &facts);
     }
-    if !global.yes && !agreed("Upload", output)? {
+    if !global.yes && !ask::is_yes("Upload? Type yes: ", Some(&mut talk), output)? {
         talk.close(output);
         return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
     }
-    let password = password.clone().map_or_else(password::ask, Ok)?;
+    let password = password.clone().map_or_else(|| password::ask(Some(&mut talk)), Ok)?;
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
     let noted = journal.note.as_ref().map(|note| note.product.clone());
     let product = args.product.map(|product| product.name.clone()).or(noted);
@@ -287,13 +286,6 @@ fn plan(
         report.facts.characters
     ));
     Ok(())
-}
-
-fn agreed(deed: &str, output: &mut Output) -> Result<bool, CliError> {
-    let _ = write!(output.err, "{deed}? Type yes: ").and_then(|()| output.err.flush());
-    let mut answer = String::new();
-    std::io::stdin().read_line(&mut answer).map_err(|error| CliError::new(Kind::Failed, error))?;
-    Ok(matches!(answer.trim().to_lowercase().as_str(), "yes" | "y"))
 }
 
 #[derive(Serialize)]
