@@ -15,6 +15,7 @@ pub mod ports;
 pub mod pump;
 pub mod recorder;
 pub mod replay;
+pub mod save;
 pub mod signal;
 pub mod terminal;
 
