@@ -44,6 +44,16 @@ impl World {
         files
     }
 
+    /// Waits until a file of this world holds a text.
+    pub fn wait_in(&self, file: &str, text: &str) {
+        let end = Instant::now() + PATIENCE;
+        let read = || std::fs::read_to_string(self.path(file)).unwrap_or_default();
+        while !read().contains(text) {
+            assert!(Instant::now() < end, "no {text:?} in {file}:\n{}", read());
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+
     /// The program with these arguments, in this world.
     pub fn command(&self, args: &[&str]) -> Command {
         self.command_of(Path::new(env!("CARGO_BIN_EXE_axcon")), args)
