@@ -8,7 +8,7 @@ use jiff::Timestamp;
 
 use super::error::{CliError, Kind};
 use super::link;
-use super::output::Output;
+use super::output::{Output, Remarks};
 use super::playback::Playback;
 use super::{Global, ask};
 use crate::host::clock::Clock;
@@ -32,6 +32,7 @@ pub struct Talk {
     spec: LinkSpec,
     comeback: Option<Comeback>,
     inputs: SyncSender<Input>,
+    remarks: Remarks,
     _signals: Signals,
 }
 
@@ -116,7 +117,8 @@ impl Talk {
             let line = Line::Live(Box::new(Pump::new(connection, inputs, clock, recorder)));
             (line, Session::new(global.baud))
         };
-        Ok(Talk { line, session, port: spec.to_string(), spec, comeback, inputs: sender, _signals: signals })
+        let (port, remarks) = (spec.to_string(), output.err.clone());
+        Ok(Talk { line, session, port, spec, comeback, inputs: sender, remarks, _signals: signals })
     }
 
     /// Runs a job to its end; `news` hears every event on the way. An interrupt cancels the job, a second one is final.
@@ -256,7 +258,12 @@ impl Talk {
         mut look: impl FnMut(&mut Session) -> ControlFlow<T>,
     ) -> Result<T, PumpError> {
         match &mut self.line {
-            Line::Live(pump) => pump.run(&mut self.session, deadline, Session::record, |session, _| look(session)),
+            Line::Live(pump) => pump.run(&mut self.session, deadline, Session::record, |session, warning| {
+                if let Some(warning) = warning {
+                    self.remarks.say(&format!("axcon: {warning}"));
+                }
+                look(session)
+            }),
             Line::Recorded(playback) => playback.run(&mut self.session, deadline, |session, _| look(session)),
         }
     }

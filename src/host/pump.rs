@@ -64,8 +64,8 @@ impl Pump {
         Pump { connection: Some(connection), port, inbox: Inbox::new(inputs), clock, recorder }
     }
 
-    /// Runs until `look` breaks with what the command wanted, or `deadline`. `look` sees the endpoint after each step;
-    /// `record` gives the endpoint's own record, which the recording follows.
+    /// Runs until `look` breaks with what the command wanted, or `deadline`. `look` sees the endpoint after each step, and
+    /// what has gone wrong with the recording meanwhile; `record` gives the endpoint's own record, which the recording follows.
     ///
     /// # Errors
     /// If the port fails, the deadline passes, or a signal comes.
@@ -74,7 +74,7 @@ impl Pump {
         endpoint: &mut E,
         deadline: Instant,
         record: impl Fn(&E) -> &Record,
-        mut look: impl FnMut(&mut E, Instant) -> ControlFlow<T>,
+        mut look: impl FnMut(&mut E, Option<String>) -> ControlFlow<T>,
     ) -> Result<T, PumpError> {
         loop {
             let arrived = self.inbox.arrived();
@@ -85,7 +85,7 @@ impl Pump {
             }
             endpoint.handle_timeout(now);
             self.drain(endpoint, &record)?;
-            if let ControlFlow::Break(result) = look(endpoint, now) {
+            if let ControlFlow::Break(result) = look(endpoint, self.recorder.take_warning()) {
                 // A command given in the last look may have something to say.
                 self.drain(endpoint, &record)?;
                 return Ok(result);
@@ -159,9 +159,10 @@ impl Pump {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
-    use crate::endpoint::{Arrived, Transmit};
+    use crate::endpoint::{Arrived, Secrecy, Transmit};
     use crate::host::link::{LinkSpec, Options};
     use crate::host::pty::Pty;
+    use crate::record::Direction;
 
     /// Notes in which order it is told what.
     #[derive(Default)]
@@ -176,6 +177,7 @@ mod tests {
         fn handle_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
             for piece in backlog {
                 assert!(piece.at < now);
+                self.record.push(piece.at, Direction::FromUnit, Secrecy::Open, &piece.bytes);
                 let text = String::from_utf8_lossy(&piece.bytes).into_owned();
                 self.told.push(format!("{text} of {:?}", piece.at.since_start()));
             }
@@ -194,22 +196,39 @@ mod tests {
         }
     }
 
-    #[test]
-    fn what_arrived_while_the_loop_was_kept_away_is_looked_at_before_the_clock() {
+    fn pump(recorder: Recorder) -> (Pty, Pump, std::sync::mpsc::SyncSender<Input>) {
         let pty = Pty::open(115_200).expect("a pseudo-terminal");
         let (sender, inputs) = crate::host::channel();
         let clock = Clock::start();
         let spec = LinkSpec::Serial(pty.path().to_owned());
         let connection =
             Connection::open(&spec, Options { baud: 115_200 }, clock, sender.clone()).expect("the link opens");
+        (pty, Pump::new(connection, inputs, clock, recorder), sender)
+    }
+
+    #[test]
+    fn what_arrived_while_the_loop_was_kept_away_is_looked_at_before_the_clock() {
+        let (_pty, mut pump, sender) = pump(Recorder::nothing());
         for (at, text) in [(1, "XOFF"), (2, "XON")] {
             let at = Instant::ZERO + Duration::from_nanos(at);
             sender.send(Input::Bytes { at, bytes: text.into() }).expect("there is room");
         }
-        let mut pump = Pump::new(connection, inputs, clock, Recorder::nothing());
         let mut notes = Notes::default();
         let ended = pump.run(&mut notes, Instant::ZERO, |notes| &notes.record, |_, _| ControlFlow::<()>::Continue(()));
         assert!(matches!(ended, Err(PumpError::Deadline)), "{ended:?}");
         assert_eq!(notes.told, ["XOFF of 1ns", "XON of 2ns", "it is late"]);
+    }
+
+    #[test]
+    fn that_a_recording_ends_is_told_at_once() {
+        let (_pty, mut pump, sender) = pump(crate::host::recorder::tests::doomed());
+        sender.send(Input::Bytes { at: Instant::ZERO, bytes: b"x".to_vec() }).expect("there is room");
+        let told = pump.run(
+            &mut Notes::default(),
+            Instant::NEVER,
+            |notes| &notes.record,
+            |_, warning| warning.map_or(ControlFlow::Continue(()), ControlFlow::Break),
+        );
+        assert!(told.is_ok_and(|warning| warning.starts_with("the recording ends here: ")));
     }
 }

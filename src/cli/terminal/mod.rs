@@ -323,6 +323,9 @@ impl Conversation {
     fn follow(&mut self, output: &mut Output) -> Result<(), CliError> {
         while self.session.poll_event().is_some() {}
         self.recorder.follow(self.session.record());
+        if let Some(warning) = self.recorder.take_warning() {
+            self.say(&warning, output)?;
+        }
         self.hold_told &= self.session.held_since().is_some();
         let time_of = time_of(Calendar::Clock(self.clock));
         let mut out = Vec::new();
