@@ -193,6 +193,12 @@ pub fn may_read_standard_input() -> bool {
     true
 }
 
+/// Columns of the user's terminal, where it says.
+pub fn columns() -> Option<usize> {
+    let (columns, _) = ratatui::crossterm::terminal::size().ok()?;
+    (columns > 0).then(|| columns.into())
+}
+
 fn take_screen() -> io::Result<()> {
     enable_raw_mode()?;
     TAKEN.store(SCREEN, Ordering::SeqCst);
