@@ -12,6 +12,14 @@ pub trait Endpoint {
     /// Bytes have arrived, all of them at `now`.
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]);
 
+    /// Bytes arrived in these pieces, in this order, and are looked at `now`: nobody was there earlier. Each is dated at
+    /// its own moment, what follows from it begins now, and nothing that was due meanwhile happens before all of them.
+    fn handle_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
+        for piece in backlog {
+            self.handle_bytes(now, &piece.bytes);
+        }
+    }
+
     /// The time is `now`; what was due by then happens.
     fn handle_timeout(&mut self, now: Instant);
 
@@ -20,6 +28,15 @@ pub trait Endpoint {
 
     /// When [`handle_timeout`](Endpoint::handle_timeout) is wanted next. `None`: only bytes or a command can bring news.
     fn poll_timeout(&self) -> Option<Instant>;
+}
+
+/// Bytes that arrived together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Arrived {
+    /// When.
+    pub at: Instant,
+    /// At least one byte.
+    pub bytes: Vec<u8>,
 }
 
 /// Bytes for the line.

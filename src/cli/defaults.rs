@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Global;
-use super::confirm::confirm;
+use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;

@@ -6,7 +6,7 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::Global;
-use super::confirm::confirm;
+use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::output::Output;
 use super::talk::{Ended, Talk};
@@ -104,6 +104,9 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 }
 
 fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    if let Some(file) = out {
+        files::admit(file, global.yes)?;
+    }
     if !link::is_recording(global) {
         confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
     }
@@ -139,7 +142,7 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
     };
     match out {
         None => output.data(text.as_bytes()),
-        Some(file) => files::write_whole(file, text.as_bytes()),
+        Some(file) => files::save(file, text.as_bytes(), global.yes),
     }
 }
 

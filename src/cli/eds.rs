@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::error::{CliError, Kind};
+use super::error::CliError;
 use super::image::product;
 use super::output::Output;
+use super::{Global, files};
 use crate::device::{Product, eds};
 
 /// Arguments of `axcon eds`.
@@ -23,14 +24,11 @@ pub struct Args {
 /// Writes the data sheet.
 ///
 /// # Errors
-/// If it cannot be written.
-pub fn run(args: Args, output: &mut Output) -> Result<(), CliError> {
+/// If it cannot be written, or the file is there already and nobody said yes.
+pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let text = eds::write(args.product);
     match &args.out {
         None => output.data(text.as_bytes()),
-        Some(file) => std::fs::write(file, text).map_err(|error| {
-            let context = format!("cannot write '{}'", file.display());
-            CliError::new(Kind::Failed, anyhow::Error::new(error).context(context))
-        }),
+        Some(file) => files::save(file, text.as_bytes(), global.yes),
     }
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use super::Global;
-use super::confirm::confirm;
+use super::ask::{self, confirm};
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
@@ -152,15 +152,17 @@ fn wait_for_banner(talk: &mut Talk, output: &mut Output) -> Result<(), CliError>
         Ok(if said { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     })?;
     if !undisturbed {
-        return Err(CliError::message(Kind::Interrupted, "interrupted"));
+        return Err(ask::interrupted());
     }
     if !said {
         let message = format!("no power-up messages within {} s", POWER_CYCLE.as_secs());
         return Err(no_answer_hints(CliError::message(Kind::NoAnswer, message)));
     }
     let until = talk.now() + REST_OF_BANNER;
-    talk.listen(until, |_, _| Ok(ControlFlow::Continue(())))?;
-    Ok(())
+    match talk.listen(until, |_, _| Ok(ControlFlow::Continue(())))? {
+        true => Ok(()),
+        false => Err(ask::interrupted()),
+    }
 }
 
 /// The state as JSON names it.

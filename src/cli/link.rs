@@ -267,7 +267,7 @@ mod tests {
     use crate::host::ports::Holder;
 
     fn port(path: &str, kind: ports::Kind) -> Port {
-        Port { path: path.into(), kind, usb: None, driver: None }
+        Port { path: path.into(), kind, usb: None, driver: None, place: None }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The command line: what can be asked for, and where each answer is made.
 
-pub mod confirm;
+pub mod ask;
 pub mod console;
 pub mod defaults;
 pub mod diagnostics;
@@ -81,7 +81,7 @@ pub struct Global {
     /// Data and errors as JSON.
     #[arg(long, global = true)]
     pub json: bool,
-    /// Answer yes to every question.
+    /// Answer yes to every question, and replace files that are there.
     #[arg(long, short = 'y', global = true)]
     pub yes: bool,
     /// Record to this file instead of the state directory.
@@ -167,7 +167,7 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Report(args)) => report::run(&args, global, output),
         Some(Command::Load(args)) => load::run(args, global, output),
         Some(Command::Terminal(args)) => terminal::run(args, global, output),
-        Some(Command::Eds(args)) => eds::run(args, output),
+        Some(Command::Eds(args)) => eds::run(args, global, output),
         Some(Command::Emulate(args)) => emulate::run(args, global, output),
         Some(Command::Image(args)) => image::run(args, global, output),
         Some(Command::Completions(args)) => manual::completions(&args, output),

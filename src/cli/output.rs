@@ -1,6 +1,7 @@
 //! Standard output and standard error: data to the one, everything else to the other.
 
 use std::io::{self, Write};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::Serialize;
 
@@ -13,7 +14,33 @@ pub struct Output {
     /// Data.
     pub out: Box<dyn Write + Send>,
     /// Everything else.
-    pub err: Box<dyn Write + Send>,
+    pub err: Remarks,
+}
+
+/// Where remarks go; whoever has something to say at once, in the middle of something else, has a copy.
+#[derive(Clone)]
+pub struct Remarks(Arc<Mutex<Box<dyn Write + Send>>>);
+
+impl Remarks {
+    /// Remarks that are written there.
+    pub fn to(writer: impl Write + Send + 'static) -> Self {
+        Remarks(Arc::new(Mutex::new(Box::new(writer))))
+    }
+
+    /// A remark for a person. Nothing can be done if that fails.
+    pub fn say(&mut self, text: &str) {
+        let _ = writeln!(self, "{text}");
+    }
+}
+
+impl Write for Remarks {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).flush()
+    }
 }
 
 /// Whoever reads our output has enough. Not an error: the command ends with success.
@@ -24,7 +51,7 @@ pub struct Closed;
 impl Output {
     /// The process's own streams.
     pub fn standard(json: bool) -> Self {
-        Output { json, out: Box::new(io::stdout()), err: Box::new(io::stderr()) }
+        Output { json, out: Box::new(io::stdout()), err: Remarks::to(io::stderr()) }
     }
 
     /// One JSON object on a line of its own.
@@ -50,7 +77,7 @@ impl Output {
 
     /// A remark for a person, on standard error. Nothing can be done if that fails.
     pub fn remark(&mut self, text: &str) {
-        let _ = writeln!(self.err, "{text}");
+        self.err.say(text);
     }
 }
 

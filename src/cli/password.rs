@@ -4,7 +4,12 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use zeroize::Zeroizing;
+
+use super::ask;
 use super::error::{CliError, Kind};
+use super::talk::Talk;
+use crate::host::terminal::KeptTerminal;
 use crate::secret::Secret;
 
 /// The environment's name for it.
@@ -26,21 +31,28 @@ pub fn find(file: Option<&Path>) -> Result<Option<Secret>, CliError> {
             let password = password.into_string().map_err(|_| {
                 CliError::message(Kind::Usage, format!("{VARIABLE} holds characters that no keyboard line can"))
             })?;
-            accept(password.into_bytes(), VARIABLE).map(Some)
+            accept(Secret::new(password.into_bytes()), VARIABLE).map(Some)
         }
         _ => Ok(None),
     }
 }
 
-/// Asks for it.
+/// Asks for it, while `talk` goes on if there is one.
 ///
 /// # Errors
-/// If the terminal cannot be used, or nothing is typed.
-pub fn ask() -> Result<Secret, CliError> {
-    let password = rpassword::prompt_password("Password: ").map_err(|error| {
-        CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot ask for the password"))
+/// If the terminal cannot be used, nothing is typed, the user interrupts, or the link is lost meanwhile.
+pub fn ask(talk: Option<&mut Talk>) -> Result<Secret, CliError> {
+    // A signal leaves the thread that hides the typing where it is.
+    let _kept = KeptTerminal::now();
+    let password = ask::typed(talk, || {
+        // Into its place at once: a copy that waits somewhere is not wiped.
+        rpassword::prompt_password("Password: ").map(|password| Secret::new(password.into_bytes()))
     })?;
-    accept(password.into_bytes(), "the answer")
+    let password = password.map_err(|error| match error.kind() {
+        std::io::ErrorKind::Interrupted => ask::interrupted(),
+        _ => CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot ask for the password")),
+    })?;
+    accept(password, "the answer")
 }
 
 fn read(path: &Path) -> Result<Secret, CliError> {
@@ -48,7 +60,8 @@ fn read(path: &Path) -> Result<Secret, CliError> {
     let failed = |error: std::io::Error| {
         CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the password file {shown}")))
     };
-    let mut text = Vec::new();
+    // With room for all of it, so that growing leaves no copy behind.
+    let mut text = Zeroizing::new(Vec::with_capacity(LONGEST + 2));
     File::open(path).and_then(|file| file.take(LONGEST as u64 + 1).read_to_end(&mut text)).map_err(failed)?;
     if text.len() > LONGEST {
         let message = format!("the password file {shown} is longer than {LONGEST} bytes; is it the right one?");
@@ -58,11 +71,10 @@ fn read(path: &Path) -> Result<Secret, CliError> {
     while text.last().is_some_and(|last| matches!(last, b'\n' | b'\r')) {
         text.pop();
     }
-    accept(text, &format!("the password file {shown}"))
+    accept(Secret::new(std::mem::take(&mut *text)), &format!("the password file {shown}"))
 }
 
-fn accept(password: Vec<u8>, place: &str) -> Result<Secret, CliError> {
-    let password = Secret::new(password);
+fn accept(password: Secret, place: &str) -> Result<Secret, CliError> {
     if password.is_empty() {
         return Err(CliError::message(Kind::Usage, format!("{place} is empty")));
     }

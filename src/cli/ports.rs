@@ -128,10 +128,16 @@ mod tests {
         };
         vec![
             (
-                Port { path: "/dev/ttyUSB0".into(), kind: Kind::Usb, usb: Some(usb), driver: Some("ftdi_sio".into()) },
+                Port {
+                    path: "/dev/ttyUSB0".into(),
+                    kind: Kind::Usb,
+                    usb: Some(usb),
+                    driver: Some("ftdi_sio".into()),
+                    place: None,
+                },
                 Some(Holder { name: "picocom".into(), pid: 4711 }),
             ),
-            (Port { path: "/dev/ttyS0".into(), kind: Kind::Native, usb: None, driver: None }, None),
+            (Port { path: "/dev/ttyS0".into(), kind: Kind::Native, usb: None, driver: None, place: None }, None),
         ]
     }
 

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use jiff::tz::TimeZone;
 
 use super::Global;
-use super::confirm::confirm;
-use super::error::{CliError, Kind};
+use super::ask::{self, confirm};
+use super::error::CliError;
 use super::output::Output;
 use super::stream::{leave_as_found, watch};
 use super::talk::{Ended, Talk};
@@ -56,6 +56,7 @@ struct Findings {
 /// in the report, which says so.
 pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let is_recording = link::is_recording(global);
+    files::admit(&args.out, global.yes)?;
     if !is_recording && !args.no_dictionary {
         confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
     }
@@ -89,7 +90,7 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
         transcript: &transcript,
         start_of_day: clock::time_of_day(start.as_millisecond()),
     };
-    files::write_whole(&args.out, contents.html().as_bytes())?;
+    files::save(&args.out, contents.html().as_bytes(), global.yes)?;
     output.remark(&format!("axcon: the report is in {}", args.out.display()));
     Ok(())
 }
@@ -106,18 +107,23 @@ impl Findings {
     /// Watches the stream for some seconds; one that is off is switched on for as long.
     fn watch_values(&mut self, talk: &mut Talk, seconds: u64, output: &mut Output) -> Result<(), CliError> {
         let found = watch(talk)?;
-        if found.is_none() {
-            self.ask(talk, Command::StreamOn { source: Source::FieldValue, period: PERIOD }, "the stream")?;
+        if found.is_some() {
+            return self.listen(talk, seconds);
         }
+        let watched = self
+            .ask(talk, Command::StreamOn { source: Source::FieldValue, period: PERIOD }, "the stream")
+            .and_then(|()| self.listen(talk, seconds));
+        // However it ended.
+        watched.and(leave_as_found(talk, false, found, output))
+    }
+
+    fn listen(&mut self, talk: &mut Talk, seconds: u64) -> Result<(), CliError> {
         let until = talk.now() + Duration::from_secs(seconds);
         let whole = talk.listen(until, |session, event| {
             self.fold(session, event);
             Ok(ControlFlow::Continue(()))
         })?;
-        if found.is_none() {
-            leave_as_found(talk, false, found, output)?;
-        }
-        if whole { Ok(()) } else { Err(CliError::message(Kind::Interrupted, "interrupted")) }
+        if whole { Ok(()) } else { Err(ask::interrupted()) }
     }
 
     /// Asks for something that the report can do without.
@@ -127,7 +133,7 @@ impl Findings {
             Ok(())
         })?;
         match ended {
-            Ended::Finished { interrupted: true, .. } => Err(CliError::message(Kind::Interrupted, "interrupted")),
+            Ended::Finished { interrupted: true, .. } => Err(ask::interrupted()),
             Ended::Lost { error, .. } => Err(error),
             Ended::Finished { outcome: Outcome::DictionaryRead(reading), .. } => {
                 self.reading = Some(*reading);

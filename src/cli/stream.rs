@@ -1,19 +1,20 @@
 //! `axcon stream`: the unit's data stream as CSV, JSON lines or as it is.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
 use serde::Serialize;
 
-use super::Global;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::{Closed, Output};
 use super::talk::{Calendar, Ended, Talk};
+use super::{Global, ask, files};
 use crate::device::Product;
+use crate::host::save::SaveError;
 use crate::session::{Command, Event, Outcome};
 use crate::time::{BITS_PER_CHARACTER, Duration, Instant};
 use crate::wire::stream::{Layout, Reading, Row, Source};
@@ -34,7 +35,7 @@ pub struct Args {
     /// How rows are written. JSON lines if --json is given.
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// Write to FILE instead of standard output.
+    /// Write to FILE instead of standard output. It is made with the first row; one that is there needs --yes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// End after N rows.
@@ -87,7 +88,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if link::is_recording(global) && (args.off || args.period.is_some() || args.keep) {
         return Err(link::read_only("change its stream"));
     }
-    let file = args.out.as_ref().map(create).transpose()?;
+    let file = args.out.map(|path| OutFile::admit(path, global.yes)).transpose()?;
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     if args.off {
@@ -95,10 +96,10 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         talk.close(output);
         return talk.expect_done(outcome);
     }
-    let sink = Sink { file, format, source: wanted, calendar: talk.calendar(), header_written: false, rows: 0 };
+    let sink = Sink { file, format, source: wanted, calendar: talk.calendar(), channels: None, rows: 0 };
     let period = args.period.map(Duration::from_millis);
     let limits = Limits { count: args.count, duration };
-    let mut stream = Stream { talk, sink, limits, until: Instant::NEVER, setting: None };
+    let mut stream = Stream { talk, sink, limits, until: Instant::NEVER, setting: None, was_on: false };
     if stream.talk.is_recorded() {
         let written = stream.write_rows(output);
         let flushed = stream.sink.flush();
@@ -107,18 +108,29 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     }
     let found = watch(&mut stream.talk)?;
     let joins = found.is_some_and(|found| period.is_none() && wanted.is_none_or(|wanted| wanted == found.source));
-    let mut was_on = found.is_some();
-    if !joins {
+    stream.was_on = found.is_some();
+    let begun = if joins {
+        Ok(())
+    } else {
         let source = wanted.or(found.map(|found| found.source)).unwrap_or(Source::FieldValue);
         let period = period.or(found.and_then(|found| found.period)).unwrap_or(PERIOD);
         warn_of_rate(&stream.talk, source, period, global.baud, output);
-        was_on |= stream.switch_on(source, period, output)?;
-    }
-    let written = stream.keep_writing(Duration::from_secs(args.reconnect), output);
-    let Stream { mut talk, mut sink, .. } = stream;
-    let left = if args.keep || (joins && was_on) { Ok(()) } else { leave_as_found(&mut talk, was_on, found, output) };
+        stream.switch_on(source, period, output)
+    };
+    let written = begun.and_then(|()| stream.keep_writing(Duration::from_secs(args.reconnect), output));
+    let Stream { mut talk, mut sink, setting, was_on, .. } = stream;
+    // However it ended, and also if the first row never came: what has been changed is changed back.
+    let left = match setting {
+        Some(_) if !args.keep => leave_as_found(&mut talk, was_on, found, output),
+        Some(_) | None => Ok(()),
+    };
     let flushed = sink.flush();
     talk.close(output);
+    let written = match written {
+        // Whoever read our output has enough: that is a way to end.
+        Err(error) if error.error.is::<Closed>() => Ok(()),
+        written => written,
+    };
     written.and(left).and(flushed)
 }
 
@@ -135,8 +147,10 @@ struct Stream {
     limits: Limits,
     /// When the time is over.
     until: Instant,
-    /// What the stream was switched to, if it was.
+    /// What the stream was switched to, if that was begun.
     setting: Option<(Source, Duration)>,
+    /// Whether it was on before, as far as is known.
+    was_on: bool,
 }
 
 /// How long the rows of a unit that was on all the time may take to come behind a cable that is back, beside their
@@ -144,8 +158,8 @@ struct Stream {
 const ROWS_AGAIN: Duration = Duration::from_secs(7);
 
 impl Stream {
-    /// Switches the stream on and says whether it was on before. The row that proves it is the first one written.
-    fn switch_on(&mut self, source: Source, period: Duration, output: &mut Output) -> Result<bool, CliError> {
+    /// Switches the stream on. The row that proves it is the first one written.
+    fn switch_on(&mut self, source: Source, period: Duration, output: &mut Output) -> Result<(), CliError> {
         self.setting = Some((source, period));
         let mut proof = None;
         let ended = self.talk.run(Command::StreamOn { source, period }, |session, event| {
@@ -154,18 +168,16 @@ impl Stream {
             }
             Ok(())
         })?;
-        let was_on = match ended {
-            Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => was_on,
-            Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(outcome).map(|()| false),
-            Ended::Finished { interrupted: true, .. } => {
-                return Err(CliError::message(Kind::Interrupted, "interrupted"));
-            }
+        match ended {
+            Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => self.was_on |= was_on,
+            Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(outcome),
+            Ended::Finished { interrupted: true, .. } => return Err(ask::interrupted()),
             Ended::Lost { error, .. } => return Err(error),
-        };
-        if let Some((at, row, raw)) = proof {
-            self.sink.row(at, &row, &raw, output)?;
         }
-        Ok(was_on)
+        match proof {
+            Some((at, row, raw)) => self.sink.row(at, &row, &raw, output),
+            None => Ok(()),
+        }
     }
 
     /// Writes rows until it is enough, also over a cable that was pulled out in between.
@@ -175,30 +187,39 @@ impl Stream {
                 Err(error) if error.kind == Kind::PortGone => error,
                 ended => return ended,
             };
-            if !self.talk.reconnect(lost, patience, output)? {
+            let is_back = self.talk.reconnect(lost, patience, output)?;
+            if !(is_back && self.ask_again(output)?) {
                 return Ok(());
             }
-            self.ask_again(output)?;
         }
     }
 
-    /// A unit that has lost its power with the cable may have come back without its stream.
-    fn ask_again(&mut self, output: &mut Output) -> Result<(), CliError> {
-        let Some((source, period)) = self.setting else { return Ok(()) };
+    /// A unit that has lost its power with the cable may have come back without its stream. `Ok(false)` if the user has
+    /// had enough.
+    fn ask_again(&mut self, output: &mut Output) -> Result<bool, CliError> {
+        let Some((source, period)) = self.setting else { return Ok(true) };
         let until = self.talk.now() + ROWS_AGAIN + period;
         let mut runs = false;
         let sink = &mut self.sink;
-        self.talk.listen(until, |session, event| {
+        let undisturbed = self.talk.listen(until, |session, event| {
             let Event::Row { at, span, row } = event else { return Ok(ControlFlow::Continue(())) };
             runs = true;
             sink.row(*at, row, &session.record().bytes(*span), output)?;
             Ok(ControlFlow::Break(()))
         })?;
-        if !runs {
+        if undisturbed && !runs {
+            let product = |talk: &Talk| talk.session().facts().product.as_ref().map(|known| known.value.clone());
+            let before = product(&self.talk);
             self.talk.find_application()?;
+            let now = product(&self.talk);
+            if let (Some(before), Some(now)) = (before, now)
+                && before != now
+            {
+                return Err(another_unit(&format!("the unit is an {now} now and was an {before}")));
+            }
             self.switch_on(source, period, output)?;
         }
-        Ok(())
+        Ok(undisturbed)
     }
 
     fn write_rows(&mut self, output: &mut Output) -> Result<(), CliError> {
@@ -211,7 +232,7 @@ impl Stream {
         if count.is_some_and(|count| sink.rows >= count) {
             return Ok(());
         }
-        let result = self.talk.listen(self.until, |session, event| {
+        self.talk.listen(self.until, |session, event| {
             if let Event::Row { at, span, row } = event {
                 sink.row(*at, row, &session.record().bytes(*span), output)?;
             }
@@ -220,13 +241,8 @@ impl Stream {
             } else {
                 ControlFlow::Continue(())
             })
-        });
-        match result {
-            Ok(_) => Ok(()),
-            // Whoever read our output has enough: that is a way to end.
-            Err(error) if error.error.is::<Closed>() => Ok(()),
-            Err(error) => Err(error),
-        }
+        })?;
+        Ok(())
     }
 }
 
@@ -247,7 +263,7 @@ pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
     let mut last = None;
     let mut rows = 0u32;
     let until = talk.now() + LISTEN_FIRST;
-    talk.listen(until, |_, event| {
+    let undisturbed = talk.listen(until, |_, event| {
         if let Event::Row { at, row, .. } = event {
             first.get_or_insert((*at, row.source));
             last = Some((*at, row.source));
@@ -255,6 +271,9 @@ pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
         }
         Ok(ControlFlow::Continue(()))
     })?;
+    if !undisturbed {
+        return Err(ask::interrupted());
+    }
     Ok(first.zip(last).map(|((begun, _), (ended, source))| {
         let period = (rows > 1).then(|| ended.since(begun) / (rows - 1));
         // Rows come at whole milliseconds; the clock that saw them is not that exact.
@@ -313,12 +332,13 @@ fn layout(talk: &Talk) -> Option<&'static Layout> {
 
 /// Where rows go.
 struct Sink {
-    file: Option<(PathBuf, BufWriter<File>)>,
+    file: Option<OutFile>,
     format: Format,
     /// Rows of another source are left out.
     source: Option<Source>,
     calendar: Calendar,
-    header_written: bool,
+    /// How many channels the rows have, once one was written.
+    channels: Option<usize>,
     rows: u64,
 }
 
@@ -343,12 +363,16 @@ impl Sink {
             return Ok(());
         }
         let channels = channels_of(row);
+        if let Some(before) = self.channels.filter(|&before| before != row.readings.len()) {
+            let now = row.readings.len();
+            return Err(another_unit(&format!("the unit's rows have {now} values now and had {before}")));
+        }
         let time = self.calendar.text(at);
         let mut text = Vec::new();
         match self.format {
             Format::Raw => text.extend_from_slice(raw),
             Format::Csv => {
-                if !self.header_written {
+                if self.channels.is_none() {
                     text.extend_from_slice(Row::csv_heading(channels).as_bytes());
                 }
                 text.extend_from_slice(row.csv(&time).trim_end().as_bytes());
@@ -361,22 +385,70 @@ impl Sink {
             }
         }
         text.push(b'\n');
-        self.header_written = true;
+        self.channels = Some(row.readings.len());
         self.rows += 1;
         match &mut self.file {
             None => output.data(&text),
-            Some((path, file)) => {
-                file.write_all(&text).and_then(|()| file.flush()).map_err(|error| file_error(path, error))
-            }
+            Some(file) => file.write(&text),
         }
     }
 
     fn flush(&mut self) -> Result<(), CliError> {
-        match &mut self.file {
-            None => Ok(()),
-            Some((path, file)) => file.flush().map_err(|error| file_error(path, error)),
-        }
+        self.file.as_mut().map_or(Ok(()), OutFile::flush)
     }
+}
+
+/// A file that is made with the first row: until then yesterday's is there.
+struct OutFile {
+    path: PathBuf,
+    overwrite: bool,
+    file: Option<BufWriter<File>>,
+}
+
+impl OutFile {
+    /// A file that may be written. What is no file, a pipe or a device, is written to as it is.
+    fn admit(path: PathBuf, overwrite: bool) -> Result<Self, CliError> {
+        if path.is_dir() {
+            return Err(files::save_error(&path, SaveError::NotAFile));
+        }
+        if path.is_file() {
+            files::admit(&path, overwrite)?;
+        }
+        Ok(OutFile { path, overwrite, file: None })
+    }
+
+    fn write(&mut self, text: &[u8]) -> Result<(), CliError> {
+        let written = self.opened().and_then(|file| file.write_all(text).and_then(|()| file.flush()));
+        written.map_err(|error| self.failed(error))
+    }
+
+    fn flush(&mut self) -> Result<(), CliError> {
+        let flushed = self.file.as_mut().map_or(Ok(()), BufWriter::flush);
+        flushed.map_err(|error| self.failed(error))
+    }
+
+    fn opened(&mut self) -> io::Result<&mut BufWriter<File>> {
+        let file = match self.file.take() {
+            Some(file) => file,
+            None => {
+                let mut options = File::options();
+                options.write(true);
+                let is_new = !self.overwrite && !self.path.exists();
+                options.create_new(is_new).create(true).truncate(true);
+                BufWriter::new(options.open(&self.path)?)
+            }
+        };
+        Ok(self.file.insert(file))
+    }
+
+    fn failed(&self, error: io::Error) -> CliError {
+        files::save_error(&self.path, SaveError::Io(error))
+    }
+}
+
+fn another_unit(what: &str) -> CliError {
+    CliError::message(Kind::Failed, what.to_owned())
+        .hint("another unit answers: its values are not written behind those of the first one")
 }
 
 /// Names of a row's fields, from the layout that has as many.
@@ -401,15 +473,4 @@ fn seconds(seconds: f64) -> Result<Duration, CliError> {
     Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero()).ok_or_else(|| {
         CliError::message(Kind::Usage, format!("--duration {seconds} is not a length of time in seconds"))
     })
-}
-
-fn create(path: &PathBuf) -> Result<(PathBuf, BufWriter<File>), CliError> {
-    match File::create(path) {
-        Ok(file) => Ok((path.clone(), BufWriter::new(file))),
-        Err(error) => Err(file_error(path, error)),
-    }
-}
-
-fn file_error(path: &std::path::Path, error: std::io::Error) -> CliError {
-    CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot write '{}'", path.display())))
 }

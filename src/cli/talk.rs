@@ -2,15 +2,15 @@
 //! unit's place where a command only reads.
 
 use std::ops::ControlFlow;
-use std::sync::mpsc::SyncSender;
+use std::sync::mpsc::{Receiver, SyncSender};
 
 use jiff::Timestamp;
 
-use super::Global;
 use super::error::{CliError, Kind};
 use super::link;
-use super::output::Output;
+use super::output::{Output, Remarks};
 use super::playback::Playback;
+use super::{Global, ask};
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::LinkSpec;
@@ -32,6 +32,7 @@ pub struct Talk {
     spec: LinkSpec,
     comeback: Option<Comeback>,
     inputs: SyncSender<Input>,
+    remarks: Remarks,
     _signals: Signals,
 }
 
@@ -108,7 +109,7 @@ impl Talk {
         } else {
             let clock = Clock::start();
             let connection = link::open(&spec, global, clock, sender.clone())?;
-            comeback = Comeback::of(&spec, &connection, link::options(global));
+            comeback = Comeback::of(&spec, link::options(global));
             let mut recorder = Recorder::start(&link::recording(global), &connection, clock);
             if let Some(warning) = recorder.take_warning() {
                 output.remark(&format!("axcon: {warning}"));
@@ -116,7 +117,8 @@ impl Talk {
             let line = Line::Live(Box::new(Pump::new(connection, inputs, clock, recorder)));
             (line, Session::new(global.baud))
         };
-        Ok(Talk { line, session, port: spec.to_string(), spec, comeback, inputs: sender, _signals: signals })
+        let (port, remarks) = (spec.to_string(), output.err.clone());
+        Ok(Talk { line, session, port, spec, comeback, inputs: sender, remarks, _signals: signals })
     }
 
     /// Runs a job to its end; `news` hears every event on the way. An interrupt cancels the job, a second one is final.
@@ -225,6 +227,26 @@ impl Talk {
         }
     }
 
+    /// Listens until somebody who was asked has answered.
+    ///
+    /// # Errors
+    /// If the user interrupts, or the link is lost.
+    pub fn await_answer<T>(&mut self, answer: &Receiver<T>) -> Result<T, CliError> {
+        let step = self.step(Instant::NEVER, |session| {
+            while session.poll_event().is_some() {}
+            answer.try_recv().map_or(ControlFlow::Continue(()), ControlFlow::Break)
+        });
+        step.map_err(|error| match error {
+            PumpError::Interrupted(_) => ask::interrupted(),
+            error => link::pump_error(error),
+        })
+    }
+
+    /// Where inputs for the conversation are put.
+    pub fn inputs(&self) -> SyncSender<Input> {
+        self.inputs.clone()
+    }
+
     /// Whether this is a recording, to which nothing can be said.
     pub fn is_recorded(&self) -> bool {
         matches!(self.line, Line::Recorded(_))
@@ -236,7 +258,12 @@ impl Talk {
         mut look: impl FnMut(&mut Session) -> ControlFlow<T>,
     ) -> Result<T, PumpError> {
         match &mut self.line {
-            Line::Live(pump) => pump.run(&mut self.session, deadline, Session::record, |session, _| look(session)),
+            Line::Live(pump) => pump.run(&mut self.session, deadline, Session::record, |session, warning| {
+                if let Some(warning) = warning {
+                    self.remarks.say(&format!("axcon: {warning}"));
+                }
+                look(session)
+            }),
             Line::Recorded(playback) => playback.run(&mut self.session, deadline, |session, _| look(session)),
         }
     }
@@ -248,7 +275,10 @@ impl Talk {
     /// If it has not come back within `patience`: the error is the one that it was lost with.
     pub fn reconnect(&mut self, lost: CliError, patience: Duration, output: &mut Output) -> Result<bool, CliError> {
         let Line::Live(pump) = &mut self.line else { return Err(lost) };
-        let Some(comeback) = self.comeback.as_ref().filter(|_| !patience.is_zero()) else { return Err(lost) };
+        let Some(comeback) = self.comeback.as_mut().filter(|_| !patience.is_zero()) else { return Err(lost) };
+        comeback.lost();
+        // An adapter whose old name is still open gets another one when it comes back.
+        pump.disconnect();
         let clock = pump.clock();
         let gone = clock.now();
         self.session.link_lost(gone);

@@ -6,10 +6,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+
+use super::save::{SaveError, save};
 
 /// The notes.
 #[derive(Clone, Debug)]
@@ -106,18 +108,11 @@ impl Journal {
     /// Replaces the file as a whole: old or new, never torn.
     fn write(&self, mut notes: Notes) -> io::Result<()> {
         SCHEMA.clone_into(&mut notes.schema);
-        let folder = self.file.parent().unwrap_or(Path::new("."));
-        let fresh = folder.join(format!("uploads.json.{}.tmp", std::process::id()));
-        let mut file = fs::File::create(&fresh)?;
-        let written = serde_json::to_writer_pretty(&mut file, &notes)
-            .map_err(io::Error::from)
-            .and_then(|()| file.write_all(b"\n"))
-            .and_then(|()| file.sync_all())
-            .and_then(|()| fs::rename(&fresh, &self.file));
-        if written.is_err() {
-            let _ = fs::remove_file(&fresh);
-        }
-        written
+        let text = serde_json::to_string_pretty(&notes)? + "\n";
+        save(&self.file, text.as_bytes(), true).map_err(|error| match error {
+            SaveError::Io(error) => error,
+            SaveError::Exists | SaveError::NotAFile => io::Error::other(error.to_string()),
+        })
     }
 }
 

@@ -15,6 +15,7 @@ pub mod ports;
 pub mod pump;
 pub mod recorder;
 pub mod replay;
+pub mod save;
 pub mod signal;
 pub mod terminal;
 
@@ -34,9 +35,11 @@ pub mod state;
 #[cfg(unix)]
 pub mod unit;
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::collections::VecDeque;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 
-use crate::time::Instant;
+use crate::endpoint::Arrived;
+use crate::time::{Duration, Instant};
 use link::LinkError;
 
 /// What the world did, on the one channel of a program's loop.
@@ -49,7 +52,7 @@ pub enum Input {
         /// What, at least one byte.
         bytes: Vec<u8>,
     },
-    /// The port is gone, and nothing more comes from this connection.
+    /// The port is gone. Told once for each connection; what was read before may still come behind it.
     Gone(LinkError),
     /// The process got a signal (its number).
     Signal(i32),
@@ -68,4 +71,116 @@ pub const INPUTS: usize = 64;
 /// The one channel of a program's loop.
 pub fn channel() -> (SyncSender<Input>, Receiver<Input>) {
     sync_channel(INPUTS)
+}
+
+/// The receiving end of the channel, with what has been taken from it and not looked at.
+///
+/// A loop that was kept away, by a stopped terminal or a slow disk, finds the answers of the unit here and a clock that
+/// has gone on. It takes the bytes first: what came in time must not be lost to a deadline that nobody could keep.
+#[derive(Debug)]
+pub struct Inbox {
+    inputs: Receiver<Input>,
+    waiting: VecDeque<Input>,
+}
+
+/// Nobody can put anything on the channel any more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Closed;
+
+impl Inbox {
+    /// Everything that comes on this channel.
+    pub fn new(inputs: Receiver<Input>) -> Self {
+        Inbox { inputs, waiting: VecDeque::new() }
+    }
+
+    /// All bytes that have come, in their pieces, up to the loss of the port if there is one.
+    pub fn arrived(&mut self) -> Vec<Arrived> {
+        self.collect();
+        let mut arrived = Vec::new();
+        let mut others = VecDeque::new();
+        while let Some(input) = self.waiting.pop_front() {
+            match input {
+                Input::Bytes { at, bytes } => arrived.push(Arrived { at, bytes }),
+                Input::Gone(_) => {
+                    self.waiting.push_front(input);
+                    break;
+                }
+                Input::Signal(_) | Input::Typed(_) | Input::TypedEnd | Input::Wake => others.push_back(input),
+            }
+        }
+        others.append(&mut self.waiting);
+        self.waiting = others;
+        arrived
+    }
+
+    /// The next input that is not bytes. `None` if the time is over, or bytes come first.
+    ///
+    /// # Errors
+    /// If nothing can come any more.
+    pub fn next(&mut self, patience: Duration) -> Result<Option<Input>, Closed> {
+        if self.waiting.is_empty() {
+            match self.inputs.recv_timeout(patience) {
+                Ok(input) => self.waiting.push_back(input),
+                Err(RecvTimeoutError::Timeout) => return Ok(None),
+                Err(RecvTimeoutError::Disconnected) => return Err(Closed),
+            }
+        }
+        let is_bytes = matches!(self.waiting.front(), Some(Input::Bytes { .. }));
+        Ok(if is_bytes { None } else { self.waiting.pop_front() })
+    }
+
+    /// Forgets what has come from a link that is closed.
+    pub fn forget_link(&mut self) {
+        self.collect();
+        self.waiting.retain(|input| !matches!(input, Input::Bytes { .. } | Input::Gone(_)));
+    }
+
+    fn collect(&mut self) {
+        let room = INPUTS.saturating_sub(self.waiting.len());
+        self.waiting.extend(self.inputs.try_iter().take(room));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::{Cause, Operation};
+
+    fn bytes(millis: u64, text: &str) -> Input {
+        Input::Bytes { at: Instant::from_millis(millis), bytes: text.into() }
+    }
+
+    #[test]
+    fn bytes_come_first_each_piece_with_its_time_and_none_from_behind_the_loss_of_the_port() {
+        let (sender, inputs) = channel();
+        let mut inbox = Inbox::new(inputs);
+        let gone = Input::Gone(LinkError { port: "u0".into(), operation: Operation::Read, cause: Cause::Gone });
+        for input in [bytes(1, "a"), Input::Wake, bytes(2, "b"), gone, Input::Signal(2), bytes(3, "c")] {
+            sender.send(input).expect("there is room");
+        }
+        let arrived: Vec<(Instant, Vec<u8>)> =
+            inbox.arrived().into_iter().map(|piece| (piece.at, piece.bytes)).collect();
+        assert_eq!(arrived, [(Instant::from_millis(1), b"a".to_vec()), (Instant::from_millis(2), b"b".to_vec())]);
+        let mut next = || inbox.next(Duration::ZERO);
+        assert!(matches!(next(), Ok(Some(Input::Wake))));
+        assert!(matches!(next(), Ok(Some(Input::Gone(_)))));
+        assert!(matches!(next(), Ok(Some(Input::Signal(2)))));
+        assert!(matches!(next(), Ok(None)), "bytes are taken by the other way");
+        assert_eq!(inbox.arrived().len(), 1);
+        assert!(matches!(inbox.next(Duration::ZERO), Ok(None)));
+        drop(sender);
+        assert_eq!(inbox.next(Duration::ZERO).err(), Some(Closed));
+    }
+
+    #[test]
+    fn what_a_closed_link_has_left_is_forgotten_and_a_signal_is_not() {
+        let (sender, inputs) = channel();
+        let mut inbox = Inbox::new(inputs);
+        for input in [bytes(1, "a"), Input::Signal(15)] {
+            sender.send(input).expect("there is room");
+        }
+        inbox.forget_link();
+        assert_eq!(inbox.arrived(), []);
+        assert!(matches!(inbox.next(Duration::ZERO), Ok(Some(Input::Signal(15)))));
+    }
 }

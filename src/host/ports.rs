@@ -17,6 +17,8 @@ pub struct Port {
     pub usb: Option<Usb>,
     /// The kernel's driver, where the system tells.
     pub driver: Option<String>,
+    /// Where a USB adapter is plugged in, with its interface (`1-1.4:1.0`), where the system tells.
+    pub place: Option<String>,
 }
 
 /// What a port hangs on.
@@ -106,40 +108,60 @@ pub fn describe(path: &Path) -> Port {
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let listed = list().unwrap_or_default().into_iter().find(|port| Path::new(&port.path) == target);
     let kind = if target.starts_with("/dev/pts") { Kind::Pty } else { Kind::Native };
-    listed.unwrap_or_else(|| Port { path: path.display().to_string(), kind, usb: None, driver: None })
+    listed.unwrap_or_else(|| Port { path: path.display().to_string(), kind, usb: None, driver: None, place: None })
 }
 
-/// Where an adapter is now that was at `path` before the cable was pulled: a USB adapter keeps its identity and not its
-/// name. Everything else is known by its path. `None` while it is not there.
-pub fn find_again(path: &Path, adapter: Option<&Adapter>) -> Option<PathBuf> {
-    let Some(adapter) = adapter else { return path.exists().then(|| path.to_owned()) };
-    again(&list().unwrap_or_default(), path, adapter)
+/// The other ports whose adapters nobody could tell from this one by what they say of themselves.
+pub fn alike(port: &Port) -> Vec<Port> {
+    list().unwrap_or_default().into_iter().filter(|other| is_alike(other, port) && other.path != port.path).collect()
 }
 
-fn again(ports: &[Port], path: &Path, adapter: &Adapter) -> Option<PathBuf> {
-    let same: Vec<&Port> = ports
-        .iter()
-        .filter(|port| {
-            port.usb.clone().map(Adapter::from).is_some_and(|other| {
-                (&other.vid, &other.pid, &other.serial_number) == (&adapter.vid, &adapter.pid, &adapter.serial_number)
-            })
-        })
-        .collect();
-    // Without a serial number, adapters of one kind are told apart by their place only.
-    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let at_its_place = same.iter().find(|port| Path::new(&port.path) == target);
-    match (at_its_place, same.as_slice()) {
-        (Some(port), _) => Some(port.path.clone().into()),
-        (None, [only]) => Some(only.path.clone().into()),
-        (None, _) => None,
-    }
+/// Where an adapter is now whose cable was pulled: it keeps its identity and not its name. `others` are those
+/// [`alike`] when the link was lost, which it cannot be. `None` while it is not there, or nobody can say that it is the
+/// same: what hangs on another adapter is another unit.
+pub fn find_again(port: &Port, others: &[Port]) -> Option<PathBuf> {
+    again(&list().unwrap_or_default(), port, others)
+}
+
+fn again(ports: &[Port], port: &Port, others: &[Port]) -> Option<PathBuf> {
+    let was_there =
+        |found: &Port| others.iter().any(|other| (&other.path, &other.place) == (&found.path, &found.place));
+    let found: Vec<&Port> = ports.iter().filter(|found| is_alike(found, port) && !was_there(found)).collect();
+    let at_its_place = found.iter().find(|found| found.place.is_some() && found.place == port.place);
+    let of_its_name = || found.iter().find(|found| found.path == port.path);
+    // Some makers give all their adapters one number.
+    let is_unique = others.is_empty() && port.usb.as_ref().is_some_and(|usb| usb.serial_number.is_some());
+    let by_number = || found.first().filter(|_| is_unique && found.len() == 1);
+    at_its_place.or_else(of_its_name).or_else(by_number).map(|found| PathBuf::from(&found.path))
+}
+
+fn is_alike(one: &Port, other: &Port) -> bool {
+    let identity = |port: &Port| port.usb.as_ref().map(|usb| (usb.vid, usb.pid, usb.serial_number.clone()));
+    identity(one).is_some() && identity(one) == identity(other)
 }
 
 /// The first process that has the port open, apart from the host of a pseudo-terminal itself. `None` also where the
 /// system does not say: other users' processes are not visible.
 pub fn holder(path: &Path) -> Option<Holder> {
-    processes::holder(path)
+    processes::holder(path, |_| true)
 }
+
+/// The same without this process, and without one that it is just starting: until that runs its own program, it has this
+/// one's files.
+pub fn other_holder(path: &Path) -> Option<Holder> {
+    processes::holder(path, |pid| !processes::is_ours(pid))
+}
+
+/// The process that says it has the port by a lock file (`/run/lock/LCK..ttyUSB0`), as terminal programs have done since
+/// UUCP. `None` for one whose process is gone, or this one.
+#[cfg(unix)]
+pub fn lock_holder(path: &Path) -> Option<Holder> {
+    LOCK_FOLDERS.iter().find_map(|folder| locks::holder(Path::new(folder), path))
+}
+
+/// Where systems keep lock files of ports.
+#[cfg(unix)]
+const LOCK_FOLDERS: [&str; 3] = ["/run/lock", "/var/lock", "/var/spool/uucp"];
 
 fn port(info: serialport::SerialPortInfo) -> Port {
     let (kind, usb) = match info.port_type {
@@ -156,7 +178,8 @@ fn port(info: serialport::SerialPortInfo) -> Port {
         SerialPortType::BluetoothPort => (Kind::Bluetooth, None),
         SerialPortType::PciPort | SerialPortType::Unknown => (Kind::Native, None),
     };
-    Port { driver: driver(&info.port_name), path: info.port_name, kind, usb }
+    let place = usb.as_ref().and_then(|_| place(&info.port_name));
+    Port { driver: driver(&info.port_name), path: info.port_name, kind, usb, place }
 }
 
 fn driver(path: &str) -> Option<String> {
@@ -166,6 +189,14 @@ fn driver(path: &str) -> Option<String> {
         device.pop();
     }
     target_name(&device.join("driver"))
+}
+
+/// The USB interface the port hangs on: the nearest device above it that is one.
+fn place(path: &str) -> Option<String> {
+    let device = std::fs::canonicalize(sysfs(path)?.join("device")).ok()?;
+    let is_interface = |device: &&Path| target_name(&device.join("subsystem")).is_some_and(|name| name == "usb");
+    let interface = device.ancestors().find(is_interface)?;
+    Some(interface.file_name()?.to_string_lossy().into_owned())
 }
 
 fn target_name(link: &Path) -> Option<String> {
@@ -198,14 +229,30 @@ mod processes {
 
     use super::Holder;
 
-    pub fn holder(path: &Path) -> Option<Holder> {
+    /// The first process, of those that count, that uses the port.
+    pub fn holder(path: &Path, counts: impl Fn(u32) -> bool) -> Option<Holder> {
         let target = fs::canonicalize(path).ok()?;
         let mut pids: Vec<u32> =
             fs::read_dir("/proc").ok()?.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).collect();
         pids.sort_unstable();
-        let pid = pids.into_iter().find(|&pid| holds(pid, &target))?;
-        let name = fs::read_to_string(format!("/proc/{pid}/comm")).unwrap_or_default();
-        Some(Holder { name: name.trim_end().to_owned(), pid })
+        let pid = pids.into_iter().find(|&pid| holds(pid, &target) && counts(pid))?;
+        Some(Holder { name: name(pid).unwrap_or_default(), pid })
+    }
+
+    /// What the system calls a process.
+    pub fn name(pid: u32) -> Option<String> {
+        Some(fs::read_to_string(format!("/proc/{pid}/comm")).ok()?.trim_end().to_owned())
+    }
+
+    /// Whether it is this process, or a child of it that has not begun its own program yet.
+    pub fn is_ours(pid: u32) -> bool {
+        let own = std::process::id();
+        let program = |pid: u32| fs::read_link(format!("/proc/{pid}/exe")).ok();
+        let parent = || {
+            let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+            status.lines().find_map(|line| line.strip_prefix("PPid:"))?.trim().parse::<u32>().ok()
+        };
+        pid == own || (parent() == Some(own) && program(pid) == program(own))
     }
 
     /// Whether the process uses the port. The host of a pseudo-terminal keeps one descriptor of the client's side
@@ -241,8 +288,53 @@ mod processes {
 
     use super::Holder;
 
-    pub fn holder(_path: &Path) -> Option<Holder> {
+    pub fn holder(_path: &Path, _counts: impl Fn(u32) -> bool) -> Option<Holder> {
         None
+    }
+
+    #[cfg(unix)]
+    pub fn name(_pid: u32) -> Option<String> {
+        None
+    }
+
+    pub fn is_ours(pid: u32) -> bool {
+        pid == std::process::id()
+    }
+}
+
+#[cfg(unix)]
+mod locks {
+    //! Lock files, as the Filesystem Hierarchy Standard has them: the process number, ten characters wide.
+
+    use std::fs::File;
+    use std::io::Read;
+    use std::path::Path;
+
+    use super::{Holder, processes};
+
+    /// Bytes of a lock file that are looked at: number, program and user fit.
+    const MOST: u64 = 64;
+
+    pub fn holder(folder: &Path, port: &Path) -> Option<Holder> {
+        // Below `/dev/pts` names are bare numbers, which lock files do not tell from others.
+        let port = std::fs::canonicalize(port).ok().filter(|port| !port.starts_with("/dev/pts"))?;
+        let name = port.file_name()?.to_str()?;
+        let mut text = Vec::new();
+        File::open(folder.join(format!("LCK..{name}"))).ok()?.take(MOST).read_to_end(&mut text).ok()?;
+        let pid = process(&text).filter(|&pid| pid != std::process::id() && is_alive(pid))?;
+        Some(Holder { name: processes::name(pid).unwrap_or_else(|| "a program with a lock file".into()), pid })
+    }
+
+    /// The process that a lock file names: in digits, or as old programs write it, as a number of four bytes.
+    pub(super) fn process(text: &[u8]) -> Option<u32> {
+        let digits = std::str::from_utf8(text).ok().and_then(|text| text.split_whitespace().next()?.parse().ok());
+        digits.or_else(|| text.try_into().ok().map(u32::from_ne_bytes)).filter(|&pid| pid > 0)
+    }
+
+    fn is_alive(pid: u32) -> bool {
+        let pid = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw);
+        // A process of somebody else may not be signalled, but is there.
+        pid.is_some_and(|pid| rustix::process::test_kill_process(pid) != Err(rustix::io::Errno::SRCH))
     }
 }
 
@@ -293,29 +385,70 @@ mod tests {
         assert_eq!(names, ["/dev/ttyS0", "/dev/ttyUSB9", "/dev/ttyUSB10", "COM3", "COM12"]);
     }
 
+    fn adapter(path: &str, number: Option<&str>, place: &str) -> Port {
+        let serial_number = number.map(str::to_owned);
+        let usb = Usb { vid: 0x1a86, pid: 0x7523, serial_number, manufacturer: None, product: None };
+        let place = (!place.is_empty()).then(|| place.to_owned());
+        Port { path: path.into(), kind: Kind::Usb, usb: Some(usb), driver: None, place }
+    }
+
     #[test]
-    fn an_adapter_is_found_again_under_another_name_and_never_mistaken() {
-        let port = |path: &str, number: Option<&str>| {
-            let usb = Usb {
-                vid: 0x0403,
-                pid: 0x6001,
-                serial_number: number.map(str::to_owned),
-                manufacturer: None,
-                product: None,
-            };
-            Port { path: path.into(), kind: Kind::Usb, usb: Some(usb), driver: None }
+    fn an_adapter_with_a_number_of_its_own_is_found_under_any_name_at_any_place() {
+        let was = adapter("/dev/ttyUSB0", Some("A1"), "1-1:1.0");
+        let found = |ports: &[Port]| again(ports, &was, &[]);
+        let other = adapter("/dev/ttyUSB0", Some("B2"), "1-1:1.0");
+        assert_eq!(found(std::slice::from_ref(&other)), None, "another adapter at its place");
+        assert_eq!(found(&[other, adapter("/dev/ttyUSB2", Some("A1"), "1-2:1.0")]), Some("/dev/ttyUSB2".into()));
+        // The ports of one adapter share its number.
+        let ports = [adapter("/dev/ttyUSB3", Some("A1"), "1-1:1.1"), adapter("/dev/ttyUSB2", Some("A1"), "1-1:1.0")];
+        assert_eq!(found(&ports), Some("/dev/ttyUSB2".into()));
+        let moved = [adapter("/dev/ttyUSB3", Some("A1"), "1-2:1.0"), adapter("/dev/ttyUSB4", Some("A1"), "1-2:1.1")];
+        assert_eq!(found(&moved), None, "which of the two it is nobody can say");
+    }
+
+    #[test]
+    fn another_adapter_of_the_same_kind_is_never_taken_for_the_one_that_was_lost() {
+        for number in [None, Some("0001")] {
+            let was = adapter("/dev/ttyUSB0", number, "1-1:1.0");
+            let neighbour = adapter("/dev/ttyUSB1", number, "1-2:1.0");
+            let others = [neighbour.clone()];
+            let found = |ports: &[Port]| again(ports, &was, &others);
+            assert_eq!(found(&[neighbour.clone()]), None, "{number:?}: the neighbour was there all the time");
+            let somewhere = adapter("/dev/ttyUSB2", number, "1-3:1.0");
+            assert_eq!(found(&[neighbour.clone(), somewhere]), None, "{number:?}: a third one");
+            let renamed = adapter("/dev/ttyUSB2", number, "1-1:1.0");
+            assert_eq!(found(&[neighbour.clone(), renamed]), Some("/dev/ttyUSB2".into()), "at its place");
+            let moved = adapter("/dev/ttyUSB0", number, "1-3:1.0");
+            assert_eq!(found(&[neighbour, moved]), Some("/dev/ttyUSB0".into()), "under its name");
+            // The neighbour was pulled out as well, and ours has got its name.
+            let swapped = adapter("/dev/ttyUSB1", number, "1-1:1.0");
+            assert_eq!(found(&[swapped]), Some("/dev/ttyUSB1".into()));
+        }
+        let was = adapter("/dev/ttyUSB0", None, "1-1:1.0");
+        let alone = adapter("/dev/ttyUSB1", None, "1-2:1.0");
+        assert_eq!(again(&[alone], &was, &[]), None, "one that nothing tells from others is not enough");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_file_counts_as_long_as_its_process_lives() {
+        assert_eq!(locks::process(b"      1234\n"), Some(1234));
+        assert_eq!(locks::process(b"      1234 minicom root\n"), Some(1234));
+        assert_eq!(locks::process(&0x0001_02FF_u32.to_ne_bytes()), Some(0x0001_02FF));
+        for nonsense in [&b""[..], b"\xff\xff", b"0", b"minicom", b"\0\0\0\0"] {
+            assert_eq!(locks::process(nonsense), None, "{}", nonsense.escape_ascii());
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let port = folder.path().join("ttyUSB0");
+        std::fs::write(&port, b"").expect("written");
+        let lock = |text: String| {
+            std::fs::write(folder.path().join("LCK..ttyUSB0"), text).expect("written");
+            locks::holder(folder.path(), &port).map(|holder| holder.pid)
         };
-        let adapter = |number: Option<&str>| Adapter::from(port("", number).usb.expect("an adapter"));
-        let was = Path::new("/dev/ttyUSB0");
-        let found = |ports: &[Port], number| again(ports, was, &adapter(number));
-        let numbered = [port("/dev/ttyUSB1", Some("B2")), port("/dev/ttyUSB2", Some("A1"))];
-        assert_eq!(found(&numbered, Some("A1")), Some("/dev/ttyUSB2".into()));
-        assert_eq!(found(&numbered, Some("C3")), None);
-        let plain = [port("/dev/ttyUSB1", None), port("/dev/ttyUSB2", None)];
-        assert_eq!(found(&plain, None), None, "which of the two it is nobody can say");
-        assert_eq!(found(&plain[..1], None), Some("/dev/ttyUSB1".into()));
-        let at_its_place = [port("/dev/ttyUSB1", None), port("/dev/ttyUSB0", None)];
-        assert_eq!(found(&at_its_place, None), Some("/dev/ttyUSB0".into()));
+        let parent = std::os::unix::process::parent_id();
+        assert_eq!(lock(format!("{parent:>10}\n")), Some(parent));
+        assert_eq!(lock(format!("{:>10}\n", std::process::id())), None, "our own");
+        assert_eq!(lock(format!("{:>10}\n", i32::MAX)), None, "left behind by a process that was killed");
     }
 
     #[test]

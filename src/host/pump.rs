@@ -2,13 +2,13 @@
 //! after each step.
 
 use std::ops::ControlFlow;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::Receiver;
 
-use super::Input;
 use super::clock::Clock;
 use super::link::{Connection, LinkError, SendError};
 use super::recorder::Recorder;
 use super::replay::RecordingError;
+use super::{Closed, Inbox, Input};
 use crate::endpoint::Endpoint;
 use crate::record::Record;
 use crate::time::{Duration, Instant};
@@ -16,8 +16,11 @@ use crate::time::{Duration, Instant};
 /// A connection with the loop that serves it.
 #[derive(Debug)]
 pub struct Pump {
-    connection: Connection,
-    inputs: Receiver<Input>,
+    /// `None` while a lost link is away.
+    connection: Option<Connection>,
+    /// The port as the user named it.
+    port: String,
+    inbox: Inbox,
     clock: Clock,
     recorder: Recorder,
 }
@@ -57,11 +60,12 @@ const LONGEST_WAIT: Duration = Duration::from_secs(3600);
 impl Pump {
     /// A pump for an open connection, whose inputs (and signals) come on this channel.
     pub fn new(connection: Connection, inputs: Receiver<Input>, clock: Clock, recorder: Recorder) -> Self {
-        Pump { connection, inputs, clock, recorder }
+        let port = connection.port().to_owned();
+        Pump { connection: Some(connection), port, inbox: Inbox::new(inputs), clock, recorder }
     }
 
-    /// Runs until `look` breaks with what the command wanted, or `deadline`. `look` sees the endpoint after each step;
-    /// `record` gives the endpoint's own record, which the recording follows.
+    /// Runs until `look` breaks with what the command wanted, or `deadline`. `look` sees the endpoint after each step, and
+    /// what has gone wrong with the recording meanwhile; `record` gives the endpoint's own record, which the recording follows.
     ///
     /// # Errors
     /// If the port fails, the deadline passes, or a signal comes.
@@ -70,13 +74,18 @@ impl Pump {
         endpoint: &mut E,
         deadline: Instant,
         record: impl Fn(&E) -> &Record,
-        mut look: impl FnMut(&mut E, Instant) -> ControlFlow<T>,
+        mut look: impl FnMut(&mut E, Option<String>) -> ControlFlow<T>,
     ) -> Result<T, PumpError> {
         loop {
+            let arrived = self.inbox.arrived();
             let now = self.clock.now();
+            if !arrived.is_empty() {
+                endpoint.handle_backlog(now, &arrived);
+                self.recorder.follow(record(endpoint));
+            }
             endpoint.handle_timeout(now);
             self.drain(endpoint, &record)?;
-            if let ControlFlow::Break(result) = look(endpoint, now) {
+            if let ControlFlow::Break(result) = look(endpoint, self.recorder.take_warning()) {
                 // A command given in the last look may have something to say.
                 self.drain(endpoint, &record)?;
                 return Ok(result);
@@ -86,26 +95,26 @@ impl Pump {
                 return Err(PumpError::Deadline);
             }
             let wake = endpoint.poll_timeout().unwrap_or(Instant::NEVER).min(deadline);
-            match self.inputs.recv_timeout(self.clock.until(wake).min(LONGEST_WAIT)) {
-                Ok(Input::Bytes { at, bytes }) => {
-                    endpoint.handle_bytes(at, &bytes);
-                    self.recorder.follow(record(endpoint));
-                }
-                Ok(Input::Gone(error)) => return Err(PumpError::Link(error)),
-                Ok(Input::Signal(signal)) => return Err(PumpError::Interrupted(signal)),
-                Ok(Input::Typed(_) | Input::TypedEnd | Input::Wake) | Err(RecvTimeoutError::Timeout) => {}
+            match self.inbox.next(self.clock.until(wake).min(LONGEST_WAIT)) {
+                Ok(Some(Input::Gone(error))) => return Err(PumpError::Link(error)),
+                Ok(Some(Input::Signal(signal))) => return Err(PumpError::Interrupted(signal)),
+                Ok(Some(Input::Bytes { .. } | Input::Typed(_) | Input::TypedEnd | Input::Wake) | None) => {}
                 // The connection's threads hold the other end as long as it lives.
-                Err(RecvTimeoutError::Disconnected) => {
-                    let port = self.connection.port().to_owned();
-                    return Err(PumpError::Send { port, error: SendError::Gone });
-                }
+                Err(Closed) => return Err(self.send_error(SendError::Gone)),
             }
         }
     }
 
+    /// Closes a lost link. What it has put on the channel and nobody has taken is forgotten.
+    pub fn disconnect(&mut self) {
+        self.connection = None;
+        self.inbox.forget_link();
+    }
+
     /// Goes on over another connection, which puts its inputs on the same channel.
     pub fn replace(&mut self, connection: Connection) {
-        self.connection = connection;
+        self.port = connection.port().to_owned();
+        self.connection = Some(connection);
     }
 
     /// Waits so long, whatever else comes; a signal ends it.
@@ -115,16 +124,12 @@ impl Pump {
     pub fn pause(&mut self, time: Duration) -> Result<(), PumpError> {
         let until = self.clock.now() + time;
         while self.clock.now() < until {
-            if let Ok(Input::Signal(signal)) = self.inputs.recv_timeout(self.clock.until(until)) {
+            self.inbox.arrived();
+            if let Ok(Some(Input::Signal(signal))) = self.inbox.next(self.clock.until(until)) {
                 return Err(PumpError::Interrupted(signal));
             }
         }
         Ok(())
-    }
-
-    /// The connection.
-    pub fn connection(&self) -> &Connection {
-        &self.connection
     }
 
     /// The clock that all moments are of.
@@ -140,10 +145,90 @@ impl Pump {
     fn drain<E: Endpoint>(&mut self, endpoint: &mut E, record: &impl Fn(&E) -> &Record) -> Result<(), PumpError> {
         while let Some(transmit) = endpoint.poll_transmit() {
             self.recorder.follow(record(endpoint));
-            self.connection
-                .send(transmit.bytes)
-                .map_err(|error| PumpError::Send { port: self.connection.port().to_owned(), error })?;
+            let sent = self.connection.as_ref().map_or(Err(SendError::Gone), |link| link.send(transmit.bytes));
+            sent.map_err(|error| self.send_error(error))?;
         }
         Ok(())
+    }
+
+    fn send_error(&self, error: SendError) -> PumpError {
+        PumpError::Send { port: self.port.clone(), error }
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::endpoint::{Arrived, Secrecy, Transmit};
+    use crate::host::link::{LinkSpec, Options};
+    use crate::host::pty::Pty;
+    use crate::record::Direction;
+
+    /// Notes in which order it is told what.
+    #[derive(Default)]
+    struct Notes {
+        record: Record,
+        told: Vec<String>,
+    }
+
+    impl Endpoint for Notes {
+        fn handle_bytes(&mut self, _now: Instant, _bytes: &[u8]) {}
+
+        fn handle_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
+            for piece in backlog {
+                assert!(piece.at < now);
+                self.record.push(piece.at, Direction::FromUnit, Secrecy::Open, &piece.bytes);
+                let text = String::from_utf8_lossy(&piece.bytes).into_owned();
+                self.told.push(format!("{text} of {:?}", piece.at.since_start()));
+            }
+        }
+
+        fn handle_timeout(&mut self, _now: Instant) {
+            self.told.push("it is late".into());
+        }
+
+        fn poll_transmit(&mut self) -> Option<Transmit> {
+            None
+        }
+
+        fn poll_timeout(&self) -> Option<Instant> {
+            Some(Instant::ZERO)
+        }
+    }
+
+    fn pump(recorder: Recorder) -> (Pty, Pump, std::sync::mpsc::SyncSender<Input>) {
+        let pty = Pty::open(115_200).expect("a pseudo-terminal");
+        let (sender, inputs) = crate::host::channel();
+        let clock = Clock::start();
+        let spec = LinkSpec::Serial(pty.path().to_owned());
+        let connection =
+            Connection::open(&spec, Options { baud: 115_200 }, clock, sender.clone()).expect("the link opens");
+        (pty, Pump::new(connection, inputs, clock, recorder), sender)
+    }
+
+    #[test]
+    fn what_arrived_while_the_loop_was_kept_away_is_looked_at_before_the_clock() {
+        let (_pty, mut pump, sender) = pump(Recorder::nothing());
+        for (at, text) in [(1, "XOFF"), (2, "XON")] {
+            let at = Instant::ZERO + Duration::from_nanos(at);
+            sender.send(Input::Bytes { at, bytes: text.into() }).expect("there is room");
+        }
+        let mut notes = Notes::default();
+        let ended = pump.run(&mut notes, Instant::ZERO, |notes| &notes.record, |_, _| ControlFlow::<()>::Continue(()));
+        assert!(matches!(ended, Err(PumpError::Deadline)), "{ended:?}");
+        assert_eq!(notes.told, ["XOFF of 1ns", "XON of 2ns", "it is late"]);
+    }
+
+    #[test]
+    fn that_a_recording_ends_is_told_at_once() {
+        let (_pty, mut pump, sender) = pump(crate::host::recorder::tests::doomed());
+        sender.send(Input::Bytes { at: Instant::ZERO, bytes: b"x".to_vec() }).expect("there is room");
+        let told = pump.run(
+            &mut Notes::default(),
+            Instant::NEVER,
+            |notes| &notes.record,
+            |_, warning| warning.map_or(ControlFlow::Continue(()), ControlFlow::Break),
+        );
+        assert!(told.is_ok_and(|warning| warning.starts_with("the recording ends here: ")));
     }
 }

@@ -92,7 +92,9 @@ impl Recorder {
     fn begin(plan: &Plan, header: Header, now: Instant, stem: &str) -> Self {
         let opened = match plan {
             Plan::Nothing => return Recorder::nothing(),
-            Plan::File(path) => part(path, &header, now).map(|cast| Open::new(cast, path.clone(), now, None)),
+            Plan::File(path) => {
+                part(path, &header, now, Existing::IsReplaced).map(|cast| Open::new(cast, path.clone(), now, None))
+            }
             Plan::Unasked => folder()
                 .ok_or_else(|| io::Error::other("there is no home directory"))
                 .and_then(|folder| series(folder, stem, header, now, LIMITS)),
@@ -194,20 +196,43 @@ impl Series {
         let later = i64::try_from(now.since(self.begun).as_millis()).unwrap_or(i64::MAX);
         let unix_millis = self.header.unix_millis.saturating_add(later);
         let header = Header { part: self.part, unix_millis, ..self.header.clone() };
-        Ok((part(&path, &header, now)?, path))
+        Ok((part(&path, &header, now, Existing::Stays)?, path))
     }
 }
 
 fn series(folder: PathBuf, stem: &str, header: Header, begun: Instant, limits: Limits) -> io::Result<Open> {
     fs::create_dir_all(&folder)?;
-    let series = Series { folder, stem: stem.to_owned(), part: 1, header, begun, limits };
-    let (cast, path) = series.open(begun)?;
-    Ok(Open::new(cast, path, begun, Some(series)))
+    let mut series = Series { folder, stem: stem.to_owned(), part: 1, header, begun, limits };
+    for number in 2.. {
+        match series.open(begun) {
+            // Another recording of this process began in the same second, of a port whose name ends the same.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && number <= MOST_NAMESAKES => {
+                series.stem = format!("{stem}-{number}");
+            }
+            opened => {
+                let (cast, path) = opened?;
+                return Ok(Open::new(cast, path, begun, Some(series)));
+            }
+        }
+    }
+    Err(io::ErrorKind::AlreadyExists.into())
 }
 
-fn part(path: &Path, header: &Header, begun: Instant) -> io::Result<Cast<File>> {
+/// Recordings of one name at most: as many links as one program could possibly open within a second.
+const MOST_NAMESAKES: u32 = 1000;
+
+/// What becomes of a file that is there already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Existing {
+    /// The user has named it.
+    IsReplaced,
+    /// It is another recording.
+    Stays,
+}
+
+fn part(path: &Path, header: &Header, begun: Instant, existing: Existing) -> io::Result<Cast<File>> {
     let mut options = File::options();
-    options.write(true).create(true).truncate(true);
+    options.write(true).create_new(existing == Existing::Stays).create(true).truncate(true);
     #[cfg(unix)]
     {
         // What a unit says is its owner's business.
@@ -265,13 +290,21 @@ pub fn state_folder() -> Option<PathBuf> {
 /// Time, port and process: `20260131T120000Z-ttyUSB0-4711`.
 fn stem(clock: Clock, port: &str) -> String {
     let time = clock.wall(clock.now()).strftime("%Y%m%dT%H%M%SZ").to_string();
-    let port = port.strip_prefix("/dev/").unwrap_or(port);
-    let port: String = port.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(40).collect();
-    format!("{time}-{port}-{}", std::process::id())
+    format!("{time}-{}-{}", name_of_port(port), std::process::id())
 }
 
+/// A port's name in the name of a file. Of a long one its end, where ports of one adapter differ.
+fn name_of_port(port: &str) -> String {
+    let port = port.strip_prefix("/dev/").unwrap_or(port);
+    let name: Vec<char> = port.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    name[name.len().saturating_sub(LONGEST_NAME)..].iter().collect()
+}
+
+/// Characters of a port's name in that of a file.
+const LONGEST_NAME: usize = 40;
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     fn header() -> Header {
@@ -329,6 +362,28 @@ mod tests {
         drop(recorder);
         let last = std::fs::read_to_string(folder.path().join(&kept[kept.len() - 1])).expect("the last part");
         assert!(last.contains("\"part\":") && last.contains("end: 5000 bytes received"), "{last}");
+    }
+
+    #[test]
+    fn recordings_of_one_second_have_files_of_their_own() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let open = || series(folder.path().to_owned(), "20260131T120000Z-u0-7", header(), Instant::ZERO, LIMITS);
+        let all = [open().expect("the first"), open().expect("the second"), open().expect("the third")];
+        assert_eq!(
+            names(folder.path()),
+            ["20260131T120000Z-u0-7-2.cast", "20260131T120000Z-u0-7-3.cast", "20260131T120000Z-u0-7.cast"]
+        );
+        drop(all);
+        let long = "/dev/serial/by-path/pci-0000:00:14.0-usb-0:1.4.2:1.0-port0";
+        assert_eq!(name_of_port(long), "h_pci_0000_00_14_0_usb_0_1_4_2_1_0_port0");
+    }
+
+    /// A recording that ends with the next byte: there is no place for its next part.
+    pub(in crate::host) fn doomed() -> Recorder {
+        let folder = tempfile::tempdir().expect("a folder");
+        let limits = Limits { bytes: 2_000, files: 100, part_bytes: 1 };
+        let open = series(folder.path().to_owned(), "x", header(), Instant::ZERO, limits).expect("opened");
+        Recorder { open: Some(open), ..Recorder::default() }
     }
 
     #[test]

@@ -223,6 +223,10 @@ fn open_exclusively(path: &Path) -> Result<OwnedFd, Cause> {
         Err(Errno::WOULDBLOCK) => return Err(Cause::Busy { holder: ports::holder(path) }),
         Err(error) => return Err(cause(error)),
     }
+    // Many programs set neither, and two readers would share what the unit says.
+    if let Some(holder) = ports::other_holder(path).or_else(|| ports::lock_holder(path)) {
+        return Err(Cause::Busy { holder: Some(holder) });
+    }
     ioctl_tiocexcl(&port).map_err(cause)?;
     Ok(port)
 }
@@ -278,4 +282,25 @@ fn group_name(gid: u32) -> Option<String> {
         (fields.nth(1)?.parse() == Ok(gid)).then(|| name.to_owned())
     });
     name.or_else(|| Some(gid.to_string()))
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use std::process::{Command, Stdio};
+
+    use super::*;
+    use crate::host::ports::Holder;
+    use crate::host::pty::Pty;
+
+    #[test]
+    fn a_port_that_a_program_without_locks_uses_is_not_shared() {
+        let pty = Pty::open(115_200).expect("a pseudo-terminal");
+        let port = fs::File::options().read(true).write(true).open(pty.path()).expect("opened");
+        let mut reader = Command::new("cat").stdin(port).stdout(Stdio::null()).spawn().expect("cat starts");
+        let refused = open_exclusively(pty.path()).map(drop).expect_err("somebody else reads there");
+        let Cause::Busy { holder: Some(Holder { name, pid }) } = refused else { panic!("{refused}") };
+        assert_eq!((name.as_str(), pid), ("cat", reader.id()));
+        reader.kill().and_then(|()| reader.wait()).expect("cat ends");
+        open_exclusively(pty.path()).expect("nobody else is there");
+    }
 }

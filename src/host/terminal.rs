@@ -38,6 +38,14 @@ const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1000l";
 #[derive(Debug)]
 pub struct RawMode(());
 
+/// The settings of the user's terminal, given back when dropped: for typing that is hidden in a thread which a signal
+/// does not reach.
+#[derive(Debug)]
+pub struct KeptTerminal {
+    #[cfg(unix)]
+    kept: Option<(std::fs::File, rustix::termios::Termios)>,
+}
+
 /// Keys that wait at most; the terminal keeps the others.
 const KEYS: usize = 64;
 
@@ -112,6 +120,34 @@ impl RawMode {
     }
 }
 
+impl KeptTerminal {
+    /// As they are now. Where there is no terminal, nothing is kept.
+    #[cfg(unix)]
+    pub fn now() -> Self {
+        let terminal = std::fs::File::options().read(true).write(true).open("/dev/tty").ok();
+        let kept = terminal.and_then(|terminal| {
+            let settings = rustix::termios::tcgetattr(&terminal).ok()?;
+            Some((terminal, settings))
+        });
+        KeptTerminal { kept }
+    }
+
+    /// Nothing to keep: the program ends without a signal of its own there.
+    #[cfg(not(unix))]
+    pub fn now() -> Self {
+        KeptTerminal {}
+    }
+}
+
+impl Drop for KeptTerminal {
+    fn drop(&mut self) {
+        #[cfg(unix)]
+        if let Some((terminal, settings)) = &self.kept {
+            let _ = rustix::termios::tcsetattr(terminal, rustix::termios::OptionalActions::Now, settings);
+        }
+    }
+}
+
 impl Drop for RawMode {
     fn drop(&mut self) {
         restore();
@@ -155,6 +191,12 @@ pub fn may_read_standard_input() -> bool {
         }
     }
     true
+}
+
+/// Columns of the user's terminal, where it says.
+pub fn columns() -> Option<usize> {
+    let (columns, _) = ratatui::crossterm::terminal::size().ok()?;
+    (columns > 0).then(|| columns.into())
 }
 
 fn take_screen() -> io::Result<()> {

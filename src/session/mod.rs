@@ -24,7 +24,7 @@ use std::collections::VecDeque;
 use zeroize::Zeroizing;
 
 use crate::device::Product;
-use crate::endpoint::{Endpoint, Secrecy, Transmit};
+use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
 use crate::record::{Direction, REDACTED, Record, Span};
 use crate::time::character_time;
 use crate::time::{Duration, Instant};
@@ -50,6 +50,8 @@ const MENU_ANSWER: Duration = Duration::from_millis(1500);
 /// A conversation with one unit.
 pub struct Session {
     now: Instant,
+    /// The moment that what is heard is dated at: before `now` for bytes that had to wait for us.
+    dated: Instant,
     record: Record,
     framer: Framer,
     vocabulary: Vocabulary<'static>,
@@ -120,6 +122,7 @@ impl Session {
         let products = Product::all();
         Session {
             now: Instant::ZERO,
+            dated: Instant::ZERO,
             record: Record::new(),
             framer: Framer::default(),
             vocabulary: Vocabulary {
@@ -258,7 +261,7 @@ impl Session {
 
     /// In a recording: these bytes were sent then.
     pub fn handle_sent(&mut self, now: Instant, bytes: &[u8]) {
-        self.now = self.now.max(now);
+        self.pass_to(now);
         self.record.push(self.now, Direction::ToUnit, Secrecy::Open, bytes);
         self.note_menu_key(bytes);
         self.signal(Signal::Typed(bytes));
@@ -267,7 +270,7 @@ impl Session {
 
     /// In a recording: it has ended. The running job ends with what it has heard.
     pub fn recording_over(&mut self, now: Instant) {
-        self.now = self.now.max(now);
+        self.pass_to(now);
         self.hand_out_echo();
         self.look_at_prompt();
         if self.facts.state == UnitState::Silent && self.record.received() > 0 {
@@ -363,6 +366,12 @@ impl Session {
         }
     }
 
+    /// The time is `now`, also for what has been heard.
+    fn pass_to(&mut self, now: Instant) {
+        self.now = self.now.max(now);
+        self.dated = self.now;
+    }
+
     /// Appends to the record; what may echo the password is secret up to the next line end, and the password itself
     /// wherever it stands.
     fn append(&mut self, bytes: &[u8]) {
@@ -415,7 +424,7 @@ impl Session {
             let begins = if self.echo.1 == from { self.echo.0 } else { from };
             self.echo = (begins, from + bytes.len() as u64);
         }
-        self.record.push(self.now, Direction::FromUnit, secrecy, bytes);
+        self.record.push(self.dated, Direction::FromUnit, secrecy, bytes);
         self.frame(bytes);
     }
 
@@ -505,8 +514,8 @@ impl Session {
             self.events.push_back(Event::Held(false));
         }
         self.events.push_back(match &message {
-            Message::Row(row) => Event::Row { at: self.now, span: text.span, row: row.clone() },
-            _ => Event::Heard { at: self.now, span: text.span, message: message.clone() },
+            Message::Row(row) => Event::Row { at: self.dated, span: text.span, row: row.clone() },
+            _ => Event::Heard { at: self.dated, span: text.span, message: message.clone() },
         });
         self.signal(Signal::Heard(&text, &message));
     }
@@ -618,13 +627,22 @@ impl Session {
 
 impl Endpoint for Session {
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
-        self.now = self.now.max(now);
+        self.pass_to(now);
         self.append(bytes);
         self.signal(Signal::Tick);
     }
 
-    fn handle_timeout(&mut self, now: Instant) {
+    fn handle_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
         self.now = self.now.max(now);
+        for piece in backlog {
+            self.dated = piece.at.clamp(self.dated, self.now);
+            self.append(&piece.bytes);
+        }
+        self.signal(Signal::Tick);
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.pass_to(now);
         if self.echo_due.is_some_and(|due| due <= self.now) {
             self.hand_out_echo();
         }
@@ -642,6 +660,8 @@ impl Endpoint for Session {
         if transmit.secrecy == Secrecy::Open {
             self.note_menu_key(&transmit.bytes);
         }
+        // The record keeps the order of time: nothing that is taken in behind this is dated before it.
+        self.dated = self.now;
         self.record.push(self.now, Direction::ToUnit, transmit.secrecy, &transmit.bytes);
         Some(transmit)
     }

@@ -133,6 +133,11 @@ impl App {
                     session.handle_bytes(now, &bytes);
                 }
             }
+            Input::Arrived(backlog) => {
+                if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
+                    session.handle_backlog(now, &backlog);
+                }
+            }
             Input::Timeout => self.timeout(now),
             Input::PortsListed(ports) => {
                 self.connect.listed(ports);

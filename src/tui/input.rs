@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use ratatui::crossterm::event::Event as TerminalEvent;
 
-use crate::endpoint::Transmit;
+use crate::endpoint::{Arrived, Transmit};
 use crate::image::{CheckedImage, Report, Severity};
 use crate::time::Duration;
 use crate::version::Version;
@@ -21,6 +21,8 @@ pub enum Input {
     Terminal(TerminalEvent),
     /// The unit has sent bytes.
     Bytes(Vec<u8>),
+    /// The unit has sent bytes in these pieces, which had to wait for the console: before anything that was due.
+    Arrived(Vec<Arrived>),
     /// The moment [`App::poll_timeout`](super::App::poll_timeout) named has come. Early is harmless.
     Timeout,
     /// Answer to [`Effect::ListPorts`]; an error in one sentence.

@@ -450,8 +450,10 @@ fn an_interrupt_in_the_middle_of_a_dump_leaves_the_view() {
     let world = World::new();
     let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1"]);
     unit.wait_out("serial: ");
-    let dump = world.start(&["dictionary", "dump", "--yes", "--port", "u1"]);
-    std::thread::sleep(std::time::Duration::from_millis(1_800));
+    let dump = world.start(&["dictionary", "dump", "--yes", "--port", "u1", "--record", "dump.cast"]);
+    // The unit stands in its view once it is asked for the second entry.
+    world.wait_in("dump.cast", "\"i\",\"v\"");
+    world.wait_in("dump.cast", "\"i\",\"\\r");
     dump.signal(rustix::process::Signal::INT);
     let ran = dump.wait();
     assert_eq!(ran.code, Some(130), "{}{}", ran.out, ran.err);
@@ -564,4 +566,36 @@ fn an_upload_whose_reader_has_gone_is_finished_all_the_same() {
     assert!(shell.status().expect("a shell").success());
     let ran = world.run(&["identify", "--json", "--port", "u1"], b"");
     assert!(ran.out.contains("\"version\":\"1.2.0\""), "{}", ran.out);
+}
+
+#[test]
+fn a_stream_that_ends_before_its_first_row_is_off_all_the_same() {
+    let bench = Bench::new();
+    fs::write(bench.world.path("old.csv"), "yesterday\n").expect("written");
+    let run = |args: &[&str]| {
+        let mut all = vec!["stream", "--port", "u0"];
+        all.extend(args);
+        all.extend(FAST);
+        bench.world.start(&all)
+    };
+    // One for each: an interrupt while the first row is awaited, and a row that cannot be written.
+    let early = run(&["--period", "10000", "--out", "old.csv", "--yes", "--record", "early.cast"]);
+    bench.world.wait_in("early.cast", "10000");
+    early.signal(rustix::process::Signal::INT);
+    let ran = early.wait();
+    assert_eq!(ran.code, Some(130), "{}", ran.err);
+    bench.world.wait_heard("early.cast", "RS-232 stream is now OFF");
+    assert_eq!(fs::read_to_string(bench.world.path("old.csv")).expect("there"), "yesterday\n", "nothing came for it");
+
+    let full = run(&["--period", "200", "--out", "/dev/full", "--record", "full.cast"]).wait();
+    assert_eq!(full.code, Some(1), "{}", full.err);
+    assert!(full.err.contains("cannot write '/dev/full'"), "{}", full.err);
+    bench.world.wait_heard("full.cast", "RS-232 stream is now OFF");
+
+    // What is there is not replaced unasked, and nobody troubles the unit for it.
+    for command in [&["stream", "--out", "old.csv"][..], &["report", "--no-dictionary", "--out", "old.csv"]] {
+        let ran = bench.run(command);
+        assert_eq!(ran.code, Some(2), "{}", ran.err);
+        assert!(ran.err.contains("old.csv exists already"), "{}", ran.err);
+    }
 }

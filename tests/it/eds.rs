@@ -19,6 +19,8 @@ fn a_data_sheet_goes_to_standard_output_or_to_a_file() {
     let written = world.run(&["eds", "axtc4co", "--out", "unit.eds"], b"");
     assert_eq!(written.code, Some(0), "{}", written.err);
     assert_eq!(std::fs::read_to_string(world.path("unit.eds")).expect("written"), ran.out);
+    let again = world.run(&["eds", "axtc4co", "--out", "unit.eds"], b"");
+    assert_eq!(again.code, Some(2), "{}", again.err);
     let unknown = world.run(&["eds", "axtc5co"], b"");
     assert_eq!(unknown.code, Some(2));
     assert!(unknown.err.contains("axtc4co") || unknown.err.contains("AXTC4CO"), "{}", unknown.err);

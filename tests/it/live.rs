@@ -243,3 +243,33 @@ fn recordings_are_listed_and_played_from_any_place() {
     screen.keys("q");
     assert_eq!(screen.wait_end(), Some(0));
 }
+
+#[test]
+fn a_question_is_left_by_a_signal_and_by_ctrl_c_and_nothing_is_sent() {
+    let world = World::new();
+    let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "300", "--out", "new.S"];
+    assert_eq!(world.run(&args, b"").code, Some(0));
+    let leave: [(&str, fn(&Screen)); 4] = [
+        ("Type yes", |screen| screen.signal(rustix::process::Signal::TERM)),
+        ("Type yes", |screen| screen.keys("\x03")),
+        ("Password:", |screen| screen.signal(rustix::process::Signal::TERM)),
+        ("Password:", |screen| screen.keys("\x03")),
+    ];
+    std::thread::scope(|scope| {
+        for (question, leave) in leave {
+            let world = &world;
+            scope.spawn(move || {
+                let mut screen = Screen::start(world.command(&["load", "--port", "emu:axtc4co", "new.S"]), 24, 80);
+                screen.wait("Type yes");
+                if question == "Password:" {
+                    screen.keys("yes\r");
+                    screen.wait(question);
+                }
+                leave(&screen);
+                assert_eq!(screen.wait_end(), Some(130), "{question}: {}", screen.text());
+                assert!(screen.is_given_back(), "{question}");
+                screen.wait("interrupted");
+            });
+        }
+    });
+}

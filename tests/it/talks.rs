@@ -1,6 +1,6 @@
 //! Stories of talks with the firmware: console and unit on one cable, in virtual time.
 
-use axcon::endpoint::Endpoint;
+use axcon::endpoint::{Arrived, Endpoint};
 use axcon::rng::Rng;
 use axcon::session::{Command, Event, Job, Origin, Outcome, Session, UnitState};
 use axcon::time::{Duration, Instant};
@@ -304,4 +304,30 @@ fn noise_is_never_taken_for_a_unit() {
         }
         assert_eq!(session.facts().state, UnitState::Unknown, "seed {seed}: {:?}", session.facts());
     }
+}
+
+#[test]
+fn what_had_to_wait_is_dated_when_it_came_and_heard_before_anything_that_was_due() {
+    let mut session = Session::new(115_200);
+    session.command(Instant::ZERO, Command::Identify).expect("taken");
+    while session.poll_transmit().is_some() {}
+    let piece = |millis, text: &str| Arrived { at: Instant::from_millis(millis), bytes: text.into() };
+    // Ten seconds are more than any question waits.
+    let now = Instant::from_millis(10_000);
+    let backlog = [piece(40, "AXTC4CO V1.1.0\r\n"), piece(50, "CAN Status: Node ID = 127, Baud Rate = 125 kbps\r\n")];
+    session.handle_backlog(now, &backlog);
+    assert_eq!(session.facts().state, UnitState::Application);
+    let mut dated = Vec::new();
+    while let Some(event) = session.poll_event() {
+        if let Event::Heard { at, .. } = event {
+            dated.push(at);
+        }
+    }
+    assert_eq!(dated, [Instant::from_millis(40), Instant::from_millis(50)]);
+    // What follows lies behind it, also in the record.
+    session.handle_timeout(now);
+    while session.poll_transmit().is_some() {}
+    session.handle_backlog(now, &[piece(60, "late\r\n")]);
+    let times: Vec<Instant> = session.record().entries().map(|entry| entry.at).collect();
+    assert!(times.is_sorted(), "{times:?}");
 }

@@ -421,3 +421,22 @@ fn what_a_ring_of_550_characters_costs_at_any_latency() {
         assert!(ratio > 0.9 && ratio <= most, "{latency} ms: {ratio}");
     }
 }
+
+#[test]
+fn a_console_that_was_kept_away_in_the_middle_goes_on_where_it_was() {
+    // Longer than any answer behind a record may take.
+    let away = Duration::from_secs(5);
+    for loader in [LoaderKind::G1, LoaderKind::G3] {
+        for moment_ms in (1_500..5_500).step_by(470) {
+            let flash = factory_flash("1.1.0");
+            let mut bench = Bench::of(axtc4co(), loader, flash, Duration::from_millis(1));
+            bench.run_for(Duration::from_secs(4));
+            bench.command(Command::Load(Box::new(order(small_image("AXTC4CO", "1.2.0")))));
+            bench.run_for(Duration::from_millis(moment_ms));
+            bench.stand_still(away);
+            let Outcome::Loaded(report) = bench.outcome() else { panic!("{loader:?} {moment_ms} ms") };
+            let transcript = bench.transcript();
+            assert_eq!(report.verdict, Verdict::Done, "{loader:?} {moment_ms} ms: {report:?}\n{transcript}");
+        }
+    }
+}

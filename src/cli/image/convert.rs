@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::report::contents;
-use super::{allowable, checked, grouped, read, report_text, save, shown, targets};
-use crate::cli::Global;
+use super::{allowable, checked, grouped, read, report_text, shown, targets};
 use crate::cli::error::{CliError, Kind};
 use crate::cli::output::Output;
+use crate::cli::{Global, files};
 use crate::image::{self, AddressUnit, ConvertError, DefectId, LineEnd, Report, Shape};
 
 /// Arguments.
@@ -97,7 +97,7 @@ pub(super) fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(
     if args.out == Path::new("-") {
         return output.data(&bytes);
     }
-    save::save(&args.out, &bytes, global.yes)?;
+    files::save(&args.out, &bytes, global.yes)?;
     let out = shown(&args.out);
     if output.json {
         return output.object(&super::ImageObject::new(&written, &out));

@@ -6,7 +6,6 @@
 mod convert;
 mod diff;
 mod report;
-mod save;
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -14,9 +13,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
 
-use super::Global;
 use super::error::{CliError, Kind};
 use super::output::Output;
+use super::{Global, files};
 use crate::device::{LoaderKind, Product};
 use crate::image::make::{self, Recipe};
 use crate::image::{self, DefectId, Report, Target};
@@ -133,7 +132,7 @@ fn make(args: &MakeArgs, global: &Global, output: &mut Output) -> Result<(), Cli
     if path == Path::new("-") {
         return output.data(&bytes);
     }
-    save::save(&path, &bytes, global.yes)?;
+    files::save(&path, &bytes, global.yes)?;
     let report =
         image::check(&bytes[..], None, &targets(), None, &[]).map_err(|error| CliError::new(Kind::Failed, error))?;
     let name = shown(&path);

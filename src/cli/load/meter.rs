@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::phase_name;
 use crate::cli::output::Output;
+use crate::host::terminal;
 use crate::session::{Phase, Progress};
 use crate::time::Duration;
 
@@ -15,6 +16,7 @@ pub struct Meter {
     port: String,
     style: Style,
     phase: Option<Phase>,
+    pace: Pace,
 }
 
 enum Style {
@@ -40,8 +42,11 @@ struct ProgressObject<'a> {
     held_s: Option<f64>,
 }
 
-/// Characters of the bar.
-const BAR: usize = 30;
+/// Characters of the bar at most, and so few that it shows nothing.
+const LONGEST_BAR: usize = 30;
+const SHORTEST_BAR: usize = 4;
+/// Columns where nobody says how many there are.
+const COLUMNS: usize = 80;
 /// A hold that lasts so long is told.
 const LONG_HOLD: Duration = Duration::from_secs(1);
 
@@ -53,28 +58,29 @@ impl Meter {
             (false, true) => Style::Bar,
             (false, false) => Style::Phases,
         };
-        Meter { port: port.to_owned(), style, phase: None }
+        Meter { port: port.to_owned(), style, phase: None, pace: Pace::default() }
     }
 
     /// For one of several uploads, on its line of a board.
     pub fn on_board(port: &str, board: Arc<Board>, line: usize) -> Self {
-        Meter { port: port.to_owned(), style: Style::Line(board, line), phase: None }
+        Meter { port: port.to_owned(), style: Style::Line(board, line), phase: None, pace: Pace::default() }
     }
 
     /// Shows how far it is. That nobody reads it any more is no reason to end an upload.
     pub fn show(&mut self, progress: &Progress, output: &mut Output) {
+        self.pace.note(progress);
         let is_new_phase = self.phase.replace(progress.phase) != Some(progress.phase);
         match &self.style {
             Style::Json => {
                 let _ = output.object(&self.object(progress));
             }
             Style::Bar => {
-                let line = format!("\r{}\x1b[K", text(progress));
+                let line = format!("\r{}\x1b[K", text(progress, self.pace, columns()));
                 let _ = output.err.write_all(line.as_bytes()).and_then(|()| output.err.flush());
             }
             Style::Phases if is_new_phase => output.remark(&format!("{} ...", phase_name(progress.phase))),
             Style::Phases => {}
-            Style::Line(board, line) => board.set(*line, text(progress)),
+            Style::Line(board, line) => board.set(*line, text(progress, self.pace, board.room())),
         }
     }
 
@@ -95,41 +101,82 @@ impl Meter {
             address: progress.address,
             bytes: progress.bytes,
             bytes_total: progress.bytes_total,
-            rate: rate(progress).round(),
-            eta_s: eta(progress).map(|eta| (eta * 10.0).round() / 10.0),
+            rate: self.pace.rate(progress).unwrap_or_default().round(),
+            eta_s: self.pace.eta(progress).map(|eta| (eta * 10.0).round() / 10.0),
             held_s: progress.held.map(|held| held.as_secs_f64()),
         }
     }
 }
 
-/// Characters a second since the first record.
-fn rate(progress: &Progress) -> f64 {
-    let seconds = progress.elapsed.as_secs_f64();
-    if seconds > 0.0 { progress.bytes as f64 / seconds } else { 0.0 }
+/// How fast the loader takes the records. Counted from the first data it has taken: the erasing before that takes as long
+/// whatever follows.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    /// When that was, since the first record left, and how many characters were taken then.
+    since: Option<(Duration, usize)>,
 }
 
-/// Seconds left, where they can be told.
-fn eta(progress: &Progress) -> Option<f64> {
-    let rest = (progress.bytes_total - progress.bytes.min(progress.bytes_total)) as f64;
-    let rate = rate(progress);
-    (rate > 0.0).then(|| rest / rate)
+impl Pace {
+    fn note(&mut self, progress: &Progress) {
+        // The header is the first record. A transfer that begins again counts anew.
+        let begins_again = self.since.is_some_and(|(_, bytes)| progress.bytes < bytes);
+        if progress.records < 2 {
+            self.since = None;
+        } else if self.since.is_none() || begins_again {
+            self.since = Some((progress.elapsed, progress.bytes));
+        }
+    }
+
+    /// Characters a second, once they can be told.
+    fn rate(self, progress: &Progress) -> Option<f64> {
+        let (since, bytes) = self.since?;
+        let seconds = progress.elapsed.saturating_sub(since).as_secs_f64();
+        let taken = progress.bytes.saturating_sub(bytes);
+        (seconds > 0.0 && taken > 0).then(|| taken as f64 / seconds)
+    }
+
+    /// Seconds left, once they can be told.
+    fn eta(self, progress: &Progress) -> Option<f64> {
+        let rest = progress.bytes_total.saturating_sub(progress.bytes) as f64;
+        self.rate(progress).map(|rate| rest / rate)
+    }
 }
 
-fn text(progress: &Progress) -> String {
-    let share = if progress.bytes_total == 0 { 0.0 } else { progress.bytes as f64 / progress.bytes_total as f64 };
-    let filled = (share * BAR as f64) as usize;
-    let eta = eta(progress).map_or_else(String::new, |eta| format!(", {eta:.0} s left"));
-    let held = progress.held.filter(|held| *held >= LONG_HOLD);
-    let held = held.map_or_else(String::new, |held| format!(", held by XOFF for {:.0} s", held.as_secs_f64()));
-    format!(
-        "{:<12} [{}{}] {:>3.0} %  {}/{} records{eta}{held}",
-        phase_name(progress.phase),
-        "#".repeat(filled),
-        " ".repeat(BAR - filled),
-        share * 100.0,
-        progress.records,
-        progress.records_total
-    )
+/// Columns of the terminal.
+fn columns() -> usize {
+    terminal::columns().unwrap_or(COLUMNS)
+}
+
+/// One line of fewer than so many columns: a line that fills its terminal wraps on many. What is left of them is the bar.
+fn text(progress: &Progress, pace: Pace, columns: usize) -> String {
+    let Progress { records, records_total, bytes, bytes_total, address, .. } = *progress;
+    let share = if bytes_total == 0 { 0.0 } else { bytes as f64 / bytes_total as f64 };
+    let kilobytes = |bytes: usize| bytes.div_ceil(1000);
+    let mut members = vec![format!("{:>3.0} % {records}/{records_total} rec", share * 100.0)];
+    if records > 1 {
+        members.push(format!("{address:#07x}"));
+    }
+    members.push(format!("{}/{} kB", kilobytes(bytes), kilobytes(bytes_total)));
+    match (progress.held.filter(|held| *held >= LONG_HOLD), pace.rate(progress)) {
+        (Some(held), _) => members.push(format!("XOFF {:.0} s", held.as_secs_f64())),
+        (None, Some(rate)) => members.push(format!("{:.1} kB/s", rate / 1000.0)),
+        (None, None) => {}
+    }
+    members.extend(pace.eta(progress).map(|eta| format!("{eta:.0} s left")));
+    let (phase, members) = (phase_name(progress.phase), members.join(" "));
+    let room = columns.saturating_sub(1);
+    let bar = room.saturating_sub(phase.len() + members.len() + " [] ".len()).min(LONGEST_BAR);
+    let line = if bar < SHORTEST_BAR {
+        format!("{phase} {members}")
+    } else {
+        let filled = ((share * bar as f64) as usize).min(bar);
+        format!("{phase} [{}{}] {members}", "#".repeat(filled), " ".repeat(bar - filled))
+    };
+    cut(&line, room)
+}
+
+fn cut(line: &str, columns: usize) -> String {
+    line.chars().take(columns).collect()
 }
 
 /// A line for each of several uploads: repainted in place on a terminal, printed anew elsewhere when its phase changes.
@@ -137,6 +184,7 @@ pub struct Board {
     state: Mutex<State>,
     names: Vec<String>,
     in_place: bool,
+    columns: fn() -> usize,
 }
 
 struct State {
@@ -148,10 +196,20 @@ struct State {
 impl Board {
     /// A board for uploads on these ports.
     pub fn new(ports: &[String], to: Box<dyn Write + Send>, in_place: bool) -> Self {
+        Board::of_columns(ports, to, in_place, columns)
+    }
+
+    fn of_columns(ports: &[String], to: Box<dyn Write + Send>, in_place: bool, columns: fn() -> usize) -> Self {
         let lines = vec!["waits".to_owned(); ports.len()];
         let width = ports.iter().map(|port| port.chars().count()).max().unwrap_or_default();
         let names = ports.iter().map(|port| format!("{port:<width$}")).collect();
-        Board { state: Mutex::new(State { lines, painted: false, to }), names, in_place }
+        Board { state: Mutex::new(State { lines, painted: false, to }), names, in_place, columns }
+    }
+
+    /// Columns of a line behind its name.
+    pub fn room(&self) -> usize {
+        let name = self.names.first().map_or(0, |name| name.chars().count() + 2);
+        (self.columns)().saturating_sub(name)
     }
 
     /// What a line says now.
@@ -162,7 +220,9 @@ impl Board {
         state.lines[line] = text;
         let painted = if self.in_place {
             let up = if state.painted { format!("\x1b[{}A", state.lines.len()) } else { String::new() };
-            let lines = self.names.iter().zip(&state.lines).map(|(name, line)| format!("\r{name}  {line}\x1b[K\r\n"));
+            let room = (self.columns)().saturating_sub(1);
+            let lines = self.names.iter().zip(&state.lines);
+            let lines = lines.map(|(name, line)| format!("\r{}\x1b[K\r\n", cut(&format!("{name}  {line}"), room)));
             up + &lines.collect::<String>()
         } else if is_news {
             format!("{}  {}\n", self.names[line], state.lines[line])
@@ -195,7 +255,7 @@ mod tests {
     fn board(in_place: bool) -> (Board, Shared) {
         let shared = Shared::default();
         let ports = ["/dev/ttyUSB0".to_owned(), "u1".to_owned()];
-        (Board::new(&ports, Box::new(shared.clone()), in_place), shared)
+        (Board::of_columns(&ports, Box::new(shared.clone()), in_place, || 40), shared)
     }
 
     fn said(shared: &Shared) -> String {
@@ -218,5 +278,58 @@ mod tests {
         board.set(1, "done".into());
         let text = said(&shared);
         assert!(text.ends_with("\x1b[2A\r/dev/ttyUSB0  check\x1b[K\r\n\ru1            done\x1b[K\r\n"), "{text:?}");
+    }
+
+    #[test]
+    fn a_line_that_is_repainted_never_fills_its_terminal() {
+        let (board, shared) = board(true);
+        board.set(0, "x".repeat(100));
+        assert!(said(&shared).contains(&format!("\r/dev/ttyUSB0  {}\x1b[K", "x".repeat(39 - 14))));
+        assert_eq!(board.room(), 40 - 14);
+    }
+
+    fn progress(seconds: u64, records: usize, bytes: usize) -> Progress {
+        Progress {
+            phase: Phase::Transfer,
+            records,
+            records_total: 3_074,
+            bytes,
+            bytes_total: 242_742,
+            address: 0xBFFF,
+            elapsed: Duration::from_secs(seconds),
+            held: None,
+        }
+    }
+
+    #[test]
+    fn the_bar_takes_the_room_that_what_is_said_leaves() {
+        let mut pace = Pace::default();
+        pace.note(&progress(10, 2, 100));
+        let now = progress(20, 1_500, 121_371);
+        let line = |columns| text(&now, pace, columns);
+        assert_eq!(line(80), "transfer [####     ]  50 % 1500/3074 rec 0x0bfff 122/243 kB 12.1 kB/s 10 s left");
+        assert_eq!(line(60), "transfer  50 % 1500/3074 rec 0x0bfff 122/243 kB 12.1 kB/s 1");
+        assert!(line(200).contains(&format!("[{}{}]", "#".repeat(15), " ".repeat(15))));
+        for columns in 0..200 {
+            let held = Progress { held: Some(Duration::from_secs(12)), ..now };
+            for progress in [&now, &held, &progress(0, 0, 0)] {
+                assert!(text(progress, pace, columns).chars().count() < columns.max(1), "{columns}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_rate_is_that_of_the_records_and_not_of_the_erasing_before_them() {
+        let mut pace = Pace::default();
+        let mut told = |seconds, records, bytes| {
+            let progress = progress(seconds, records, bytes);
+            pace.note(&progress);
+            (pace.rate(&progress), pace.eta(&progress).map(f64::round))
+        };
+        assert_eq!(told(0, 0, 0), (None, None));
+        assert_eq!(told(10, 1, 40), (None, None), "ten seconds of erasing behind the header");
+        assert_eq!(told(10, 2, 142), (None, None));
+        assert_eq!(told(11, 102, 10_142), (Some(10_000.0), Some(23.0)));
+        assert_eq!(told(12, 2, 142), (None, None), "everything is sent once more");
     }
 }

@@ -3,7 +3,6 @@
 mod meter;
 mod several;
 
-use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -12,7 +11,7 @@ use super::error::{CliError, Kind};
 use super::image::{self as image_cli, DefectObject};
 use super::output::Output;
 use super::talk::{Ended, Talk, no_answer_hints};
-use super::{Global, link, password};
+use super::{Global, ask, link, password};
 use crate::device::{LoaderKind, Product};
 use crate::host::journal::{Journal, Note};
 use crate::image::{CheckedImage, DefectId, Report};
@@ -75,18 +74,15 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if !output.json && (report.warnings > 0 || report.allowed > 0) {
         output.remark(image_cli::report_text(&report, &name).trim_end());
     }
-    let interactive = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
+    let interactive = ask::somebody();
     if !args.dry_run && !global.yes && !interactive {
         return Err(CliError::message(Kind::NeedsYes, "an upload replaces the unit's software and nobody said yes")
             .hint("add --yes where nobody can be asked"));
     }
     let password = if args.dry_run { None } else { password::find(args.password_file.as_deref())? };
-    if password.is_none() && !args.dry_run && !interactive {
-        return Err(CliError::message(Kind::Usage, "the password is missing")
-            .hint("give it with --password-file FILE or in AXCON_PASSWORD"));
-    }
     if args.dry_run && global.ports.is_empty() {
-        return plan(&report, &image, &name, None, output);
+        plan(&report, &image, &name, None, output)?;
+        return planned(&report, None, image.identity().map(|identity| identity.product.as_str()), output);
     }
     let mut prepared = Prepared { args, name, report, image, password };
     match global.ports.as_slice() {
@@ -103,10 +99,10 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
             Ok(())
         }
         several => {
-            if !global.yes && !agreed(&format!("Upload to {} units", several.len()), output)? {
+            if !global.yes && !ask::is_yes(&format!("Upload to {} units? Type yes: ", several.len()), None, output)? {
                 return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
             }
-            let password = prepared.password.take().map_or_else(password::ask, Ok)?;
+            let password = prepared.password.take().map_or_else(|| password::ask(None), Ok)?;
             prepared.password = Some(password);
             several::run(several, &prepared, global, output)
         }
@@ -131,21 +127,33 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     let mut talk = Talk::open(global, output)?;
     talk.ask(Command::Identify)?;
     let journal = Desk::of(&talk);
+    find_product(&mut talk, args, global, output)?;
     let facts = talk.session().facts().clone();
     plan(report, image, name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
     if args.dry_run {
+        let port = talk.port().to_owned();
         talk.close(output);
-        return check_fit(image, &facts, args);
+        let product = check_fit(image, &facts, journal.note.as_ref(), args)?;
+        return planned(report, Some((&facts, &port)), Some(&product.name), output);
     }
-    if !global.yes && !agreed("Upload", output)? {
-        talk.close(output);
-        return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
-    }
-    let password = password.clone().map_or_else(password::ask, Ok)?;
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
     let noted = journal.note.as_ref().map(|note| note.product.clone());
     let product = args.product.map(|product| product.name.clone()).or(noted);
-    journal.begin(&facts, product.as_deref(), name, &talk, output);
+    let needs_password = facts.state != UnitState::Loader;
+    if needs_password && password.is_none() && !ask::somebody() {
+        talk.close(output);
+        return Err(CliError::message(Kind::Usage, "the password is missing")
+            .hint("give it with --password-file FILE or in AXCON_PASSWORD"));
+    }
+    if !global.yes && !ask::is_yes("Upload? Type yes: ", Some(&mut talk), output)? {
+        talk.close(output);
+        return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
+    }
+    let password = match password {
+        None if needs_password => Some(password::ask(Some(&mut talk))?),
+        password => password.clone(),
+    };
+    let mut note = journal.compose(&facts, product.as_deref(), name, &talk);
     let order = LoadOrder {
         product,
         loader: args.loader,
@@ -155,6 +163,10 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     };
     let ended = talk.run(Command::Load(Box::new(order)), |_, event| {
         if let Event::Progress(progress) = event {
+            // The unit has been found to be the right one, and L or the first record is about to leave.
+            if let Some(note) = note.take() {
+                journal.begin(note, output);
+            }
             meter.show(progress, output);
         }
         Ok(())
@@ -173,20 +185,92 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     result
 }
 
+/// Finds out the product of a unit whose menu does not name it: its object dictionary does.
+fn find_product(talk: &mut Talk, args: &Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let facts = talk.session().facts();
+    if facts.state != UnitState::Application || facts.product.is_some() || args.product.is_some() {
+        return Ok(());
+    }
+    if args.dry_run && !global.yes {
+        output.remark(
+            "axcon: the unit's menu does not name it; with --yes its object dictionary is asked (scanning halts)",
+        );
+        return Ok(());
+    }
+    output.remark("axcon: the unit's menu does not name it; its object dictionary is asked");
+    // What it showed is among the facts then; if it would not, the upload says what is missing.
+    talk.ask(Command::ReadDictionary).map(|_| ())
+}
+
 /// What the upload itself would say of this image for this unit.
-fn check_fit(image: &CheckedImage, facts: &Facts, args: &Args) -> Result<(), CliError> {
+fn check_fit(
+    image: &CheckedImage,
+    facts: &Facts,
+    note: Option<&Note>,
+    args: &Args,
+) -> Result<&'static Product, CliError> {
+    let refused = |message: String| CliError::message(Kind::ImageRefused, message + ": it would be refused");
     let said = facts.product.as_ref().and_then(|known| Product::named(&known.value));
-    let Some(product) = said.or(args.product) else { return Ok(()) };
+    if let (Some(said), Some(ordered)) = (said, args.product)
+        && said.name != ordered.name
+    {
+        return Err(refused(format!("the unit is an {}, not an {}", said.name, ordered.name)));
+    }
+    let noted = note.and_then(|note| Product::named(&note.product));
+    if matches!(facts.state, UnitState::Silent | UnitState::Unknown) {
+        return Err(no_answer_hints(CliError::message(Kind::NoAnswer, "no unit answers on this port")));
+    }
+    let Some(product) = said.or(args.product).or(noted) else {
+        let message = "the unit does not say which product it is";
+        return Err(CliError::message(Kind::Usage, message).hint("look at its label and say it: --product NAME"));
+    };
     let unit = product.target_with(args.loader.unwrap_or(product.loader.kind));
     let misfits = image.misfits(&unit, facts.version.as_ref().map(|known| known.value));
     match misfits.into_iter().find(|misfit| !args.allow.contains(&misfit.id)) {
-        None => Ok(()),
+        None => Ok(product),
         Some(misfit) => {
-            let message = format!("{}: it would be refused", misfit.message);
             let allow = format!("if it is wanted all the same: --allow {}", misfit.id);
-            Err(CliError::message(Kind::ImageRefused, message).hint(allow))
+            Err(refused(misfit.message).hint(allow))
         }
     }
+}
+
+/// A dry run has come to its end without an objection.
+fn planned(
+    report: &Report,
+    unit: Option<(&Facts, &str)>,
+    product: Option<&str>,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    if !output.json {
+        return Ok(());
+    }
+    let state = match unit.map(|(facts, _)| facts.state) {
+        Some(UnitState::Loader) => UnitNow::Loader,
+        Some(_) => UnitNow::Application,
+        None => UnitNow::Unknown,
+    };
+    let version = unit.and_then(|(facts, _)| facts.version.as_ref());
+    output.object(&LoadObject {
+        schema: "axcon.load/1",
+        port: unit.map(|(_, port)| port),
+        exit_code: 0,
+        verdict: "planned",
+        unit: unit_name(state),
+        phase: phase_name(Phase::Check),
+        product,
+        version_before: version.map(|known| known.value.to_string()),
+        version_after: None,
+        records: 0,
+        records_total: report.facts.records as usize,
+        address: None,
+        seconds: 0.0,
+        what: "a dry run: nothing has been sent",
+        heard: "",
+        remark: None,
+        next: "run the same command without --dry-run",
+        defects: image_cli::defect_objects(report),
+    })
 }
 
 /// The journal's part in an upload on one port.
@@ -204,12 +288,16 @@ impl Desk {
         Desk { journal, note }
     }
 
-    fn begin(&self, facts: &Facts, product: Option<&str>, image: &str, talk: &Talk, output: &mut Output) {
-        let Some((journal, key)) = &self.journal else { return };
+    /// What is to be noted of this upload, if anything can be.
+    fn compose(&self, facts: &Facts, product: Option<&str>, image: &str, talk: &Talk) -> Option<Note> {
         let said = facts.product.as_ref().map(|known| known.value.as_str());
-        let Some(product) = said.or(product) else { return };
+        let product = said.or(product)?.to_owned();
         let unix_seconds = talk.calendar().at(talk.now()).as_second();
-        let note = Note { product: product.to_owned(), image: image.to_owned(), unix_seconds };
+        Some(Note { product, image: image.to_owned(), unix_seconds })
+    }
+
+    fn begin(&self, note: Note, output: &mut Output) {
+        let Some((journal, key)) = &self.journal else { return };
         if let Err(error) = journal.begin(key, note) {
             output.remark(&format!("axcon: this upload is not noted, so a failed one will want --product: {error}"));
         }
@@ -292,18 +380,15 @@ fn plan(
     }
     let pages = report.facts.data_bytes as f64 / 512.0;
     let seconds = report.facts.characters as f64 / CHARACTERS_PER_SECOND + pages * SECONDS_PER_PAGE;
+    let enter = match unit {
+        Some((facts, ..)) if facts.state == UnitState::Loader => "",
+        Some(_) | None => "enter the loader, ",
+    };
     output.remark(&format!(
-        "plan   enter the loader, send {} characters (some {seconds:.0} s), then believe only the new banner",
+        "plan   {enter}send {} characters (some {seconds:.0} s), then believe only the new banner",
         report.facts.characters
     ));
     Ok(())
-}
-
-fn agreed(deed: &str, output: &mut Output) -> Result<bool, CliError> {
-    let _ = write!(output.err, "{deed}? Type yes: ").and_then(|()| output.err.flush());
-    let mut answer = String::new();
-    std::io::stdin().read_line(&mut answer).map_err(|error| CliError::new(Kind::Failed, error))?;
-    Ok(matches!(answer.trim().to_lowercase().as_str(), "yes" | "y"))
 }
 
 #[derive(Serialize)]
@@ -418,7 +503,7 @@ pub fn next_step(report: &LoadReport) -> &'static str {
     match (report.verdict, report.unit) {
         (Verdict::Done, _) => "nothing: the unit runs what was sent",
         (Verdict::Refused, _) if report.product.is_none() => {
-            "look at the label of the unit and say its product: --product AXTC4CO"
+            "look at the label of the unit and say its product: --product NAME"
         }
         (Verdict::Refused, _) if report.misfit == Some(DefectId::Downgrade) => {
             "take newer software, unless the old one is wanted"

@@ -10,7 +10,7 @@ use super::meter::{Board, Meter};
 use super::{Prepared, upload};
 use crate::cli::Global;
 use crate::cli::error::{CliError, Kind};
-use crate::cli::output::{self, Output};
+use crate::cli::output::{self, Output, Remarks};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -87,7 +87,7 @@ pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut 
                     let (out, err) = (Lines(Arc::default()), Lines(Arc::default()));
                     let stdout: Box<dyn Write + Send> =
                         if json { Box::new(Shared(Vec::new())) } else { Box::new(out.clone()) };
-                    let mut output = Output { json, out: stdout, err: Box::new(err.clone()) };
+                    let mut output = Output { json, out: stdout, err: Remarks::to(err.clone()) };
                     let meter = if json { Meter::new(port, true) } else { Meter::on_board(port, board.clone(), line) };
                     let result = upload(prepared, &global, meter, &mut output);
                     let code = output::conclude(&mut output, result);

@@ -111,7 +111,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         output.remark(&warning);
     }
     let interactive = io::stdin().is_terminal();
-    let comeback = Comeback::of(&spec, &connection, link::options(global)).filter(|_| interactive);
+    let comeback = Comeback::of(&spec, link::options(global)).filter(|_| interactive);
     if interactive {
         output.remark(&format!("{} at {}; Ctrl-] leaves, Ctrl-T ? helps", connection.port(), connection.settings()));
     }
@@ -323,6 +323,9 @@ impl Conversation {
     fn follow(&mut self, output: &mut Output) -> Result<(), CliError> {
         while self.session.poll_event().is_some() {}
         self.recorder.follow(self.session.record());
+        if let Some(warning) = self.recorder.take_warning() {
+            self.say(&warning, output)?;
+        }
         self.hold_told &= self.session.held_since().is_some();
         let time_of = time_of(Calendar::Clock(self.clock));
         let mut out = Vec::new();
@@ -402,10 +405,9 @@ impl Conversation {
 
     /// The link is lost: the end, or a pause if it may come back.
     fn lost(&mut self, error: CliError, output: &mut Output) -> Result<(), CliError> {
-        if self.comeback.is_none() {
-            return Err(error);
-        }
+        let Some(comeback) = &mut self.comeback else { return Err(error) };
         if self.connection.take().is_some() {
+            comeback.lost();
             let now = self.clock.now();
             self.session.link_lost(now);
             self.sending = None;

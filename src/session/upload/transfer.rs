@@ -49,8 +49,6 @@ const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
 /// How long behind each record a hold may take while nobody knows where the loader stops its sender: an adapter of 20 ms
 /// there and back, and a busy computer.
 const WATCHED: Duration = Duration::from_millis(120);
-/// How much earlier than reckoned a record may have left: a line that is 2 % quick.
-const EARLY: Duration = Duration::from_millis(2);
 /// Words that may leave, from the header on, without any sign of life: the largest pages of such parts have 512, and twice
 /// that is looked at, the record that crosses included.
 const MOST_UNHEARD: u32 = 1280;
@@ -91,7 +89,7 @@ pub(super) struct Transfer {
     acknowledged: bool,
     /// No hold came behind the header where none was expected.
     header_passed: bool,
-    /// Nor behind the last data, where nothing has shown yet that holds come where they should.
+    /// Nor behind the last data.
     end_passed: bool,
     /// Words of a page by the product's file.
     believed: u32,
@@ -211,9 +209,8 @@ impl Transfer {
             Pacing::Pages if self.sent == 0 => {}
             Pacing::Pages if held => {
                 self.alive = true;
-                // Not where it was expected, or before that record can have come: its pages have another size, or the
-                // line made an XOFF of something.
-                if self.crossing.is_none_or(|left_at| now + EARLY < left_at) {
+                if self.crossing.is_none() {
+                    // Not where it was expected: its pages have another size, or the line made an XOFF of something.
                     self.watch();
                     self.crossing = Some(now);
                 }
@@ -364,8 +361,8 @@ impl Transfer {
                 (Some(crossing), Pages::Words(_)) => {
                     Some(crossing + if self.alive { HOLD_EXPECTED } else { SIGN_OF_LIFE })
                 }
-                // No hold has come yet, so the last data may have crossed where nobody knows.
-                (None, _) if self.sent + 1 == self.records.len() && !self.acknowledged && !self.end_passed => {
+                // Success is reported for a page that is lost here, so the last data gets its time wherever it lies.
+                (None, _) if self.sent + 1 == self.records.len() && !self.end_passed => {
                     Some(*self.left_at.back()? + WATCHED)
                 }
                 (None, _) => None,

@@ -5,6 +5,7 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::super::{FileEntry, FileKind, Input, LARGEST_TEXT, PortEntry, RecordingEntry};
+use crate::host::save::{SaveError, save};
 use crate::host::{self, library, ports, recorder};
 
 /// Entries of a folder that are shown at most.
@@ -79,12 +80,11 @@ pub(super) fn recordings() -> Result<Vec<RecordingEntry>, String> {
     Ok(listed.into_iter().map(entry).collect())
 }
 
-/// Writes a file that is not there yet.
+/// Writes a file that is not there yet, whole or not at all.
 pub(super) fn create(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    let written = File::options().write(true).create_new(true).open(path).and_then(|mut file| file.write_all(bytes));
-    written.map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => "a file of that name is there already".to_owned(),
-        _ => error.to_string(),
+    save(path, bytes, false).map_err(|error| match error {
+        SaveError::Exists | SaveError::NotAFile => "a file of that name is there already".to_owned(),
+        SaveError::Io(error) => error.to_string(),
     })
 }
 

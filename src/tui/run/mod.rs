@@ -8,7 +8,6 @@
 mod files;
 mod player;
 
-use std::collections::VecDeque;
 use std::io;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
@@ -20,6 +19,7 @@ use player::{Player, Step};
 
 use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Options, Playback};
 use crate::host;
+use crate::host::Inbox;
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::{self, Connection, LinkError, LinkSpec};
@@ -99,7 +99,7 @@ pub fn run(world: World) -> io::Result<End> {
         app,
         world,
         clock,
-        inputs,
+        inbox: Inbox::new(inputs),
         keys,
         sender,
         answer,
@@ -113,7 +113,6 @@ pub fn run(world: World) -> io::Result<End> {
         player: None,
         skew: Duration::ZERO,
         recorder: Recorder::nothing(),
-        left: VecDeque::new(),
     };
     console.serve(&mut screen)
 }
@@ -125,7 +124,7 @@ struct Console {
     app: App,
     world: World,
     clock: Clock,
-    inputs: Receiver<host::Input>,
+    inbox: Inbox,
     /// What the user does comes before anything else.
     keys: Receiver<TerminalEvent>,
     sender: SyncSender<host::Input>,
@@ -146,8 +145,6 @@ struct Console {
     /// By how much the console's time is ahead of the clock: a recording's time passes in no time.
     skew: Duration,
     recorder: Recorder,
-    /// Inputs taken from the channel while a link was closed.
-    left: VecDeque<host::Input>,
 }
 
 impl Console {
@@ -175,6 +172,12 @@ impl Console {
                 next_frame = next_frame.max(now) + FRAME;
                 hurry = false;
             }
+            // A stopped terminal keeps the drawing waiting, Ctrl-Z everything: what the unit has answered meanwhile goes
+            // before what has become due meanwhile.
+            if self.take_arrived() {
+                return Ok(End::Quit);
+            }
+            let now = self.clock.now();
             // A flood of inputs must not keep a timer from expiring.
             if self.timer_at().is_some_and(|due| due <= now) && self.handle(Input::Timeout) {
                 return Ok(End::Quit);
@@ -196,9 +199,9 @@ impl Console {
             let played = self.player.as_ref().and_then(|player| player.wake_at(now));
             let wake = [due, self.retry, played, self.timer_at()].into_iter().flatten().min();
             let wake = wake.unwrap_or(Instant::NEVER);
-            let Some(input) = self.next_input(wake) else { continue };
+            // The channel cannot be closed, since this struct holds a sender.
+            let Ok(Some(input)) = self.inbox.next(wake.since(self.clock.now()).min(LONGEST_WAIT)) else { continue };
             let leaves = match input {
-                host::Input::Bytes { bytes, .. } => self.handle(Input::Bytes(bytes)),
                 host::Input::Gone(error) => {
                     let failure = (self.world.explain)(error);
                     self.lose_link(failure)
@@ -217,7 +220,7 @@ impl Console {
                     }
                     leaves
                 }
-                host::Input::Typed(_) | host::Input::TypedEnd => false,
+                host::Input::Bytes { .. } | host::Input::Typed(_) | host::Input::TypedEnd => false,
             };
             if leaves {
                 return Ok(End::Quit);
@@ -225,13 +228,16 @@ impl Console {
         }
     }
 
-    /// The next input; `None` when it is time.
-    fn next_input(&mut self, wake: Instant) -> Option<host::Input> {
-        if let Some(input) = self.left.pop_front() {
-            return Some(input);
+    /// Hands the app the bytes that have come. Gives `true` when it is to end.
+    fn take_arrived(&mut self) -> bool {
+        let mut arrived = self.inbox.arrived();
+        if arrived.is_empty() {
+            return false;
         }
-        // An error is the time that is over: the channel cannot be closed, since this struct holds a sender.
-        self.inputs.recv_timeout(wake.since(self.clock.now()).min(LONGEST_WAIT)).ok()
+        for piece in &mut arrived {
+            piece.at += self.skew;
+        }
+        self.handle(Input::Arrived(arrived))
     }
 
     /// When the app's timer expires, by the clock. While a recording is played it expires in the recording's time.
@@ -357,7 +363,7 @@ impl Console {
         let recording = self.recorder.path().map(|path| path.display().to_string());
         let recording = recording.or_else(|| self.recorder.take_warning());
         let options = link::Options { baud: self.world.baud };
-        self.comeback = spec.and_then(|spec| Comeback::of(&spec, &connection, options));
+        self.comeback = spec.and_then(|spec| Comeback::of(&spec, options));
         self.link = Some(connection);
         let start_of_day = host::clock::day_before(self.clock.time_of_day(), self.skew);
         Input::LinkOpened(LinkInfo {
@@ -447,9 +453,10 @@ impl Console {
             return false;
         }
         let recorder = std::mem::take(&mut self.recorder);
-        let comeback = self.comeback.take();
+        let mut comeback = self.comeback.take();
         self.close_link();
-        if comeback.is_some() {
+        if let Some(comeback) = &mut comeback {
+            comeback.lost();
             self.recorder = recorder;
             self.recorder.mark(self.now(), "link lost");
             self.retry = Some(self.clock.now() + Comeback::RETRY);
@@ -482,11 +489,7 @@ impl Console {
         self.comeback = None;
         self.retry = None;
         if self.link.take().is_some() {
-            let waiting = self
-                .inputs
-                .try_iter()
-                .filter(|input| !matches!(input, host::Input::Bytes { .. } | host::Input::Gone(_)));
-            self.left.extend(waiting);
+            self.inbox.forget_link();
         }
         self.recorder = Recorder::nothing();
     }

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
 use axcon::emulator::{Running, Setup, Unit};
-use axcon::endpoint::Endpoint;
+use axcon::endpoint::{Arrived, Endpoint};
 use axcon::image::{CheckedImage, make};
 use axcon::secret::Secret;
 use axcon::session::{Command, Event, LoadOrder, LoadReport, Outcome, Session};
@@ -200,6 +200,29 @@ impl Bench {
             }
             self.step(next);
         }
+    }
+
+    /// The console stands still so long, as behind a terminal that was stopped; then it looks at what has come.
+    pub fn stand_still(&mut self, span: Duration) {
+        let end = self.now + span;
+        let mut backlog = Vec::new();
+        loop {
+            let due = [self.unit.poll_timeout(), self.to_session.next_arrival()];
+            let next = due.into_iter().flatten().min().unwrap_or(Instant::NEVER).max(self.now);
+            if next > end {
+                break;
+            }
+            self.now = next;
+            let to_session = &mut self.to_session;
+            self.unit.advance(next, |at, bytes| to_session.push(at, bytes));
+            while let Some((at, byte)) = self.to_session.pop_arrived(next) {
+                backlog.push(Arrived { at, bytes: vec![byte] });
+            }
+        }
+        self.now = end;
+        self.session.handle_backlog(end, &backlog);
+        self.session.handle_timeout(end);
+        self.drain();
     }
 
     /// Cuts the unit's power and gives it back.

@@ -1,0 +1,96 @@
+//! Writing a file so that nobody ever sees half of one: beside its place first, then in one step into it.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Why a file is not written. What was there is there.
+#[derive(Debug, thiserror::Error)]
+pub enum SaveError {
+    /// A file is there, and should stay.
+    #[error("it exists already")]
+    Exists,
+    /// Something else is there: a folder, a device.
+    #[error("it is not a file")]
+    NotAFile,
+    /// The system refuses.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+/// Whether a file may be written there: to be asked before somebody works for what goes into it.
+///
+/// # Errors
+/// If something is there that should stay.
+pub fn admit(path: &Path, overwrite: bool) -> Result<(), SaveError> {
+    match fs::metadata(path) {
+        Ok(found) if !found.is_file() => Err(SaveError::NotAFile),
+        Ok(_) if !overwrite => Err(SaveError::Exists),
+        Ok(_) | Err(_) => Ok(()),
+    }
+}
+
+/// Writes a file. What is there already is replaced only if that is wanted; behind a symbolic link, what it leads to.
+///
+/// # Errors
+/// If a file is there and should stay, if the place is no file, or the system refuses. Then nothing has changed.
+pub fn save(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), SaveError> {
+    admit(path, overwrite)?;
+    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let beside = beside(&place);
+    let mut file = File::create_new(&beside)?;
+    let written = file
+        .write_all(bytes)
+        .and_then(|()| file.sync_all())
+        .and_then(|()| match fs::metadata(&place) {
+            Ok(replaced) => fs::set_permissions(&beside, replaced.permissions()),
+            Err(_) => Ok(()),
+        })
+        .and_then(|()| fs::rename(&beside, &place));
+    written.map_err(|error| {
+        let _ = fs::remove_file(&beside);
+        error.into()
+    })
+}
+
+/// A name in the same folder that no other run of the program uses.
+fn beside(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_whole_or_as_it_was_and_nothing_stays_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("x.S");
+        save(&path, b"one", false).expect("written");
+        assert!(matches!(save(&path, b"two", false), Err(SaveError::Exists)));
+        assert_eq!(fs::read(&path).expect("there"), b"one");
+        save(&path, b"three", true).expect("replaced");
+        assert_eq!(fs::read(&path).expect("there"), b"three");
+        assert!(matches!(save(folder.path(), b"four", true), Err(SaveError::NotAFile)));
+        assert!(matches!(save(&folder.path().join("no/such/x.S"), b"five", true), Err(SaveError::Io(_))));
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_rights_stay_as_they_were() {
+        use std::os::unix::fs::PermissionsExt;
+
+        let folder = tempfile::tempdir().expect("a folder");
+        let (path, link) = (folder.path().join("x.json"), folder.path().join("latest"));
+        fs::write(&path, b"one").expect("written");
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).expect("set");
+        std::os::unix::fs::symlink(&path, &link).expect("linked");
+        save(&link, b"two", true).expect("replaced");
+        assert!(link.is_symlink());
+        assert_eq!(fs::read(&path).expect("there"), b"two");
+        assert_eq!(fs::metadata(&path).expect("there").permissions().mode() & 0o777, 0o640);
+    }
+}
