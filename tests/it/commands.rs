@@ -37,8 +37,14 @@ impl Bench {
 
     /// Starts the emulator, or starts it again.
     fn power_up(&mut self) {
+        self.power_up_as("axtc4co", &["--state", "s0"]);
+    }
+
+    /// Starts another emulator in its place.
+    fn power_up_as(&mut self, product: &str, more: &[&str]) {
         self.unit = None;
-        let unit = self.world.start(&["emulate", "axtc4co", "--link", "u0", "--state", "s0", "--line-rate", "off"]);
+        let args = [&["emulate", product, "--link", "u0", "--line-rate", "off"], more].concat();
+        let unit = self.world.start(&args);
         unit.wait_out("serial: ");
         self.unit = Some(unit);
     }
@@ -598,4 +604,48 @@ fn a_stream_that_ends_before_its_first_row_is_off_all_the_same() {
         assert_eq!(ran.code, Some(2), "{}", ran.err);
         assert!(ran.err.contains("old.csv exists already"), "{}", ran.err);
     }
+}
+
+#[test]
+fn older_software_than_what_runs_is_sent_when_that_is_wanted() {
+    let bench = Bench::new();
+    let older = ["image", "make", "--product", "axtc4co", "--version", "1.0.9", "--words", "600", "--out", "old.S"];
+    assert_eq!(bench.world.run(&older, b"").code, Some(0));
+    for dry in [&["--dry-run"][..], &[]] {
+        let refused = bench.load("old.S", dry);
+        assert_eq!(refused.code, Some(5), "{}", refused.err);
+        assert!(refused.err.contains("older than the V1.1.0 that the unit runs"), "{}", refused.err);
+        assert!(refused.err.contains("--allow downgrade"), "{}", refused.err);
+    }
+    assert_eq!(bench.version(), "1.1.0");
+    let sent = bench.load("old.S", &["--allow", "downgrade"]);
+    assert_eq!(sent.code, Some(0), "{}", sent.err);
+    assert_eq!(bench.version(), "1.0.9");
+}
+
+/// In every second dialect the menu does not name the unit.
+#[test]
+fn a_unit_whose_menu_does_not_name_it_is_asked_for_its_product_code_before_an_upload() {
+    let mut bench = Bench::new();
+    bench.power_up_as("axtc4co", &["--dialect", "42"]);
+    let planned = bench.load("new.S", &["--dry-run", "--json"]);
+    assert_eq!(planned.code, Some(0), "{}", planned.err);
+    let plan = json(&planned.out);
+    assert_eq!((&plan["verdict"], &plan["product"]), (&"planned".into(), &"AXTC4CO".into()));
+    let ran = bench.load("new.S", &[]);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.err.contains("its object dictionary is asked"), "{}", ran.err);
+}
+
+#[test]
+fn an_upload_that_nobody_answers_leaves_no_note_that_another_unit_would_be_judged_by() {
+    let bench = Bench::new();
+    let silent = crate::support::puppet::Puppet::silent();
+    let link = bench.world.path("u1");
+    std::os::unix::fs::symlink(silent.path(), &link).expect("a link");
+    let args = ["load", "new.S", "--yes", "--password-file", "pw", "--port", "u1"];
+    let ran = bench.world.run(&args, b"");
+    assert_eq!(ran.code, Some(4), "{}", ran.err);
+    let notes = fs::read_to_string(bench.world.path("state/axcon/uploads.json")).unwrap_or_default();
+    assert!(!notes.contains("u1"), "{notes}");
 }
