@@ -2,11 +2,12 @@
 
 use crate::device::RING;
 
-/// Characters received and not yet read. One too many takes the place of the oldest, which is then read twice: first
-/// as the new one, and again where that one belongs.
+/// Characters received and not yet read. One too many takes the place of the oldest (facts: "character 551 overwrites"),
+/// and is read where that one stood. That no more than all places are read then is a guess.
 #[derive(Debug)]
 pub struct Ring {
     slots: Box<[u8; RING]>,
+    write: usize,
     read: usize,
     unread: usize,
 }
@@ -14,13 +15,14 @@ pub struct Ring {
 impl Ring {
     /// An empty ring.
     pub fn new() -> Self {
-        Ring { slots: Box::new([0; RING]), read: 0, unread: 0 }
+        Ring { slots: Box::new([0; RING]), write: 0, read: 0, unread: 0 }
     }
 
     /// A character has come.
     pub fn push(&mut self, character: u8) {
-        self.slots[(self.read + self.unread) % RING] = character;
-        self.unread += 1;
+        self.slots[self.write] = character;
+        self.write = (self.write + 1) % RING;
+        self.unread = (self.unread + 1).min(RING);
     }
 
     /// The next character.
@@ -33,7 +35,7 @@ impl Ring {
 
     /// Forgets what has not been read.
     pub fn clear(&mut self) {
-        self.read = (self.read + self.unread) % RING;
+        self.read = self.write;
         self.unread = 0;
     }
 }
@@ -56,5 +58,7 @@ mod tests {
         assert_eq!((ring.pop(), ring.pop()), (Some(b'!'), Some(1)));
         ring.clear();
         assert_eq!(ring.pop(), None);
+        (0..100_000).for_each(|_| ring.push(b'x'));
+        assert_eq!(std::iter::from_fn(|| ring.pop()).count(), RING, "a sender that is deaf fills it once");
     }
 }
