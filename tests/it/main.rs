@@ -32,3 +32,4 @@ mod talks;
 mod tidy;
 mod transcripts;
 mod uploads;
+mod wire_page;
