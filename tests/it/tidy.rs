@@ -166,6 +166,65 @@ pub fn with_blocks(text: &str, kind: &str, mut draw: impl FnMut(&str) -> String)
 }
 
 #[test]
+fn what_the_documents_list_is_all_there_is() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest = read(&root.join("Cargo.toml"));
+    let architecture = read(&root.join("docs/architecture.md"));
+    let arrows = section(&architecture, "## Arrows");
+    let mut wanted: Vec<(&str, &str, String)> = Vec::new();
+    for (module, _) in ARROWS {
+        wanted.push(("the map in architecture.md", section(&architecture, "## Map"), (*module).to_owned()));
+        wanted.push(("the arrows in architecture.md", arrows, (*module).to_owned()));
+    }
+    let dependencies = section(&architecture, "## Dependencies");
+    let tables =
+        manifest.split("\n[").filter(|table| table.lines().next().unwrap_or_default().contains("dependencies"));
+    for line in tables.flat_map(|table| table.lines().skip(1)) {
+        let name = line.split(" = ").next().filter(|name| !name.is_empty() && !name.starts_with('#'));
+        wanted.extend(name.map(|name| ("the dependencies in architecture.md", dependencies, name.to_owned())));
+    }
+    let testing = read(&root.join("docs/testing.md"));
+    for (folder, extension) in
+        [("tests/it", "rs"), ("tests/clients", "py"), ("benches", "rs"), ("fuzz/fuzz_targets", "rs")]
+    {
+        for (path, _) in files(folder, extension) {
+            // A folder of tests is listed as one.
+            let below = path.strip_prefix(folder).expect("below it");
+            let first = Path::new(below.iter().next().expect("a name"));
+            let name = first.file_stem().expect("a name").to_string_lossy().into_owned();
+            wanted.extend((name != "main").then_some(("testing.md", testing.as_str(), name)));
+        }
+    }
+    let tui = read(&root.join("docs/tui.md"));
+    for (file, name) in [("src/tui/input.rs", "Effect"), ("src/tui/input.rs", "Input")] {
+        let variants = variants(&read(&root.join(file)), name);
+        wanted.extend(variants.into_iter().map(|variant| ("tui.md", tui.as_str(), variant)));
+    }
+    assert!(wanted.len() > 120, "names are looked for: {}", wanted.len());
+    let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    let missing: Vec<String> = wanted
+        .iter()
+        .filter(|(_, text, name)| !text.split(|c| !is_word(c)).any(|word| word == name))
+        .map(|(place, _, name)| format!("{place} does not have {name}"))
+        .collect();
+    assert!(missing.is_empty(), "{}", missing.join("\n"));
+}
+
+/// The part of a document below a heading.
+fn section<'a>(text: &'a str, heading: &str) -> &'a str {
+    let below = text.split_once(heading).unwrap_or_else(|| panic!("no {heading}")).1;
+    below.split("\n## ").next().unwrap_or_default()
+}
+
+/// The variants of an enumeration in a source file.
+pub fn variants(source: &str, name: &str) -> Vec<String> {
+    let body = source.split_once(&format!("pub enum {name} {{")).unwrap_or_else(|| panic!("no {name}")).1;
+    let lines = body.split("\n}").next().unwrap_or_default().lines().filter_map(|line| line.strip_prefix("    "));
+    let words = lines.filter_map(|line| line.split(|c: char| !c.is_alphanumeric()).next());
+    words.filter(|word| word.starts_with(|c: char| c.is_ascii_uppercase())).map(str::to_owned).collect()
+}
+
+#[test]
 fn the_limits_in_the_documents_are_those_of_the_code() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut wrong = Vec::new();

@@ -15,7 +15,7 @@ use axcon::wire::stream::{FieldFormat, Source};
 use axcon::wire::{Message, Prompt};
 
 use crate::support::bench::{Bench, axrtd8co, axtc4co, flash_with, image_of, order};
-use crate::tidy::{UPDATE, files, read, sources_and_tests, with_blocks};
+use crate::tidy::{UPDATE, files, read, sources_and_tests, variants, with_blocks};
 use crate::transcripts::{escaped, unescaped};
 
 /// The page, from the repository's root.
@@ -31,8 +31,11 @@ fn root() -> &'static Path {
 
 // The exchanges.
 
+/// Has an exchange and prints it.
+type Exchange = fn() -> Vec<String>;
+
 /// What the page prints below `<!-- exchange: NAME -->`, and how it comes about.
-const EXCHANGES: &[(&str, fn() -> Vec<String>)] = &[
+const EXCHANGES: &[(&str, Exchange)] = &[
     ("power-up", power_up),
     ("view", || without_menu(view())),
     ("defaults", defaults),
@@ -529,12 +532,8 @@ fn nothing_that_the_service_port_has_is_missing_from_the_page() {
         ("boot.rs", "LoaderText", &[]),
         ("prompt.rs", "Prompt", &[]),
     ] {
-        let source = read(&root().join("src/wire").join(file));
-        let body = source.split(&format!("pub enum {name} {{")).nth(1).and_then(|rest| rest.split("\n}").next());
-        let variants = body.expect("an enumeration").lines().filter_map(|line| line.strip_prefix("    "));
-        let variants = variants.map(|line| line.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default());
-        for variant in variants.filter(|variant| variant.starts_with(|c: char| c.is_ascii_uppercase())) {
-            if !read_by.contains(&variant) && !others.contains(&variant) {
+        for variant in variants(&read(&root().join("src/wire").join(file)), name) {
+            if !read_by.contains(&variant.as_str()) && !others.contains(&variant.as_str()) {
                 missing.push(format!("{name}::{variant}"));
             }
         }
