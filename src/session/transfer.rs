@@ -45,7 +45,7 @@ const LONGEST_HOLD: Duration = Duration::from_secs(4);
 /// and not one more record, since what comes back may be its menu.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
 /// Characters on their way to a ring of [`RING`] at most: six records of 32 data bytes, and 50 to spare for keys that
-/// were pressed before. More than the 372 that a line carries in the 32 ms an adapter makes of the way there and back.
+/// were pressed before. More than the 369 that a line carries in the 32 ms an adapter makes of the way there and back.
 const WINDOW: usize = RING - 50;
 
 /// Why a transfer cannot go on.

@@ -541,6 +541,9 @@ fn nothing_that_the_service_port_has_is_missing_from_the_page() {
     for product in Product::all() {
         let texts = texts_of(product).into_iter().chain(guesses_of(product));
         missing.extend(texts.filter(|words| !text.contains(&format!("`{words}`"))));
+        let (low, high) = product.measurement.stream_period_ms;
+        let periods = format!("{low} to {high} ms on an {}", product.name);
+        missing.extend((!text.contains(&periods)).then_some(periods));
         missing.extend(row_formats(product).into_iter().filter(|row| !text.lines().any(|line| line == row)));
     }
     assert!(missing.is_empty(), "{PAGE} does not have:\n{}", missing.join("\n"));
