@@ -570,7 +570,7 @@ mod tests {
         }
     }
 
-    // B-052, B-88, B-124
+    // B-052, B-124
     #[test]
     fn identifiers_nobody_has_changed_follow_the_node_id() {
         let mut objects = tc4();

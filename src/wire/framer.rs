@@ -15,7 +15,7 @@ pub const XON: u8 = 0x11;
 pub const XOFF: u8 = 0x13;
 
 /// Characters of a line at most. Longer ones are cut into pieces, so that a device without line ends cannot make us
-/// keep everything; twice the longest row of any product would be 200.
+/// keep everything; the longest row of any product has 55.
 pub const LONGEST_LINE: usize = 1024;
 
 /// Bytes of an escape sequence at most; what goes on longer is taken as text.

@@ -33,3 +33,4 @@ mod talks;
 mod tidy;
 mod transcripts;
 mod uploads;
+mod wire_page;

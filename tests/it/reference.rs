@@ -3,14 +3,13 @@
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
+use std::time::Duration;
 
 use clap::builder::StyledStr;
 use clap::{Arg, ArgAction, Command};
 
-use crate::support::shell::World;
-
-/// With this in the environment the reference is written anew.
-const UPDATE: &str = "AXCON_UPDATE_DOCS";
+use crate::support::shell::{Ran, Running, World};
+use crate::tidy::{UPDATE, documents};
 
 #[test]
 fn the_reference_is_what_the_command_line_says_of_itself() {
@@ -143,4 +142,104 @@ fn the_everyday_commands_of_the_readme_work_as_printed() {
         assert_eq!(ran.code, Some(0), "{command}\n{}\n{}", ran.out, ran.err);
     }
     assert!(world.path("values.csv").exists());
+}
+
+/// The longest that an example may take: it has units in real time, on a machine that may be busy.
+const EXAMPLE: Duration = Duration::from_secs(240);
+
+/// A file that a document prints: the block behind `<!-- file: NAME -->`.
+struct Printed {
+    document: String,
+    name: String,
+    language: String,
+    text: String,
+}
+
+fn printed_files() -> Vec<Printed> {
+    let mut files = Vec::new();
+    for (path, text) in documents() {
+        for behind in text.split("<!-- file: ").skip(1) {
+            let (name, behind) = behind.split_once(" -->\n```").expect("a name, then the file");
+            let (language, behind) = behind.split_once('\n').expect("a language");
+            let (text, _) = behind.split_once("```").expect("the file's end");
+            files.push(Printed {
+                document: path.display().to_string(),
+                name: name.into(),
+                language: language.into(),
+                text: text.into(),
+            });
+        }
+    }
+    files
+}
+
+/// A world in which the files of a document lie.
+fn world_of(document: &str) -> World {
+    let world = World::new();
+    let files: Vec<Printed> = printed_files().into_iter().filter(|file| file.document == document).collect();
+    assert!(!files.is_empty(), "{document} prints no file");
+    files.iter().for_each(|file| fs::write(world.path(&file.name), &file.text).expect("written"));
+    world
+}
+
+/// Runs one of them with another program, with this on its standard input.
+fn run_example(world: &World, program: &Path, args: &[&str], input: &[u8]) -> Ran {
+    let mut running = Running::start(world.tool(program, args));
+    running.input(input);
+    running.end_input();
+    running.wait_within(EXAMPLE)
+}
+
+#[test]
+fn every_script_in_the_documents_is_a_file_that_a_test_runs() {
+    let mut printed: Vec<String> = Vec::new();
+    for (path, text) in documents() {
+        let scripts = text.matches("\n```sh\n").count() + text.matches("\n```python\n").count();
+        let document = path.display().to_string();
+        let is_script =
+            |file: &&Printed| file.document == document && ["sh", "python"].contains(&file.language.as_str());
+        let files = printed_files();
+        let files: Vec<String> =
+            files.iter().filter(is_script).map(|file| format!("{document} {}", file.name)).collect();
+        assert_eq!(files.len(), scripts, "{document} has a script that no test runs");
+        printed.extend(files);
+    }
+    printed.sort();
+    assert_eq!(
+        printed,
+        ["docs/automation.md check.sh", "docs/automation.md test_unit.py", "docs/emulator.md faults.sh"]
+    );
+}
+
+#[test]
+fn the_shell_example_for_test_automation_works_as_printed() {
+    let world = world_of("docs/automation.md");
+    let ran = run_example(&world, Path::new("/bin/sh"), &["check.sh"], b"");
+    assert_eq!(ran.code, Some(0), "{}\n{}", ran.out, ran.err);
+    assert!(ran.out.ends_with("all as it should be\n"), "{}\n{}", ran.out, ran.err);
+}
+
+#[test]
+fn the_pytest_example_for_test_automation_works_as_printed() {
+    let Some(python) = std::env::var_os("AXCON_TEST_PYTHON") else {
+        // Straight to the stream: what the test harness captures of a test that passes is never seen.
+        let _ = std::io::Write::write_all(
+            &mut std::io::stderr(),
+            b"skipped: no pytest; set AXCON_TEST_PYTHON to a Python with pytest and pyserial, as .ci/run does\n",
+        );
+        return;
+    };
+    let world = world_of("docs/automation.md");
+    let ran = run_example(&world, Path::new(&python), &["-m", "pytest", "-q", "test_unit.py"], b"");
+    assert_eq!(ran.code, Some(0), "{}\n{}", ran.out, ran.err);
+    assert!(ran.out.contains("3 passed"), "{}", ran.out);
+}
+
+#[test]
+fn the_examples_of_scenarios_and_faults_are_taken_as_printed() {
+    let world = world_of("docs/emulator.md");
+    let ran = world.run(&["emulate", "axtc4co", "--scenario", "engine.toml"], b"quit\n");
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""), "{}", ran.out);
+    let ran = run_example(&world, Path::new("/bin/sh"), &["faults.sh"], b"quit\n");
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""), "{}", ran.out);
 }

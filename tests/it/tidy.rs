@@ -116,8 +116,7 @@ fn nothing_is_left_open() {
 fn every_link_in_the_documents_leads_somewhere() {
     let mut dead = Vec::new();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = ("README.md".into(), fs::read_to_string(root.join("README.md")).expect("a README"));
-    for (path, text) in files("docs", "md").into_iter().chain([readme]) {
+    for (path, text) in documents() {
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
             let target = link.split('#').next().unwrap_or_default();
@@ -129,26 +128,19 @@ fn every_link_in_the_documents_leads_somewhere() {
     assert!(dead.is_empty(), "dead links:\n{}", dead.join("\n"));
 }
 
-/// With this in the environment the pictures in the documents are replaced by those the program draws.
-const UPDATE: &str = "AXCON_UPDATE_DOCS";
+/// With this in the environment what a document shows of the program is replaced by what the program shows.
+pub const UPDATE: &str = "AXCON_UPDATE_DOCS";
 
 #[test]
 fn the_pictures_in_the_documents_are_those_the_program_draws() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut shown = 0;
-    for (path, text) in files("docs", "md").into_iter().chain([("README.md".into(), read(&root.join("README.md")))]) {
-        let mut current = String::new();
-        let mut rest = text.as_str();
-        while let Some((before, behind)) = rest.split_once("<!-- picture: ") {
-            let (name, behind) = behind.split_once(" -->\n```text\n").expect("a name, then the picture");
-            let (_, behind) = behind.split_once("```").expect("the picture's end");
-            let snapshot = read(&root.join(format!("src/tui/snapshots/axcon__tui__pictures__{name}.snap")));
-            let picture = snapshot.splitn(3, "---\n").nth(2).expect("a picture behind the header").trim_end();
-            current.push_str(&format!("{before}<!-- picture: {name} -->\n```text\n{picture}\n```"));
-            rest = behind;
+    for (path, text) in documents() {
+        let current = with_blocks(&text, "picture", |name| {
             shown += 1;
-        }
-        current.push_str(rest);
+            let snapshot = read(&root.join(format!("src/tui/snapshots/axcon__tui__pictures__{name}.snap")));
+            snapshot.splitn(3, "---\n").nth(2).expect("a picture behind the header").trim_end().to_owned()
+        });
         if current != text && std::env::var_os(UPDATE).is_some() {
             fs::write(root.join(&path), &current).expect("the document can be written");
             continue;
@@ -159,8 +151,139 @@ fn the_pictures_in_the_documents_are_those_the_program_draws() {
     assert!(shown >= 10, "pictures are looked for: {shown}");
 }
 
-fn read(path: &Path) -> String {
+/// A document in which every block of text behind `<!-- KIND: NAME -->` is what `draw` gives for its name.
+pub fn with_blocks(text: &str, kind: &str, mut draw: impl FnMut(&str) -> String) -> String {
+    let mark = format!("<!-- {kind}: ");
+    let mut current = String::new();
+    let mut rest = text;
+    while let Some((before, behind)) = rest.split_once(&mark) {
+        let (name, behind) = behind.split_once(" -->\n```text\n").expect("a name, then the block");
+        let (_, behind) = behind.split_once("```").expect("the block's end");
+        current.push_str(&format!("{before}{mark}{name} -->\n```text\n{}\n```", draw(name)));
+        rest = behind;
+    }
+    current + rest
+}
+
+#[test]
+fn what_the_documents_list_is_all_there_is() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest = read(&root.join("Cargo.toml"));
+    let architecture = read(&root.join("docs/architecture.md"));
+    let arrows = section(&architecture, "## Arrows");
+    let mut wanted: Vec<(&str, &str, String)> = Vec::new();
+    for (module, _) in ARROWS {
+        wanted.push(("the map in architecture.md", section(&architecture, "## Map"), (*module).to_owned()));
+        wanted.push(("the arrows in architecture.md", arrows, (*module).to_owned()));
+    }
+    let dependencies = section(&architecture, "## Dependencies");
+    let tables =
+        manifest.split("\n[").filter(|table| table.lines().next().unwrap_or_default().contains("dependencies"));
+    for line in tables.flat_map(|table| table.lines().skip(1)) {
+        let name = line.split(" = ").next().filter(|name| !name.is_empty() && !name.starts_with('#'));
+        wanted.extend(name.map(|name| ("the dependencies in architecture.md", dependencies, name.to_owned())));
+    }
+    let testing = read(&root.join("docs/testing.md"));
+    for (folder, extension) in
+        [("tests/it", "rs"), ("tests/clients", "py"), ("benches", "rs"), ("fuzz/fuzz_targets", "rs")]
+    {
+        for (path, _) in files(folder, extension) {
+            // A folder of tests is listed as one.
+            let below = path.strip_prefix(folder).expect("below it");
+            let first = Path::new(below.iter().next().expect("a name"));
+            let name = first.file_stem().expect("a name").to_string_lossy().into_owned();
+            wanted.extend((name != "main").then_some(("testing.md", testing.as_str(), name)));
+        }
+    }
+    let tui = read(&root.join("docs/tui.md"));
+    for (file, name) in [("src/tui/input.rs", "Effect"), ("src/tui/input.rs", "Input")] {
+        let variants = variants(&read(&root.join(file)), name);
+        wanted.extend(variants.into_iter().map(|variant| ("tui.md", tui.as_str(), variant)));
+    }
+    assert!(wanted.len() > 120, "names are looked for: {}", wanted.len());
+    let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    let missing: Vec<String> = wanted
+        .iter()
+        .filter(|(_, text, name)| !text.split(|c| !is_word(c)).any(|word| word == name))
+        .map(|(place, _, name)| format!("{place} does not have {name}"))
+        .collect();
+    assert!(missing.is_empty(), "{}", missing.join("\n"));
+}
+
+/// The part of a document below a heading.
+fn section<'a>(text: &'a str, heading: &str) -> &'a str {
+    let below = text.split_once(heading).unwrap_or_else(|| panic!("no {heading}")).1;
+    below.split("\n## ").next().unwrap_or_default()
+}
+
+/// The variants of an enumeration in a source file.
+pub fn variants(source: &str, name: &str) -> Vec<String> {
+    let body = source.split_once(&format!("pub enum {name} {{")).unwrap_or_else(|| panic!("no {name}")).1;
+    let lines = body.split("\n}").next().unwrap_or_default().lines().filter_map(|line| line.strip_prefix("    "));
+    let words = lines.filter_map(|line| line.split(|c: char| !c.is_alphanumeric()).next());
+    words.filter(|word| word.starts_with(|c: char| c.is_ascii_uppercase())).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_limits_in_the_documents_are_those_of_the_code() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut wrong = Vec::new();
+    let mut found = 0;
+    for (path, text) in documents() {
+        for (number, line) in text.lines().enumerate() {
+            let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+            for pair in cells.windows(2) {
+                let Some((file, name)) = constant(pair[1]) else { continue };
+                found += 1;
+                let code = read(&root.join(file));
+                let definition = code.split(&format!("const {name}: ")).nth(1).and_then(|rest| rest.split(';').next());
+                let says = definition.and_then(|definition| definition.split(" = ").nth(1)).unwrap_or("nothing");
+                if limit(pair[0]).is_none_or(|limit| coded(says) != Some(limit)) {
+                    wrong.push(format!("{}:{}: {name} is {says}, not {}", path.display(), number + 1, pair[0]));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "limits that the code does not have:\n{}", wrong.join("\n"));
+    assert!(found >= 20, "limits are looked for: {found}");
+}
+
+/// File and name, if a cell names a constant: `src/session/upload.rs::RESTART` in backticks.
+fn constant(cell: &str) -> Option<(&str, &str)> {
+    let (file, name) = cell.strip_prefix('`')?.strip_suffix('`')?.split_once(".rs::")?;
+    let is_constant = name.bytes().all(|byte| byte.is_ascii_uppercase() || byte == b'_');
+    is_constant.then(|| (&cell[1..file.len() + 4], name))
+}
+
+/// A number, or a time in ms, as documents write it: `550`, `1.5 s`, `80 ms`.
+fn limit(cell: &str) -> Option<f64> {
+    let (number, unit) = cell.split_once(' ').unwrap_or((cell, ""));
+    let number: f64 = number.replace(',', "").parse().ok()?;
+    match unit {
+        "" | "ms" => Some(number),
+        "s" => Some((number * 1000.0).round()),
+        _ => None,
+    }
+}
+
+/// The same as the code writes it.
+fn coded(definition: &str) -> Option<f64> {
+    let (factor, number) = match definition.trim_end_matches(')').split_once('(') {
+        Some(("Duration::from_secs", number)) => (1000.0, number),
+        Some(("Duration::from_millis", number)) => (1.0, number),
+        _ => (1.0, definition),
+    };
+    number.replace('_', "").parse::<f64>().ok().map(|number| number * factor)
+}
+
+pub fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// The README and everything in `docs`, with their text.
+pub fn documents() -> Vec<(PathBuf, String)> {
+    let readme = read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md"));
+    files("docs", "md").into_iter().chain([("README.md".into(), readme)]).collect()
 }
 
 /// All source files and tests with their text, by their paths from the repository's root.
@@ -177,7 +300,7 @@ fn sources() -> Vec<(PathBuf, String)> {
 }
 
 /// All files below a folder with an extension, with their text, as paths from the repository's root.
-fn files(folder: &str, extension: &str) -> Vec<(PathBuf, String)> {
+pub fn files(folder: &str, extension: &str) -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut found = Vec::new();
     let mut folders = vec![root.join(folder)];

@@ -48,7 +48,8 @@ fn quotations(path: &Path) -> Vec<Quotation> {
     found
 }
 
-fn unescaped(text: &str) -> Vec<u8> {
+/// What a text in the notation of the transcripts stands for: `\\r`, `\\n`, and `\\x13` for any other byte.
+pub fn unescaped(text: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut rest = text;
     while let Some(at) = rest.find('\\') {
@@ -64,6 +65,20 @@ fn unescaped(text: &str) -> Vec<u8> {
     }
     bytes.extend_from_slice(rest.as_bytes());
     bytes
+}
+
+/// Bytes in the notation of the transcripts.
+pub fn escaped(bytes: &[u8]) -> String {
+    let mut text = String::new();
+    for &byte in bytes {
+        match byte {
+            b'\r' => text.push_str("\\r"),
+            b'\n' => text.push_str("\\n"),
+            b' '..=b'~' => text.push(char::from(byte)),
+            _ => text.push_str(&format!("\\x{byte:02x}")),
+        }
+    }
+    text
 }
 
 /// Feeds a whole transcript, each quotation in chunks of the given sizes (over and over), and gives what was understood

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use crate::image::Image;
 use crate::image::srecord::{self, Kind, Record};
 
-/// Data bytes of a packed record: as many as fit one, less two (facts: 250, so that address, count and sum do).
+/// Data bytes of a packed record: as many as an S3 record can have beside its address and its sum.
 pub(super) const LONGEST: usize = 250;
 /// Characters of a data record besides its data: type, count, address, sum, line end.
 const AROUND: usize = 15;
@@ -40,7 +40,8 @@ pub(super) enum Size {
     Packed(usize),
 }
 
-/// What ends a record. The newer loaders take nothing else (facts: LF behind it is an error, LF alone mutes them).
+/// What ends a record. The newer loaders take nothing else: LF behind it is an error, LF alone mutes them
+/// (docs/loaders.md).
 pub(super) const LINE_END: &[u8] = b"\r";
 
 /// All records: header, data, end.

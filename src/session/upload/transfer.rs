@@ -53,7 +53,7 @@ const WATCHED: Duration = Duration::from_millis(120);
 /// that is looked at, the record that crosses included.
 const MOST_UNHEARD: u32 = 1280;
 /// Characters on their way to a ring of [`RING`] at most: six records of 32 data bytes, and 50 to spare for keys that
-/// were pressed before. More than the 372 that a line carries in the 32 ms an adapter makes of the way there and back.
+/// were pressed before. More than the 369 that a line carries in the 32 ms an adapter makes of the way there and back.
 const WINDOW: usize = RING - 50;
 
 /// Why a transfer cannot go on.

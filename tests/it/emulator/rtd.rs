@@ -120,7 +120,7 @@ fn yes_restores_the_defaults_at_once() {
     assert_eq!((bench.read("3000:1"), bench.read("6112:2"), bench.read("6114:1")), (Ok(1.0), Ok(1.0), Ok(900.0)));
 }
 
-// B-107, B-106
+// B-107
 #[test]
 fn a_start_in_the_first_five_seconds_is_lost() {
     let mut bench = rtd8();

@@ -83,6 +83,14 @@ impl World {
         command
     }
 
+    /// Another program in this world, which finds axcon as a user's shell does.
+    pub fn tool(&self, program: &Path, args: &[&str]) -> Command {
+        let mut command = self.command_of(program, args);
+        let folder = Path::new(env!("CARGO_BIN_EXE_axcon")).parent().expect("a folder");
+        command.env("PATH", format!("{}:/usr/bin:/bin", folder.display()));
+        command
+    }
+
     /// Runs the program to its end, with this on its standard input.
     pub fn run(&self, args: &[&str], input: &[u8]) -> Ran {
         let mut running = Running::start(self.command(args));
@@ -155,8 +163,13 @@ impl Running {
     }
 
     /// Waits for the end.
-    pub fn wait(mut self) -> Ran {
-        let end = Instant::now() + PATIENCE;
+    pub fn wait(self) -> Ran {
+        self.wait_within(PATIENCE)
+    }
+
+    /// Waits for the end of something that takes longer.
+    pub fn wait_within(mut self, limit: Duration) -> Ran {
+        let end = Instant::now() + limit;
         let status = loop {
             if let Some(status) = self.child.try_wait().expect("a child") {
                 break status;
