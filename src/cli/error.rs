@@ -25,6 +25,8 @@ pub enum Kind {
     PortBusy,
     /// The port went away, or is not one.
     PortGone,
+    /// The port does not do the line rate that was asked for.
+    PortRate,
     /// No answer in time.
     NoAnswer,
     /// The image has defects, cannot be read, or is not for this unit.
@@ -43,7 +45,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, for documentation and tests.
-    pub const ALL: [Kind; 16] = [
+    pub const ALL: [Kind; 17] = [
         Kind::Failed,
         Kind::Usage,
         Kind::NeedsYes,
@@ -53,6 +55,7 @@ impl Kind {
         Kind::PortDenied,
         Kind::PortBusy,
         Kind::PortGone,
+        Kind::PortRate,
         Kind::NoAnswer,
         Kind::ImageRefused,
         Kind::UnitRefused,
@@ -72,7 +75,8 @@ impl Kind {
             | Kind::PortMissing
             | Kind::PortDenied
             | Kind::PortBusy
-            | Kind::PortGone => 3,
+            | Kind::PortGone
+            | Kind::PortRate => 3,
             Kind::NoAnswer => 4,
             Kind::ImageRefused => 5,
             Kind::UnitRefused => 6,
@@ -95,6 +99,7 @@ impl Kind {
             Kind::PortDenied => "port-denied",
             Kind::PortBusy => "port-busy",
             Kind::PortGone => "port-gone",
+            Kind::PortRate => "port-rate",
             Kind::NoAnswer => "no-answer",
             Kind::ImageRefused => "image-refused",
             Kind::UnitRefused => "unit-refused",

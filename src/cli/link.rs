@@ -91,7 +91,8 @@ pub fn link_error(error: LinkError) -> CliError {
         Cause::Busy { .. } => Kind::PortBusy,
         Cause::NotSerial { .. } | Cause::Gone | Cause::Stuck { .. } | Cause::Io(_) => Kind::PortGone,
         Cause::Network(error) => network_kind(error),
-        Cause::Baud { .. } => Kind::Usage,
+        // Not the command line: another port does the same rate, and nobody may have asked for it.
+        Cause::Baud { .. } => Kind::PortRate,
     };
     let mut hints = Vec::new();
     let is_network = error.port.parse().is_ok_and(|spec: LinkSpec| spec.is_network());
@@ -321,7 +322,7 @@ mod tests {
             (Cause::Busy { holder: None }, Kind::PortBusy, "fuser"),
             (Cause::NotSerial { what: "a directory" }, Kind::PortGone, "axcon ports"),
             (Cause::Gone, Kind::PortGone, "plug the adapter in again"),
-            (Cause::Baud { asked: 3_000_000, set: 9_600 }, Kind::Usage, "115200"),
+            (Cause::Baud { asked: 3_000_000, set: 9_600 }, Kind::PortRate, "115200"),
         ] {
             let (found, hints) = shown(cause);
             assert_eq!(found, kind);

@@ -58,7 +58,7 @@ const EXIT_CODES: &str = "Exit codes:
   0    done
   1    failed otherwise
   2    the command line makes no sense, or it destroys something and nobody said --yes
-  3    the port: none, several, missing, denied, busy, gone
+  3    the port: none, several, missing, denied, busy, gone, or not at this line rate
   4    no answer in time
   5    the image is refused: it has defects, cannot be read, or is not for this unit
   6    the unit refused, a wrong password above all

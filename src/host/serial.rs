@@ -1,4 +1,4 @@
-//! Serial ports on Unix: raw, eight bits, no flow control by the kernel, no drain.
+//! Serial ports on Unix: raw, eight bits, no flow control by the kernel, no wait for a drain.
 //!
 //! Opened by hand rather than through a library, for three reasons found by measuring: the errors keep their cause
 //! (denied, busy and "not a terminal" need different advice), a failed second open leaves the first one's lock alone,
@@ -19,8 +19,8 @@ use rustix::event::PollFlags;
 use rustix::fs::{FlockOperation, Mode, OFlags};
 use rustix::io::Errno;
 use rustix::termios::{
-    Action, ControlModes, InputModes, OptionalActions, SpecialCodeIndex, Termios, ioctl_tiocexcl, ioctl_tiocnxcl,
-    isatty, tcflow, tcgetattr, tcsendbreak, tcsetattr,
+    Action, ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, Termios, ioctl_tiocexcl,
+    ioctl_tiocnxcl, isatty, tcdrain, tcflow, tcflush, tcgetattr, tcsendbreak, tcsetattr,
 };
 
 use super::Input;
@@ -103,8 +103,31 @@ impl Lines {
         for thread in [self.reader.take(), self.writer.take()].into_iter().flatten() {
             let _ = thread.join();
         }
+        // Closing waits, in the kernel and for up to 30 s, for what the driver has not sent; a port at whose other end
+        // nobody takes anything would keep the program that long.
+        let (drained, discarded) = (self.port.clone(), self.port.clone());
+        let drain = move || while tcdrain(&*drained) == Err(Errno::INTR) {};
+        let discard = || {
+            let _ = tcflush(&*discarded, QueueSelector::OFlush);
+        };
+        empty(drain, discard, patience);
         // The host of a pseudo-terminal keeps the device open, and with it this lock.
         let _ = ioctl_tiocnxcl(&self.port);
+    }
+}
+
+/// Waits until a driver has sent what it has, which is what `drain` waits for, without an end of its own and so in a
+/// thread. What takes longer than `patience` is discarded, which ends the drain.
+fn empty(drain: impl FnOnce() + Send + 'static, discard: impl FnOnce(), patience: Duration) {
+    let (done, drained) = sync_channel(1);
+    let draining = thread::Builder::new().name("drain".into()).spawn(move || {
+        drain();
+        let _ = done.try_send(());
+    });
+    if draining.is_err() || drained.recv_timeout(patience).is_err() {
+        discard();
+        // The thread has the port open, which is to be free when this returns.
+        let _ = drained.recv_timeout(patience);
     }
 }
 
@@ -284,16 +307,21 @@ fn group_name(gid: u32) -> Option<String> {
     name.or_else(|| Some(gid.to_string()))
 }
 
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
 mod tests {
-    use std::process::{Command, Stdio};
+    use std::cell::Cell;
+    use std::sync::mpsc;
 
     use super::*;
-    use crate::host::ports::Holder;
-    use crate::host::pty::Pty;
 
+    #[cfg(target_os = "linux")]
     #[test]
     fn a_port_that_a_program_without_locks_uses_is_not_shared() {
+        use std::process::{Command, Stdio};
+
+        use crate::host::ports::Holder;
+        use crate::host::pty::Pty;
+
         let pty = Pty::open(115_200).expect("a pseudo-terminal");
         let port = fs::File::options().read(true).write(true).open(pty.path()).expect("opened");
         let mut reader = Command::new("cat").stdin(port).stdout(Stdio::null()).spawn().expect("cat starts");
@@ -302,5 +330,30 @@ mod tests {
         assert_eq!((name.as_str(), pid), ("cat", reader.id()));
         reader.kill().and_then(|()| reader.wait()).expect("cat ends");
         open_exclusively(pty.path()).expect("nobody else is there");
+    }
+
+    #[test]
+    fn what_a_driver_cannot_send_is_discarded_and_keeps_nobody() {
+        let (discard, discarded) = mpsc::channel::<()>();
+        let (over, ended) = mpsc::channel();
+        let drain = move || {
+            let _ = discarded.recv();
+            let _ = over.send(());
+        };
+        empty(drain, || drop(discard), Duration::from_millis(1));
+        assert_eq!(ended.recv_timeout(Duration::from_secs(10)), Ok(()), "the drain has ended");
+        // One that not even that ends is left to itself.
+        let (never, ends) = mpsc::channel::<()>();
+        let asked = Cell::new(false);
+        empty(move || drop(ends.recv()), || asked.set(true), Duration::from_millis(1));
+        assert!(asked.get());
+        drop(never);
+    }
+
+    #[test]
+    fn what_a_driver_does_send_is_not_discarded() {
+        let discarded = Cell::new(false);
+        empty(|| thread::sleep(Duration::from_millis(5)), || discarded.set(true), Duration::from_secs(60));
+        assert!(!discarded.get());
     }
 }

@@ -161,8 +161,8 @@ fn servers_without_a_serial_port_to_set_up_say_which_way_they_lack_it() {
         (b"\xff\xfe\x00", 3, "port-gone", "the server refuses to pass all bytes unchanged (telnet BINARY)"),
         (
             b"\xff\xfd\x2c\xff\xfa\x2c\x65\x00\x00\x25\x80\xff\xf0",
-            2,
-            "usage",
+            3,
+            "port-rate",
             "it runs at 9600 baud when asked for 115200",
         ),
         (
