@@ -1,7 +1,5 @@
 //! `axcon ports`: the serial ports, what they hang on, and who holds them.
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::Global;
@@ -48,13 +46,8 @@ pub fn run(_args: Args, _global: &Global, output: &mut Output) -> Result<(), Cli
     let ports = ports::list().map_err(|error| {
         CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot list the serial ports"))
     })?;
-    let ports: Vec<(Port, Option<Holder>)> = ports
-        .into_iter()
-        .map(|port| {
-            let holder = ports::holder(Path::new(&port.path));
-            (port, holder)
-        })
-        .collect();
+    let holders = ports::holders(&ports);
+    let ports: Vec<(Port, Option<Holder>)> = ports.into_iter().zip(holders).collect();
     if output.json {
         let ports = ports.iter().map(|(port, holder)| object(port, holder.as_ref())).collect();
         return output.object(&Object { schema: "axcon.ports/1", ports });

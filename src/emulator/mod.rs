@@ -419,11 +419,12 @@ impl Endpoint for Unit {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let Power::On { program, watchdog_at, .. } = &self.power else { return None };
+        // Asked for some thousand times in each second of a unit that talks: plain comparisons, no list of what may be due.
         let program_due = match program {
-            Program::Starting { until, .. } => Some(*until),
-            Program::Loader(loader) => loader.deadline(&self.flash),
-            Program::Application(firmware) => Some(firmware.deadline()),
+            Program::Starting { until, .. } => *until,
+            Program::Loader(loader) => loader.deadline(&self.flash).unwrap_or(Instant::NEVER),
+            Program::Application(firmware) => firmware.deadline(),
         };
-        [Some(*watchdog_at), program_due, self.uart.deadline()].into_iter().flatten().min()
+        Some(program_due.min(*watchdog_at).min(self.uart.deadline().unwrap_or(Instant::NEVER)))
     }
 }

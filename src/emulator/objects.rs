@@ -181,7 +181,9 @@ impl Objects {
     }
 
     fn place(&self, at: ObjectAddress) -> Option<usize> {
-        self.values.binary_search_by_key(&at, |(at, _)| *at).ok()
+        // In one number, which compares in a step: the firmware looks entries up all the time.
+        let key = |at: ObjectAddress| u32::from(at.index) << 8 | u32::from(at.sub);
+        self.values.binary_search_by_key(&key(at), |(at, _)| key(*at)).ok()
     }
 
     fn own_place(&self, index: u16, sub: u8) -> usize {

@@ -27,7 +27,17 @@ pub struct Uart {
     /// When the first waiting character began, or may begin, to leave.
     begin: Instant,
     hold: Hold,
+    /// The next release. It is asked for many times between two changes, so it is reckoned at each change.
+    next: Option<Release>,
     released: VecDeque<Transmit>,
+}
+
+/// Characters that leave together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Release {
+    characters: usize,
+    /// When the last of them has left.
+    at: Instant,
 }
 
 /// Whether the client lets us send.
@@ -48,6 +58,7 @@ impl Uart {
             waiting: VecDeque::new(),
             begin: Instant::ZERO,
             hold: Hold::Free,
+            next: None,
             released: VecDeque::new(),
         }
     }
@@ -58,6 +69,7 @@ impl Uart {
             self.begin = self.begin.max(now);
         }
         self.waiting.extend(bytes);
+        self.plan();
     }
 
     /// The client has sent XOFF: nothing leaves but the character that is on its way.
@@ -68,6 +80,7 @@ impl Uart {
         self.release(self.finished_by(now));
         let last_character = !self.waiting.is_empty() && self.begin < now;
         self.hold = Hold::Held { last_character };
+        self.plan();
     }
 
     /// The client has sent XON.
@@ -77,6 +90,7 @@ impl Uart {
             if !last_character {
                 self.begin = self.begin.max(now);
             }
+            self.plan();
         }
     }
 
@@ -84,6 +98,7 @@ impl Uart {
     pub fn reset(&mut self) {
         self.waiting.clear();
         self.hold = Hold::Free;
+        self.plan();
     }
 
     /// Power is gone: like a reset, but what the line has carried by now has arrived.
@@ -94,20 +109,18 @@ impl Uart {
 
     /// Hands over what has left by `now`, if a release is due.
     pub fn step(&mut self, now: Instant) {
-        if self.deadline().is_some_and(|due| due <= now) {
-            self.release(self.batch());
+        if let Some(release) = self.next.filter(|release| release.at <= now) {
+            self.release(release.characters);
             if let Hold::Held { last_character } = &mut self.hold {
                 *last_character = false;
             }
+            self.plan();
         }
     }
 
     /// When the next release is due.
     pub fn deadline(&self) -> Option<Instant> {
-        match self.batch() {
-            0 => None,
-            characters => Some(self.end_of(characters)),
-        }
+        self.next.map(|release| release.at)
     }
 
     /// Bytes that have left.
@@ -125,16 +138,17 @@ impl Uart {
         self.end_of(self.waiting.len())
     }
 
-    /// Characters of the next release. It ends behind a flow-control character, whose moment matters to the reader.
-    fn batch(&self) -> usize {
-        match self.hold {
+    /// Reckons the next release anew. It ends behind a flow-control character, whose moment matters to the reader.
+    fn plan(&mut self) {
+        let characters = match self.hold {
             Hold::Held { last_character } => usize::from(last_character),
             Hold::Free => {
                 let most = self.waiting.len().min(CHARACTERS_PER_RELEASE);
                 let flow = self.waiting.iter().take(most).position(|&byte| byte == XON || byte == XOFF);
                 flow.map_or(most, |position| position + 1)
             }
-        }
+        };
+        self.next = (characters > 0).then(|| Release { characters, at: self.end_of(characters) });
     }
 
     fn finished_by(&self, now: Instant) -> usize {

@@ -143,13 +143,19 @@ fn is_alike(one: &Port, other: &Port) -> bool {
 /// The first process that has the port open, apart from the host of a pseudo-terminal itself. `None` also where the
 /// system does not say: other users' processes are not visible.
 pub fn holder(path: &Path) -> Option<Holder> {
-    processes::holder(path, |_| true)
+    processes::holders(&[path], |_| true).pop().flatten()
+}
+
+/// The same for several ports at the price of one, in their order.
+pub fn holders(ports: &[Port]) -> Vec<Option<Holder>> {
+    let paths: Vec<&Path> = ports.iter().map(|port| Path::new(&port.path)).collect();
+    processes::holders(&paths, |_| true)
 }
 
 /// The same without this process, and without one that it is just starting: until that runs its own program, it has this
 /// one's files.
 pub fn other_holder(path: &Path) -> Option<Holder> {
-    processes::holder(path, |pid| !processes::is_ours(pid))
+    processes::holders(&[path], |pid| !processes::is_ours(pid)).pop().flatten()
 }
 
 /// The process that says it has the port by a lock file (`/run/lock/LCK..ttyUSB0`), as terminal programs have done since
@@ -223,21 +229,21 @@ fn natural_key(path: &str) -> (String, u64) {
 #[cfg(target_os = "linux")]
 mod processes {
     //! Open files of processes, as `/proc` shows them.
+    //!
+    //! There are hundreds of processes with thousands of files, and most time of a command that lists ports goes into
+    //! them: so they are looked through once for all ports, folder by folder without full paths, and nothing is
+    //! allocated for a file.
 
     use std::fs;
+    use std::mem::MaybeUninit;
+    use std::os::fd::{AsFd, OwnedFd};
+    use std::os::unix::ffi::OsStringExt;
     use std::path::Path;
 
-    use super::Holder;
+    use rustix::fs::{CWD, Mode, OFlags, RawDir, openat, readlinkat_raw};
+    use rustix::path::Arg;
 
-    /// The first process, of those that count, that uses the port.
-    pub fn holder(path: &Path, counts: impl Fn(u32) -> bool) -> Option<Holder> {
-        let target = fs::canonicalize(path).ok()?;
-        let mut pids: Vec<u32> =
-            fs::read_dir("/proc").ok()?.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).collect();
-        pids.sort_unstable();
-        let pid = pids.into_iter().find(|&pid| holds(pid, &target) && counts(pid))?;
-        Some(Holder { name: name(pid).unwrap_or_default(), pid })
-    }
+    use super::Holder;
 
     /// What the system calls a process.
     pub fn name(pid: u32) -> Option<String> {
@@ -255,28 +261,79 @@ mod processes {
         pid == own || (parent() == Some(own) && program(pid) == program(own))
     }
 
-    /// Whether the process uses the port. The host of a pseudo-terminal keeps one descriptor of the client's side
-    /// open; that one does not count.
-    fn holds(pid: u32, target: &Path) -> bool {
-        let Ok(files) = fs::read_dir(format!("/proc/{pid}/fd")) else { return false };
-        let mut uses = 0;
-        let mut hosts = false;
-        for file in files.flatten() {
-            let Ok(open) = fs::read_link(file.path()) else { continue };
-            if open == target {
-                uses += 1;
-            } else if open.ends_with("ptmx") {
-                hosts |= hosted(pid, &file.file_name().to_string_lossy()).is_some_and(|pts| pts == target);
+    /// The longest name the system gives for an open file.
+    const LONGEST_PATH: usize = 4096;
+
+    /// A port, by what the link of an open file leads to.
+    struct Wanted {
+        /// `None` where there is no such file.
+        target: Option<Vec<u8>>,
+        holder: Option<Holder>,
+        /// Descriptors of the process that is being looked at.
+        uses: usize,
+        /// That process hosts this pseudo-terminal.
+        hosts: bool,
+    }
+
+    /// For each port the first process, of those that count, that uses it.
+    pub fn holders(paths: &[&Path], counts: impl Fn(u32) -> bool) -> Vec<Option<Holder>> {
+        let wanted = |path: &&Path| {
+            let target = fs::canonicalize(path).ok().map(|target| target.into_os_string().into_vec());
+            Wanted { target, holder: None, uses: 0, hosts: false }
+        };
+        let mut wanted: Vec<Wanted> = paths.iter().map(wanted).collect();
+        if let Ok(processes) = folder(CWD, "/proc") {
+            let mut pids = Vec::new();
+            each_entry(&processes, |name| pids.extend(name.to_str().ok().and_then(|name| name.parse::<u32>().ok())));
+            pids.sort_unstable();
+            for pid in pids {
+                if wanted.iter().all(|port| port.target.is_none() || port.holder.is_some()) {
+                    break;
+                }
+                look_at(&processes, pid, &counts, &mut wanted);
             }
         }
-        uses > usize::from(hosts)
+        wanted.into_iter().map(|port| port.holder).collect()
+    }
+
+    /// Whether the process uses one of the ports. The host of a pseudo-terminal keeps one descriptor of the client's side
+    /// open; that one does not count.
+    fn look_at(processes: &OwnedFd, pid: u32, counts: &impl Fn(u32) -> bool, wanted: &mut [Wanted]) {
+        let Ok(files) = folder(processes, format!("{pid}/fd")) else { return };
+        for port in &mut *wanted {
+            (port.uses, port.hosts) = (0, false);
+        }
+        let mut link = [MaybeUninit::uninit(); LONGEST_PATH];
+        each_entry(&files, |file| {
+            let Ok((open, _)) = readlinkat_raw(&files, file, &mut link) else { return };
+            let hosted = if open.ends_with(b"/ptmx") { hosted(pid, &file.to_string_lossy()) } else { None };
+            for port in wanted.iter_mut() {
+                port.uses += usize::from(port.target.as_deref() == Some(&*open));
+                port.hosts |= hosted.is_some() && port.target == hosted;
+            }
+        });
+        for port in wanted.iter_mut().filter(|port| port.holder.is_none() && port.uses > usize::from(port.hosts)) {
+            port.holder = counts(pid).then(|| Holder { name: name(pid).unwrap_or_default(), pid });
+        }
+    }
+
+    fn folder(at: impl AsFd, path: impl Arg) -> rustix::io::Result<OwnedFd> {
+        openat(at, path, OFlags::RDONLY | OFlags::DIRECTORY | OFlags::CLOEXEC, Mode::empty())
+    }
+
+    fn each_entry(folder: &OwnedFd, mut act: impl FnMut(&std::ffi::CStr)) {
+        let mut buffer = [MaybeUninit::uninit(); 8192];
+        let mut entries = RawDir::new(folder, &mut buffer);
+        while let Some(Ok(entry)) = entries.next() {
+            act(entry.file_name());
+        }
     }
 
     /// The client's side of the pseudo-terminal whose master this descriptor is.
-    fn hosted(pid: u32, fd: &str) -> Option<std::path::PathBuf> {
+    fn hosted(pid: u32, fd: &str) -> Option<Vec<u8>> {
         let info = fs::read_to_string(format!("/proc/{pid}/fdinfo/{fd}")).ok()?;
         let index = info.lines().find_map(|line| line.strip_prefix("tty-index:"))?;
-        Some(Path::new("/dev/pts").join(index.trim()))
+        Some(format!("/dev/pts/{}", index.trim()).into_bytes())
     }
 }
 
@@ -288,8 +345,8 @@ mod processes {
 
     use super::Holder;
 
-    pub fn holder(_path: &Path, _counts: impl Fn(u32) -> bool) -> Option<Holder> {
-        None
+    pub fn holders(paths: &[&Path], _counts: impl Fn(u32) -> bool) -> Vec<Option<Holder>> {
+        vec![None; paths.len()]
     }
 
     #[cfg(unix)]

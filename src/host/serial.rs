@@ -345,7 +345,7 @@ mod tests {
         // One that not even that ends is left to itself.
         let (never, ends) = mpsc::channel::<()>();
         let asked = Cell::new(false);
-        empty(move || drop(ends.recv()), || asked.set(true), Duration::from_millis(1));
+        empty(move || _ = ends.recv(), || asked.set(true), Duration::from_millis(1));
         assert!(asked.get());
         drop(never);
     }

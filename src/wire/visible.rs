@@ -94,6 +94,7 @@ impl Visible {
 
     fn show(&self, character: char, text: &mut String) {
         match character {
+            ' '..='~' => text.push(character),
             '\r' | '\n' | '\t' | '\x08' if self.controls == Controls::Layout => text.push(character),
             '\0'..='\x1f' | '\x7f' => {
                 text.push('^');
@@ -107,9 +108,14 @@ impl Visible {
     }
 }
 
+/// Made by hand, since a flood on a wrong line rate goes through here.
 fn show_bytes(bytes: &[u8], text: &mut String) {
-    for byte in bytes {
-        let _ = write!(text, "‹{byte:02x}›");
+    const DIGITS: &[u8; 16] = b"0123456789abcdef";
+    for &byte in bytes {
+        text.push('‹');
+        text.push(char::from(DIGITS[usize::from(byte >> 4)]));
+        text.push(char::from(DIGITS[usize::from(byte & 0xF)]));
+        text.push('›');
     }
 }
 

@@ -139,11 +139,12 @@ impl Firmware {
 
     /// When something is due. While the view is open scanning and CAN are halted (AXTC4CO manual, section 4.1.1).
     pub fn deadline(&self) -> Instant {
-        let halted = self.is_viewing();
-        let measurement = (!halted).then(|| self.measurement.deadline());
-        let network = self.network.deadline().filter(|_| !halted);
-        let due = [self.row_at, self.page_at, measurement, network];
-        due.into_iter().flatten().min().unwrap_or(Instant::NEVER)
+        let or_never = |due: Option<Instant>| due.unwrap_or(Instant::NEVER);
+        let shown = or_never(self.row_at).min(or_never(self.page_at));
+        if self.is_viewing() {
+            return shown;
+        }
+        shown.min(self.measurement.deadline()).min(or_never(self.network.deadline()))
     }
 
     /// Does what is due: a reading first, so that a row of the same moment carries it.

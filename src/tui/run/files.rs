@@ -14,14 +14,13 @@ const MOST_ENTRIES: usize = 10_000;
 /// The serial ports.
 pub(super) fn ports() -> Result<Vec<PortEntry>, String> {
     let ports = ports::list().map_err(|error| format!("the serial ports cannot be listed: {error}"))?;
-    Ok(ports
-        .into_iter()
-        .map(|port| PortEntry {
-            busy_by: ports::holder(Path::new(&port.path)).map(|holder| holder.to_string()),
-            description: describe(&port),
-            link: port.path,
-        })
-        .collect())
+    let holders = ports::holders(&ports);
+    let entry = |(port, holder): (ports::Port, Option<ports::Holder>)| PortEntry {
+        busy_by: holder.map(|holder| holder.to_string()),
+        description: describe(&port),
+        link: port.path,
+    };
+    Ok(ports.into_iter().zip(holders).map(entry).collect())
 }
 
 /// `USB, FTDI FT232R USB UART, 0403:6001, serial number AX12345, ftdi_sio`.
