@@ -17,8 +17,11 @@ pub enum Action {
     Open(String),
     /// Open the lost link again.
     Reconnect,
-    /// Close the link.
-    Disconnect,
+    /// Close the link, the unit left in order.
+    Disconnect {
+        /// The link to open instead.
+        then: Option<String>,
+    },
     /// List the ports.
     ListPorts,
     /// List a folder.
@@ -60,8 +63,6 @@ pub enum Action {
     Play(Playback),
     /// Have something done to the emulated unit.
     Order(String),
-    /// Leave the program.
+    /// Leave the program, the unit left in order.
     Quit,
-    /// Leave the unit's view sub-menu first, then the program.
-    LeaveViewAndQuit,
 }

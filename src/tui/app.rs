@@ -40,6 +40,9 @@ use crate::wire::stream::Row;
 
 /// How often the picture moves while an upload runs, so that its times go on when the unit is silent.
 const UPLOAD_TICK: Duration = Duration::from_millis(500);
+/// How long a unit has to answer what puts it in order before its link is closed: it prints a menu in a tenth of that,
+/// and whoever leaves, or shuts the computer down, does not wait longer for a unit that is silent.
+const WINDING_UP: Duration = Duration::from_secs(2);
 
 /// What the console is started with.
 #[derive(Clone, Debug)]
@@ -71,6 +74,8 @@ pub struct App {
     scrollback: Scrollback,
     front: ScreenId,
     popup: Option<Popup>,
+    /// The link is about to be closed: what comes then, and until when the unit has time.
+    leaving: Option<(Next, Instant)>,
     help: Option<Help>,
     connect: Connect,
     overview: Overview,
@@ -81,6 +86,17 @@ pub struct App {
     diagnostics: Diagnostics,
     recordings: Recordings,
     bench: Bench,
+}
+
+/// What comes once the unit has been left in order.
+#[derive(Debug)]
+enum Next {
+    /// The program ends.
+    Quit,
+    /// The link is closed.
+    Disconnect,
+    /// Another link is opened.
+    Open(String),
 }
 
 impl App {
@@ -99,6 +115,7 @@ impl App {
             scrollback: Scrollback::default(),
             front: ScreenId::Connect,
             popup: None,
+            leaving: None,
             help: None,
             connect: Connect::default(),
             overview: Overview::default(),
@@ -173,9 +190,10 @@ impl App {
                 self.bench.answered(&line, answer);
                 self.dirty = true;
             }
-            Input::Signal => effects.push(Effect::Quit),
+            Input::Signal => self.leave(Next::Quit, &mut effects),
         }
         self.drain(&mut effects);
+        self.go_on_leaving(&mut effects);
         effects
     }
 
@@ -190,7 +208,8 @@ impl App {
         let session = self.session.as_ref().and_then(Session::poll_timeout);
         let tick = (self.view.job == Some(Job::Load)).then(|| self.now + UPLOAD_TICK);
         let late = self.view.poll_timeout().filter(|_| is_open);
-        [session, tick, late].into_iter().flatten().min()
+        let leaving = self.leaving.as_ref().map(|(_, until)| *until);
+        [session, tick, late, leaving].into_iter().flatten().min()
     }
 
     /// Whether the picture has changed since it was last drawn.
@@ -404,9 +423,7 @@ impl App {
             Cmd::Next => self.perform(Action::Go(self.front.step(1)), effects),
             Cmd::Previous => self.perform(Action::Go(self.front.step(ScreenId::ALL.len() - 1)), effects),
             Cmd::Help => self.help = Some(Help::default()),
-            // Being asked who it is leaves a unit as it was.
-            Cmd::Quit if self.view.job.is_some_and(|job| job != Job::Identify) => self.ask(Question::Quit),
-            Cmd::Quit if self.view.viewing => self.ask(Question::QuitViewing),
+            Cmd::Quit if self.view.is_in_the_middle() => self.ask(Question::Quit),
             Cmd::Quit => effects.push(Effect::Quit),
             Cmd::Reconnect => {
                 if matches!(self.view.link.state, LinkState::Lost(_)) {
@@ -514,14 +531,14 @@ impl App {
                     _ => {}
                 }
             }
-            Action::Open(_) if self.view.job.is_some() => self.ask(Question::Disconnect),
+            Action::Open(link) if self.view.is_in_the_middle() => self.ask(Question::Disconnect { then: Some(link) }),
             Action::Open(link) => self.open(link, effects),
             Action::Reconnect => {
                 if let Some(link) = self.view.link.name.clone() {
                     self.open(link, effects);
                 }
             }
-            Action::Disconnect => self.disconnect(effects),
+            Action::Disconnect { then } => self.leave(then.map_or(Next::Disconnect, Next::Open), effects),
             Action::ListPorts => {
                 self.connect.listing();
                 effects.push(Effect::ListPorts);
@@ -541,7 +558,6 @@ impl App {
             }
             Action::ViewDictionary => {
                 if self.command(Command::Keys(b"v".to_vec())) {
-                    self.view.viewing = true;
                     self.front = ScreenId::Terminal;
                     self.terminal.follow();
                     self.view
@@ -576,12 +592,7 @@ impl App {
                 effects.push(Effect::Order(line));
             }
             Action::Order(_) => {}
-            Action::Quit => effects.push(Effect::Quit),
-            Action::LeaveViewAndQuit => {
-                self.command(Command::Keys(b"x".to_vec()));
-                self.drain(effects);
-                effects.push(Effect::Quit);
-            }
+            Action::Quit => self.leave(Next::Quit, effects),
         }
     }
 
@@ -599,7 +610,10 @@ impl App {
             Command::Overhear => Some(Job::Overhear),
             Command::Load(_) => Some(Job::Load),
         };
-        let leaves_view = matches!(&command, Command::Keys(keys) if keys.iter().any(|key| b"xX".contains(key)));
+        let viewing = match &command {
+            Command::Keys(keys) if !session.password_open() => opens_view(keys),
+            _ => None,
+        };
         match session.command(self.now, command) {
             Ok(()) => {
                 if let Some(job) = job {
@@ -610,7 +624,7 @@ impl App {
                     self.view.load = Default::default();
                     self.front = ScreenId::Load;
                 }
-                self.view.viewing &= !leaves_view;
+                self.view.viewing = viewing.unwrap_or(self.view.viewing);
                 true
             }
             Err(refusal) => {
@@ -644,6 +658,47 @@ impl App {
         self.popup = Some(Popup::Waiting(format!("Opening {}.", super::visible::text(&link))));
         self.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
         effects.push(Effect::OpenLink(link));
+    }
+
+    /// Closes the link and goes on. Whatever is in the middle is ended first: a unit whose view stays open neither scans
+    /// nor talks on CAN, and one that waits at a prompt takes the next key for an answer.
+    fn leave(&mut self, next: Next, effects: &mut Vec<Effect>) {
+        if self.leaving.is_some() {
+            return;
+        }
+        if !(self.view.is_in_the_middle() && self.view.can_send()) {
+            return self.left(next, effects);
+        }
+        if self.view.has_job_to_end() {
+            self.command(Command::Cancel);
+        }
+        if self.view.viewing && !self.view.has_job_to_end() {
+            self.command(Command::Keys(b"x".to_vec()));
+        }
+        self.dirty = true;
+        self.popup = Some(Popup::Waiting("Leaving the unit in order; at most 2 seconds. Q does not wait.".into()));
+        self.leaving = Some((next, self.now + WINDING_UP));
+    }
+
+    /// Goes on with what was to come as soon as nothing is in the middle any more, or there was time enough for it.
+    fn go_on_leaving(&mut self, effects: &mut Vec<Effect>) {
+        let is_over = self.leaving.as_ref().is_some_and(|(_, until)| *until <= self.now);
+        let is_settled = !self.view.has_job_to_end() && self.session.as_ref().is_none_or(|it| it.waiting() == 0);
+        if !(is_over || is_settled || !self.view.can_send()) {
+            return;
+        }
+        if let Some((next, _)) = self.leaving.take() {
+            self.popup = None;
+            self.left(next, effects);
+        }
+    }
+
+    fn left(&mut self, next: Next, effects: &mut Vec<Effect>) {
+        match next {
+            Next::Quit => effects.push(Effect::Quit),
+            Next::Disconnect => self.disconnect(effects),
+            Next::Open(link) => self.open(link, effects),
+        }
     }
 
     fn disconnect(&mut self, effects: &mut Vec<Effect>) {
@@ -896,4 +951,13 @@ impl App {
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         self.dirty |= self.scrollback.follow(record);
     }
+}
+
+/// Whether keys typed at the unit's menu leave its view open (true), closed, or (`None`) as it was.
+fn opens_view(keys: &[u8]) -> Option<bool> {
+    keys.iter().rev().find_map(|key| match key.to_ascii_lowercase() {
+        b'v' => Some(true),
+        b'x' => Some(false),
+        _ => None,
+    })
 }

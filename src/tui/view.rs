@@ -177,6 +177,17 @@ impl View {
         self.link.state == LinkState::Open { read_only: false }
     }
 
+    /// Whether a job runs that has to be ended before the unit is left alone. Being asked who it is, or listened to,
+    /// leaves a unit as it was.
+    pub fn has_job_to_end(&self) -> bool {
+        self.job.is_some_and(|job| !matches!(job, Job::Identify | Job::Overhear))
+    }
+
+    /// Whether something would stay half done if the link were closed now.
+    pub fn is_in_the_middle(&self) -> bool {
+        self.has_job_to_end() || self.viewing
+    }
+
     /// The product, where it is one we know.
     pub fn product(&self) -> Option<&'static Product> {
         self.facts.product.as_ref().and_then(|known| Product::named(&known.value))
@@ -206,7 +217,11 @@ impl View {
     fn finished(&mut self, now: Instant, outcome: &Outcome) {
         self.job = None;
         match outcome {
-            Outcome::DictionaryRead(reading) => self.dictionary_read(now, reading),
+            Outcome::DictionaryRead(reading) => {
+                // Its view was left again.
+                self.viewing = false;
+                self.dictionary_read(now, reading);
+            }
             Outcome::Identified => self.identified(),
             Outcome::StreamRuns { was_on: true } => {
                 self.tell(Tone::Good, "The stream was on already and now sends what you asked for.");

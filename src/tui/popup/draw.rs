@@ -6,6 +6,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Clear};
 
 use super::{Popup, Purpose, Question, consequence};
+use crate::session::Job;
 use crate::time::BITS_PER_CHARACTER;
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
@@ -257,23 +258,20 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             },
             vec![("Y", "send"), ("N", "do not send")],
         ),
-        Question::Disconnect => (
+        Question::Disconnect { then } => (
             "Close the link?",
-            paragraphs(&["A job runs.", job_consequence(view)], columns),
+            {
+                let [what, consequence] = in_the_middle(view);
+                let then = then.as_deref().map(|link| format!("Then {} is opened.", visible::text(link)));
+                let texts: Vec<&str> = [what, consequence].into_iter().chain(then.as_deref()).collect();
+                paragraphs(&texts, columns)
+            },
             vec![("Y", "close the link"), ("N", "stay connected")],
         ),
         Question::Quit => (
             "Leave axcon?",
-            paragraphs(&["A job runs.", job_consequence(view)], columns),
+            paragraphs(&in_the_middle(view), columns),
             vec![("Y", "leave"), ("N", "stay")],
-        ),
-        Question::QuitViewing => (
-            "Leave axcon?",
-            paragraphs(
-                &["The unit's view sub-menu is open. If it stays open, temperature scanning and CAN stay halted."],
-                columns,
-            ),
-            vec![("Enter", "close it and leave"), ("Q", "leave it open"), ("Esc", "stay")],
         ),
     };
     if rows.is_empty() {
@@ -295,11 +293,24 @@ fn too_fast(view: &View, source: Source, millis: &str) -> Option<String> {
     })
 }
 
-/// What the running job leaves behind when it is dropped.
-fn job_consequence(view: &View) -> &'static str {
+/// What is in the middle, and what becomes of it when the link is closed.
+fn in_the_middle(view: &View) -> [&'static str; 2] {
     match view.job {
-        Some(crate::session::Job::Load) => consequence(view.load.progress.map(|progress| progress.phase)),
-        _ => "The unit may be left waiting for an answer at a prompt.",
+        Some(Job::Load) => {
+            ["New software is being loaded.", consequence(view.load.progress.map(|progress| progress.phase))]
+        }
+        Some(Job::ReadDictionary) => [
+            "The object dictionary is being read: temperature scanning and CAN are halted.",
+            "axcon leaves the view first (X), so that they go on.",
+        ],
+        Some(Job::Diagnostics) => ["The unit prints its diagnostics.", "axcon stops them first (S)."],
+        Some(Job::StreamOn | Job::StreamOff | Job::RestoreDefaults) => {
+            ["The unit is at one of its prompts.", "axcon answers it first, so that the next key is none."]
+        }
+        None | Some(Job::Identify | Job::Overhear) => [
+            "The unit's view is open: temperature scanning and CAN are halted.",
+            "axcon closes it first (X), so that they go on.",
+        ],
     }
 }
 

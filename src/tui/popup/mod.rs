@@ -102,12 +102,13 @@ pub enum Question {
     CancelLoad,
     /// Shall pasted text go to the unit?
     Paste(Vec<u8>),
-    /// Shall the link be closed though a job runs?
-    Disconnect,
-    /// Shall the program end though a job runs?
+    /// Shall the link be closed though something is in the middle?
+    Disconnect {
+        /// The link to open instead.
+        then: Option<String>,
+    },
+    /// Shall the program end though something is in the middle?
     Quit,
-    /// Shall the program end though the unit's view sub-menu is open?
-    QuitViewing,
 }
 
 /// What a file is for.
@@ -323,9 +324,8 @@ impl Question {
             }
             Question::CancelLoad => Answer::Act(Action::Command(Command::Cancel)),
             Question::Paste(bytes) => Answer::Act(Action::Command(Command::Keys(std::mem::take(bytes)))),
-            Question::Disconnect => Answer::Act(Action::Disconnect),
+            Question::Disconnect { then } => Answer::Act(Action::Disconnect { then: then.take() }),
             Question::Quit => Answer::Act(Action::Quit),
-            Question::QuitViewing => Answer::Act(Action::LeaveViewAndQuit),
         }
     }
 
@@ -355,14 +355,12 @@ impl Question {
                 _ => {}
             },
             Question::Password { field, .. } => field.push(character),
-            Question::QuitViewing if character.eq_ignore_ascii_case(&'q') => return Answer::Act(Action::Quit),
             Question::View if character.eq_ignore_ascii_case(&'t') => return Answer::Act(Action::ViewDictionary),
             Question::View
             | Question::CancelLoad
             | Question::Paste(_)
-            | Question::Disconnect
-            | Question::Quit
-            | Question::QuitViewing => match character.to_ascii_lowercase() {
+            | Question::Disconnect { .. }
+            | Question::Quit => match character.to_ascii_lowercase() {
                 'y' => return self.accept(),
                 'n' => return Answer::Close,
                 _ => {}
@@ -411,9 +409,8 @@ impl Question {
             | Question::View
             | Question::CancelLoad
             | Question::Paste(_)
-            | Question::Disconnect
-            | Question::Quit
-            | Question::QuitViewing => None,
+            | Question::Disconnect { .. }
+            | Question::Quit => None,
         }
     }
 }

@@ -131,8 +131,10 @@ impl Connect {
             Cmd::Refresh => return Some(Action::ListPorts),
             Cmd::Disconnect => {
                 return match view.link.state {
-                    LinkState::Open { .. } if view.job.is_some() => Some(Action::Ask(Question::Disconnect)),
-                    LinkState::Open { .. } | LinkState::Lost(_) => Some(Action::Disconnect),
+                    LinkState::Open { .. } if view.is_in_the_middle() => {
+                        Some(Action::Ask(Question::Disconnect { then: None }))
+                    }
+                    LinkState::Open { .. } | LinkState::Lost(_) => Some(Action::Disconnect { then: None }),
                     LinkState::Closed | LinkState::Opening => None,
                 };
             }
