@@ -356,6 +356,10 @@ impl App {
     }
 
     fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+        // No text and no answer: it means the same in front of everything but the bare terminal.
+        if !self.passes_keys() && keymap::find(&[EVERYWHERE], key) == Some(Cmd::Suspend) {
+            return self.on(Cmd::Suspend, effects);
+        }
         if let Some(popup) = &mut self.popup {
             let is_waiting = matches!(popup, Popup::Waiting(_));
             match popup.on(key) {
@@ -425,6 +429,12 @@ impl App {
             Cmd::Help => self.help = Some(Help::default()),
             Cmd::Quit if self.view.is_in_the_middle() => self.ask(Question::Quit),
             Cmd::Quit => effects.push(Effect::Quit),
+            // Time goes on while the program is stopped: every deadline of the job would be over.
+            Cmd::Suspend if self.view.is_in_the_middle() && self.view.can_send() => {
+                let what = self.view.job.map_or("the unit's view is open: close it with X first", |_| "a job runs");
+                self.view.tell(Tone::Bad, format!("Not stopped: {what}."));
+            }
+            Cmd::Suspend => effects.push(Effect::Suspend),
             Cmd::Reconnect => {
                 if matches!(self.view.link.state, LinkState::Lost(_)) {
                     self.perform(Action::Reconnect, effects);

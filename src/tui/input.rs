@@ -136,6 +136,8 @@ pub enum Effect {
         /// The link.
         link: String,
     },
+    /// Give the terminal back and stop the program until its shell continues it.
+    Suspend,
     /// End the program, after the effects before this one.
     Quit,
 }

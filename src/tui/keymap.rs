@@ -22,6 +22,8 @@ pub enum Cmd {
     Help,
     /// Leave the program.
     Quit,
+    /// Stop the program until the shell continues it.
+    Suspend,
     /// Open the lost link again.
     Reconnect,
     /// One up.
@@ -170,6 +172,12 @@ pub const EVERYWHERE: &[Binding] = &[
         cmd: Cmd::Quit,
         short: "quit",
         long: "leave; asks first if something would be left half done",
+    },
+    Binding {
+        keys: &[Press::Ctrl('z')],
+        cmd: Cmd::Suspend,
+        short: "",
+        long: "back to the shell; fg goes on; not while a job runs",
     },
     Binding { keys: &[Press::Plain(KeyCode::Tab)], cmd: Cmd::Next, short: "", long: "next screen" },
     Binding { keys: &[Press::Plain(KeyCode::BackTab)], cmd: Cmd::Previous, short: "", long: "screen before" },

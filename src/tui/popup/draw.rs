@@ -268,11 +268,9 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             },
             vec![("Y", "close the link"), ("N", "stay connected")],
         ),
-        Question::Quit => (
-            "Leave axcon?",
-            paragraphs(&in_the_middle(view), columns),
-            vec![("Y", "leave"), ("N", "stay")],
-        ),
+        Question::Quit => {
+            ("Leave axcon?", paragraphs(&in_the_middle(view), columns), vec![("Y", "leave"), ("N", "stay")])
+        }
     };
     if rows.is_empty() {
         rows.push(Line::default());

@@ -12,9 +12,10 @@ use std::collections::VecDeque;
 use std::io;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
+use ratatui::crossterm::event::Event as TerminalEvent;
 
 use player::{Player, Step};
 
@@ -26,7 +27,7 @@ use crate::host::link::{self, Connection, LinkError, LinkSpec};
 use crate::host::ports;
 use crate::host::recorder::{Plan, Recorder};
 use crate::host::replay::{Recording, RecordingError};
-use crate::host::signal::Signals;
+use crate::host::signal::{self, Signals};
 use crate::host::socket::Dialled;
 use crate::host::terminal::{self, Screen};
 use crate::time::{Duration, Instant};
@@ -77,7 +78,7 @@ pub fn run(world: World) -> io::Result<End> {
     let clock = Clock::start();
     let (sender, inputs) = host::channel();
     let mut screen = Screen::enter()?;
-    let _signals = Signals::start(sender.clone())?;
+    let _signals = Signals::of_screen(sender.clone())?;
     let keys = terminal::listen(sender.clone())?;
     let size = screen.terminal.size()?;
     let app = App::new(Options {
@@ -114,6 +115,8 @@ pub fn run(world: World) -> io::Result<End> {
         skew: Duration::ZERO,
         recorder: Recorder::nothing(),
         left: VecDeque::new(),
+        suspends: false,
+        over: None,
     };
     console.serve(&mut screen)
 }
@@ -148,6 +151,10 @@ struct Console {
     recorder: Recorder,
     /// Inputs taken from the channel while a link was closed.
     left: VecDeque<host::Input>,
+    /// The program is to be stopped as soon as the effects before that are done.
+    suspends: bool,
+    /// How the console ends once the unit has been left, where that is not the user's wish.
+    over: Option<io::Result<End>>,
 }
 
 impl Console {
@@ -156,6 +163,8 @@ impl Console {
         self.player.as_ref().map_or_else(|| self.clock.now() + self.skew, Player::now)
     }
 
+    /// Serves until the user leaves, a signal comes, or the terminal fails. The app then has the unit left in order,
+    /// which takes a moment; nothing is drawn meanwhile, since the terminal may be gone.
     fn serve(&mut self, screen: &mut Screen) -> io::Result<End> {
         let mut next_frame = Instant::ZERO;
         let mut hurry = false;
@@ -169,15 +178,19 @@ impl Console {
             // What a key changes is seen at once: a frame early, which the next one pays for.
             let due = if hurry { Instant::ZERO + next_frame.since_start().saturating_sub(FRAME) } else { next_frame };
             if self.app.is_dirty() && now >= due {
-                screen.terminal.draw(|frame| self.app.draw(frame))?;
+                if self.over.is_none()
+                    && let Err(error) = self.draw(screen)
+                    && self.end(Err(error))
+                {
+                    return self.ended();
+                }
                 self.app.drawn();
-                screen.set_mouse(self.app.wants_mouse())?;
                 next_frame = next_frame.max(now) + FRAME;
                 hurry = false;
             }
             // A flood of inputs must not keep a timer from expiring.
             if self.timer_at().is_some_and(|due| due <= now) && self.handle(Input::Timeout) {
-                return Ok(End::Quit);
+                return self.ended();
             }
             if self.retry.is_some_and(|due| due <= now) {
                 self.look_for_link();
@@ -185,10 +198,14 @@ impl Console {
             self.play();
             if let Ok(event) = self.keys.try_recv() {
                 hurry = true;
-                if is_suspend(&event) && !self.app.passes_keys() {
-                    suspend(screen)?;
-                } else if self.handle(Input::Terminal(event)) {
-                    return Ok(End::Quit);
+                if self.handle(Input::Terminal(event)) {
+                    return self.ended();
+                }
+                if std::mem::take(&mut self.suspends)
+                    && let Err(error) = screen.suspend().and_then(|()| self.draw_anew(screen))
+                    && self.end(Err(error))
+                {
+                    return self.ended();
                 }
                 continue;
             }
@@ -203,10 +220,14 @@ impl Console {
                     let failure = (self.world.explain)(error);
                     self.lose_link(failure)
                 }
-                host::Input::Signal(_) => {
-                    self.handle(Input::Signal);
-                    return Ok(End::Signal);
+                // Who stopped us, and whatever was drawn meanwhile: it is our terminal again.
+                host::Input::Signal(number) if signal::continues(number) => {
+                    match screen.retake().and_then(|()| self.draw_anew(screen)) {
+                        Ok(()) => false,
+                        Err(error) => self.end(Err(error)),
+                    }
                 }
+                host::Input::Signal(_) => self.end(Ok(End::Signal)),
                 host::Input::Wake => {
                     let mut leaves = false;
                     while let Ok(answer) = self.answers.try_recv() {
@@ -220,9 +241,31 @@ impl Console {
                 host::Input::Typed(_) | host::Input::TypedEnd => false,
             };
             if leaves {
-                return Ok(End::Quit);
+                return self.ended();
             }
         }
+    }
+
+    fn draw(&mut self, screen: &mut Screen) -> io::Result<()> {
+        screen.terminal.draw(|frame| self.app.draw(frame))?;
+        screen.set_mouse(self.app.wants_mouse())
+    }
+
+    /// Everything is drawn with the next frame, in the size that the terminal has now.
+    fn draw_anew(&mut self, screen: &mut Screen) -> io::Result<()> {
+        let size = screen.terminal.size()?;
+        self.handle(Input::Terminal(TerminalEvent::Resize(size.width, size.height)));
+        Ok(())
+    }
+
+    /// The console ends like this as soon as the app has left the unit. Gives `true` when it has.
+    fn end(&mut self, end: io::Result<End>) -> bool {
+        self.over.get_or_insert(end);
+        self.handle(Input::Signal)
+    }
+
+    fn ended(&mut self) -> io::Result<End> {
+        self.over.take().unwrap_or(Ok(End::Quit))
     }
 
     /// The next input; `None` when it is time.
@@ -295,6 +338,7 @@ impl Console {
                 }
                 Effect::UploadBegins { link, product, image } => (self.world.note)(&link, Some((&product, &image))),
                 Effect::UploadEnds { link } => (self.world.note)(&link, None),
+                Effect::Suspend => self.suspends = true,
                 Effect::Quit => {
                     self.close_link();
                     leaves = true;
@@ -327,13 +371,12 @@ impl Console {
     fn dial(&mut self, name: String, spec: LinkSpec) {
         let (dial, clock, options) = (self.dial, self.clock, link::Options { baud: self.world.baud });
         let (dialling, sender) = (self.dialling.clone(), self.sender.clone());
-        let begun = thread::Builder::new().name("dial".into()).spawn(move || {
+        in_thread("dial", move || {
             let result = Connection::dial(&spec, options, clock);
             if dialling.send((dial, name, spec, result)).is_ok() {
-                let _ = sender.send(host::Input::Wake);
+                let _ = sender.try_send(host::Input::Wake);
             }
         });
-        debug_assert!(begun.is_ok());
     }
 
     /// Takes what came of dialling, unless the user has gone on to something else. Gives `true` when it is to end.
@@ -494,27 +537,29 @@ impl Console {
     /// Finds something out in a thread, which wakes the loop when it has.
     fn ask(&self, find_out: impl FnOnce() -> Input + Send + 'static) {
         let (answer, sender) = (self.answer.clone(), self.sender.clone());
-        let begun = thread::Builder::new().name("answer".into()).spawn(move || {
+        in_thread("answer", move || {
             if answer.send(find_out()).is_ok() {
-                let _ = sender.send(host::Input::Wake);
+                // A full channel wakes the loop by itself.
+                let _ = sender.try_send(host::Input::Wake);
             }
         });
-        // Without threads there is no program either: the key thread came first.
-        debug_assert!(begun.is_ok());
     }
 }
 
-/// Ctrl-Z, as every program of a shell understands it.
-fn is_suspend(event: &TerminalEvent) -> bool {
-    matches!(event, TerminalEvent::Key(key) if key.code == KeyCode::Char('z') && key.modifiers == KeyModifiers::CONTROL)
-}
-
-#[cfg(unix)]
-fn suspend(screen: &mut Screen) -> io::Result<()> {
-    screen.suspend()
-}
-
-#[cfg(not(unix))]
-fn suspend(_screen: &mut Screen) -> io::Result<()> {
-    Ok(())
+/// Does something in a thread of its own; where the system has none to give, it is done here, so that whoever waits for
+/// what comes of it does not wait for ever.
+fn in_thread(name: &str, work: impl FnOnce() + Send + 'static) {
+    let work = Arc::new(Mutex::new(Some(work)));
+    let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let shared = Arc::clone(&work);
+    let begun = thread::Builder::new().name(name.to_owned()).spawn(move || {
+        if let Some(work) = take(&shared) {
+            work();
+        }
+    });
+    if begun.is_err()
+        && let Some(work) = take(&work)
+    {
+        work();
+    }
 }
