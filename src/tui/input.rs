@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use ratatui::crossterm::event::Event as TerminalEvent;
 
+use crate::device;
 use crate::endpoint::Transmit;
 use crate::image::{CheckedImage, Report, Severity};
 use crate::time::Duration;
@@ -266,6 +267,8 @@ pub struct ImageFacts {
     pub records: usize,
     /// Characters that will be sent.
     pub characters: usize,
+    /// What sending them takes, roughly.
+    pub time: Duration,
     /// Every defect in one line each, errors first: `line 12, column 43: ...`.
     pub defects: Vec<String>,
     /// The image itself, if it may be sent.
@@ -300,6 +303,7 @@ impl ImageFacts {
             version: identity.map(|identity| identity.version),
             records: report.facts.records as usize,
             characters: report.facts.characters as usize,
+            time: device::transfer_time(report.facts.characters, report.facts.data_bytes),
             defects,
             checked: report.image().filter(|_| ok),
         }
@@ -314,6 +318,7 @@ impl ImageFacts {
             version: None,
             records: 0,
             characters: 0,
+            time: Duration::ZERO,
             defects: vec![why],
             checked: None,
         }

@@ -288,6 +288,8 @@ fn progress() -> Progress {
         bytes_total: 242_846,
         address: 0x5a80,
         elapsed: Duration::from_secs(10),
+        moving: Duration::from_millis(9_950),
+        moved: 114_280,
         held: None,
     }
 }

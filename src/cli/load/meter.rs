@@ -95,30 +95,17 @@ impl Meter {
             address: progress.address,
             bytes: progress.bytes,
             bytes_total: progress.bytes_total,
-            rate: rate(progress).round(),
-            eta_s: eta(progress).map(|eta| (eta * 10.0).round() / 10.0),
+            rate: progress.rate().round(),
+            eta_s: progress.eta().map(|eta| (eta.as_secs_f64() * 10.0).round() / 10.0),
             held_s: progress.held.map(|held| held.as_secs_f64()),
         }
     }
 }
 
-/// Characters a second since the first record.
-fn rate(progress: &Progress) -> f64 {
-    let seconds = progress.elapsed.as_secs_f64();
-    if seconds > 0.0 { progress.bytes as f64 / seconds } else { 0.0 }
-}
-
-/// Seconds left, where they can be told.
-fn eta(progress: &Progress) -> Option<f64> {
-    let rest = (progress.bytes_total - progress.bytes.min(progress.bytes_total)) as f64;
-    let rate = rate(progress);
-    (rate > 0.0).then(|| rest / rate)
-}
-
 fn text(progress: &Progress) -> String {
     let share = if progress.bytes_total == 0 { 0.0 } else { progress.bytes as f64 / progress.bytes_total as f64 };
     let filled = (share * BAR as f64) as usize;
-    let eta = eta(progress).map_or_else(String::new, |eta| format!(", {eta:.0} s left"));
+    let eta = progress.eta().map_or_else(String::new, |eta| format!(", {:.0} s left", eta.as_secs_f64()));
     let held = progress.held.filter(|held| *held >= LONG_HOLD);
     let held = held.map_or_else(String::new, |held| format!(", held by XOFF for {:.0} s", held.as_secs_f64()));
     format!(

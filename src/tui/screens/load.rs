@@ -73,8 +73,6 @@ const fn footer(keys: &'static [Press], cmd: Cmd, short: &'static str) -> Bindin
     Binding { keys, cmd, short, long: "" }
 }
 
-/// Characters a second at 115200 baud, ten bits each.
-const CHARACTERS_PER_SECOND: usize = 11_520;
 /// Defects shown at once on a small screen before the plan takes its place.
 const LEAST_DEFECT_ROWS: usize = 3;
 /// The steps of an upload.
@@ -350,30 +348,6 @@ pub fn is_image(name: &str) -> bool {
     matches!(ending.as_deref(), Some("s" | "s19" | "srec" | "hex"))
 }
 
-/// What to do after an upload, by what is true of the unit now.
-pub fn advice(report: &LoadReport) -> &'static str {
-    match (report.verdict, report.unit) {
-        (Verdict::Done, _) => "Nothing: the unit runs the new software.",
-        (Verdict::WrongApplication, _) => {
-            "Do not put the unit into service. Send the right file again; if the result is the same, keep the recording."
-        }
-        (_, UnitNow::Loader) => {
-            "Keep the unit powered and send again: it waits in its loader and has no complete software. A power cycle \
-             does no harm, it comes back to the loader."
-        }
-        (Verdict::Refused, _) => "Nothing was changed. Choose the file made for this unit.",
-        (Verdict::UnitRefused, _) => {
-            "The unit still runs what it ran. Check the password, capital and small letters count, and try again."
-        }
-        (Verdict::NoAnswer, _) => "Nothing was changed. Check power, cable and port, press M, and try again.",
-        (Verdict::Failed | Verdict::Interrupted, UnitNow::Application) => "The unit still runs. Try again when ready.",
-        (Verdict::Failed | Verdict::Interrupted, UnitNow::Unknown) => {
-            "Switch the unit off and on and watch the terminal. If its banner comes, software runs; if it waits for an \
-             S-Record, send again."
-        }
-    }
-}
-
 /// What stands against sending this image now, one sentence each.
 fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
     let mut against = Vec::new();
@@ -472,8 +446,7 @@ fn plan(scene: Scene, facts: &ImageFacts, columns: u16) -> Vec<Line<'static>> {
     let mut rows = vec![lines::rule(theme, columns, "Plan", "")];
     let product =
         facts.product.as_deref().map_or("the right product".into(), |name| format!("an {}", visible::text(name)));
-    let seconds = facts.characters.div_ceil(CHARACTERS_PER_SECOND).max(1);
-    let time = format::minutes(Duration::from_secs(seconds as u64));
+    let time = format::minutes(Duration::from_secs_f64(facts.time.as_secs_f64().ceil()));
     let sent = format::grouped(facts.characters);
     let expected = match (&facts.product, facts.version) {
         (Some(product), Some(version)) => format!("name {} {version}", visible::text(product)),
@@ -483,7 +456,7 @@ fn plan(scene: Scene, facts: &ImageFacts, columns: u16) -> Vec<Line<'static>> {
         for (number, step) in [
             format!("Make sure that the unit is {product}."),
             "Send L and the password; the unit resets into its loader.".into(),
-            format!("Send {sent} characters: {time} at 115200 baud, and what the loader needs."),
+            format!("Send {sent} characters: some {time} with what the loader needs."),
             format!("Wait for the banner of the new software: it must {expected}."),
         ]
         .into_iter()
@@ -548,11 +521,10 @@ fn gauge_and_numbers(scene: Scene, progress: &Progress, columns: usize) -> Vec<L
     let share = share.clamp(0.0, 1.0);
     let room = columns.saturating_sub(11).min(100);
     let filled = (share * room as f64).floor() as usize;
-    let seconds = progress.elapsed.as_secs_f64();
-    let rate = if seconds > 0.0 { progress.bytes as f64 / seconds } else { 0.0 };
-    let left = progress.bytes_total.saturating_sub(progress.bytes) as f64 / rate.max(1.0);
-    let left =
-        if rate < 1.0 { "not known yet".to_owned() } else { format::minutes(Duration::from_secs_f64(left.ceil())) };
+    let left = progress.eta().map_or_else(
+        || "time left not known yet".to_owned(),
+        |eta| format!("{} left", format::minutes(Duration::from_secs_f64(eta.as_secs_f64().ceil()))),
+    );
     let held = match (scene.view.load.held_since, progress.held) {
         (Some(since), _) => Some(scene.now.since(since)),
         (None, held) => held,
@@ -579,9 +551,9 @@ fn gauge_and_numbers(scene: Scene, progress: &Progress, columns: usize) -> Vec<L
             theme,
             "Time",
             format!(
-                "{} gone, {left} left, {} characters a second",
+                "{} gone, {left}, {} characters a second",
                 format::minutes(progress.elapsed),
-                format::grouped(rate as u64)
+                format::grouped(progress.rate() as u64)
             ),
         ),
         lines::labelled(theme, "Line", line),
@@ -644,7 +616,7 @@ fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line<'static>> 
     if !report.heard.is_empty() {
         paragraph("Heard", &report.heard);
     }
-    paragraph("What next", advice(report));
+    paragraph("What next", &format!("{}.", visible::sentence(report.advice())));
     rows.push(Line::default());
     rows.push(Line::from(vec![
         Span::styled("  Enter", theme.key()),
