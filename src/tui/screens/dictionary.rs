@@ -162,8 +162,8 @@ impl Dictionary {
         None
     }
 
-    /// The rows that are shown.
-    fn rows<'a>(&self, view: &'a View) -> Vec<Row<'a>> {
+    /// Everything there is to show: what was read, what the manual has besides, and what only the other dump has.
+    fn all_rows<'a>(&self, view: &'a View) -> Vec<Row<'a>> {
         let product = view.product();
         let known = |at: ObjectAddress| {
             let object = product?.dictionary.object(at.index)?;
@@ -192,6 +192,15 @@ impl Dictionary {
             }
         }
         rows.sort_by_key(|row| (row.at.index, row.at.sub));
+        rows
+    }
+
+    /// The rows that are shown.
+    fn rows<'a>(&self, view: &'a View) -> Vec<Row<'a>> {
+        self.chosen(self.all_rows(view))
+    }
+
+    fn chosen<'a>(&self, mut rows: Vec<Row<'a>>) -> Vec<Row<'a>> {
         rows.retain(|row| match self.only {
             Only::Everything => true,
             Only::Deviations => row.read.is_some_and(|read| read.deviates),
@@ -210,7 +219,9 @@ impl Dictionary {
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let (theme, view) = (scene.theme, scene.view);
-        let rows = self.rows(view);
+        let all = self.all_rows(view);
+        let total = all.len();
+        let rows = self.chosen(all);
         let (upper, detail) = match area.width >= BESIDE_AT {
             true => {
                 let width = area.width - DETAIL_COLUMNS;
@@ -220,7 +231,7 @@ impl Dictionary {
             false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
         };
         let (head, table) = lines::split(upper, 2);
-        let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len()))];
+        let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len(), total))];
         let columns = usize::from(upper.width);
         let name_columns = name_columns(columns);
         let factory = match &self.other {
@@ -261,7 +272,7 @@ impl Dictionary {
         lines::draw(frame, detail, rows[cursor].detail(scene, detail.width, detail.height > DETAIL_ROWS));
     }
 
-    fn remark(&self, scene: Scene, shown: usize) -> String {
+    fn remark(&self, scene: Scene, shown: usize, total: usize) -> String {
         let view = scene.view;
         let mut parts = Vec::new();
         if view.job == Some(Job::ReadDictionary) {
@@ -271,8 +282,7 @@ impl Dictionary {
                 None => parts.push("the manual's; V reads the unit's".to_owned()),
                 Some(read) => {
                     let time = format::time_of_day(scene.start_of_day, read.at);
-                    let all = read.dump.entries.len();
-                    parts.push(format!("{shown} of {all}, {} not as factory, {time}", read.dump.deviations()));
+                    parts.push(format!("{shown} of {total}, {} not as factory, {time}", read.dump.deviations()));
                 }
             }
         }
