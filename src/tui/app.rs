@@ -165,6 +165,7 @@ impl App {
                 }
             }
             Input::Mark(text) => self.scrollback.note(now, super::visible::text(&text)),
+            Input::Unrecorded(why) => self.unrecorded(now, why),
             Input::RecordingOver(failure) => self.recording_over(now, failure),
             Input::FilesListed { directory, entries } => {
                 self.load.listed(directory, entries);
@@ -759,6 +760,7 @@ impl App {
             recording: info.recording,
             start_millis: info.start_millis,
             state: LinkState::Open { read_only: info.read_only },
+            ..Link::default()
         });
         self.dictionary.begin_link();
         self.stream.begin_link();
@@ -917,6 +919,14 @@ impl App {
             }
             self.command(Command::Identify);
         }
+    }
+
+    /// What happens from now on is not in the recording. That stays in sight: who has to prove something later must know.
+    fn unrecorded(&mut self, now: Instant, why: String) {
+        self.dirty = true;
+        self.scrollback.note(now, format!("not recorded any more: {}", super::visible::text(&why)));
+        self.view.tell(Tone::Bad, format!("Not recorded any more: {why}."));
+        (self.view.link.recording, self.view.link.unrecorded) = (None, Some(why));
     }
 
     fn recording_over(&mut self, now: Instant, failure: Option<Failure>) {

@@ -38,6 +38,8 @@ pub enum Input {
     Sent(Vec<u8>),
     /// In a recording: a remark.
     Mark(String),
+    /// Nothing more of this connection is recorded, and why.
+    Unrecorded(String),
     /// The recording has ended, well or (why) not.
     RecordingOver(Option<Failure>),
     /// Answer to [`Effect::ListFiles`].

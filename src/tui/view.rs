@@ -45,6 +45,8 @@ pub struct Link {
     pub baud: u32,
     /// Where the recording is written.
     pub recording: Option<String>,
+    /// Why nothing is recorded any more, where that was not wanted.
+    pub unrecorded: Option<String>,
     /// The start of time, in milliseconds since 1970, UTC.
     pub start_millis: i64,
     /// How it stands.

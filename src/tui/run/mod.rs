@@ -287,7 +287,12 @@ impl Console {
     fn handle(&mut self, input: Input) -> bool {
         let effects = self.app.handle(self.now(), input);
         self.recorder.follow(self.app.record());
-        self.perform(effects)
+        let leaves = self.perform(effects);
+        // Asked behind what was performed: a recording begins there.
+        match self.recorder.take_warning() {
+            Some(warning) => self.handle(Input::Unrecorded(warning)) || leaves,
+            None => leaves,
+        }
     }
 
     fn perform(&mut self, effects: Vec<Effect>) -> bool {
@@ -398,7 +403,6 @@ impl Console {
     fn begin(&mut self, name: &str, connection: Connection, spec: Option<LinkSpec>) -> Input {
         self.recorder = Recorder::start(&self.world.recording, &connection, self.clock);
         let recording = self.recorder.path().map(|path| path.display().to_string());
-        let recording = recording.or_else(|| self.recorder.take_warning());
         let options = link::Options { baud: self.world.baud };
         self.comeback = spec.and_then(|spec| Comeback::of(&spec, &connection, options));
         self.link = Some(connection);
