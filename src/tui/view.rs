@@ -94,6 +94,38 @@ pub struct DictionaryRead {
     pub at: Instant,
 }
 
+/// A channel's temperature limits in °C, as far as the unit showed them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// Below it there is a low warning (4000h).
+    pub low: Option<f64>,
+    /// From it on there is a high warning (4010h).
+    pub high: Option<f64>,
+    /// From it on there is a high shutdown (4020h).
+    pub shutdown: Option<f64>,
+}
+
+impl Limits {
+    /// What a value is beyond these, in a word. The unit itself waits for its reaction delay (4030h) before it says so.
+    pub fn word(self, value: f64) -> Option<&'static str> {
+        match self {
+            Limits { shutdown: Some(limit), .. } if value >= limit => Some("shutdown"),
+            Limits { high: Some(limit), .. } if value >= limit => Some("high"),
+            Limits { low: Some(limit), .. } if value < limit => Some("low"),
+            Limits { .. } => None,
+        }
+    }
+}
+
+/// Objects of both products with a limit for each channel (manuals, sections 3.4.12 to 3.4.14).
+const LOW_WARNING: u16 = 0x4000;
+const HIGH_WARNING: u16 = 0x4010;
+const HIGH_SHUTDOWN: u16 = 0x4020;
+/// Means of the valid channels, by bank and of all (manuals, section 3.4.3).
+const AVERAGES: u16 = 0x2100;
+/// They are in tenths of a degree.
+const LIMIT_STEPS: f64 = 10.0;
+
 /// A file that rows are written to as they come.
 #[derive(Debug)]
 pub struct Export {
