@@ -476,13 +476,14 @@ impl App {
     }
 
     fn screen(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
-        let page = usize::from(frame::body(Rect::new(0, 0, self.size.0, self.size.1)).height);
+        let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1));
+        let page = usize::from(area.height);
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         let action = match self.front {
             ScreenId::Connect => self.connect.on(cmd, &self.view),
             ScreenId::Overview => self.overview.on(cmd, self.view.monitor.stream.channels.len()),
             ScreenId::Terminal => self.terminal.on(cmd, &self.scrollback, record, page),
-            ScreenId::Load => self.load.on(cmd, &self.view, page),
+            ScreenId::Load => self.load.on(cmd, &self.view, area),
             ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
             ScreenId::Stream => self.stream.on(cmd, &self.view),
             ScreenId::Diagnostics => {

@@ -272,11 +272,20 @@ fn good_image() -> ImageFacts {
     ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report)
 }
 
+/// What the checker says of a good file in which an editor has replaced digits and cut the end off.
 fn bad_image() -> ImageFacts {
-    let defects =
-        (1..=40).map(|n| format!("line {}, column 43: the checksum is A{:X}, it should be 5C", n * 7, n % 16));
-    let path = "/home/service/images/bad.S".into();
-    ImageFacts { path, ok: false, defects: defects.collect(), checked: None, ..good_image() }
+    let recipe =
+        make::Recipe { target: &axtc4co().target(), version: Version::new(1, 2, 0), words: 0xC000, flaw: None };
+    let text = String::from_utf8(make::make(&recipe).expect("an image of the usual size")).expect("ASCII");
+    let spoil = |(number, line): (usize, &str)| match number % 7 {
+        3 if number < 200 => format!("{}ZZ{}\n", &line[..20], &line[22..]),
+        5 if number < 100 => format!("{}\n", &line[..line.len() - 6]),
+        _ => format!("{line}\n"),
+    };
+    let file: String = text.lines().take(2000).enumerate().map(spoil).collect();
+    let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
+    let report = crate::image::check(file.as_bytes(), None, &targets, None, &[]).expect("a slice");
+    ImageFacts::of_report("/home/service/images/bad.S".into(), &report)
 }
 
 fn progress() -> Progress {

@@ -73,8 +73,12 @@ const fn footer(keys: &'static [Press], cmd: Cmd, short: &'static str) -> Bindin
     Binding { keys, cmd, short, long: "" }
 }
 
-/// Defects shown at once on a small screen before the plan takes its place.
+/// Lines of findings shown at once on a small screen before the plan takes its place.
 const LEAST_DEFECT_ROWS: usize = 3;
+/// Lines that say what the file is, with their heading.
+const REPORT_ROWS: usize = 4;
+/// Steps of the plan.
+const PLAN_STEPS: usize = 4;
 /// The steps of an upload.
 const PHASES: [(Phase, &str); 6] = [
     (Phase::Check, "check the unit"),
@@ -163,8 +167,9 @@ impl Load {
         Action::CheckImage(path)
     }
 
-    /// What a command does here; `page` is the height of the picture.
-    pub fn on(&mut self, cmd: Cmd, view: &View, page: usize) -> Option<Action> {
+    /// What a command does here; `area` is that of the picture.
+    pub fn on(&mut self, cmd: Cmd, view: &View, area: Rect) -> Option<Action> {
+        let page = usize::from(area.height);
         if view.job == Some(Job::Load) {
             return (cmd == Cmd::Back).then_some(Action::Ask(Question::CancelLoad));
         }
@@ -180,12 +185,13 @@ impl Load {
                 None
             }
             Stage::Report { facts, scrolled } => {
-                let last = facts.defects.len().saturating_sub(1);
+                let (all, room) = (findings(facts, area.width).len(), findings_room(facts, view, area));
+                let last = all.saturating_sub(room);
                 match cmd {
                     Cmd::Up => *scrolled = scrolled.saturating_sub(1),
                     Cmd::Down => *scrolled = (*scrolled + 1).min(last),
-                    Cmd::PageUp => *scrolled = scrolled.saturating_sub(page / 2),
-                    Cmd::PageDown => *scrolled = (*scrolled + page / 2).min(last),
+                    Cmd::PageUp => *scrolled = scrolled.saturating_sub(room),
+                    Cmd::PageDown => *scrolled = (*scrolled + room).min(last),
                     Cmd::First => *scrolled = 0,
                     Cmd::Last => *scrolled = last,
                     Cmd::Back => {
@@ -415,18 +421,42 @@ fn report(scene: Scene, facts: &ImageFacts, scrolled: usize, area: Rect) -> Vec<
     ];
     let plan = plan(scene, facts, area.width);
     if !facts.defects.is_empty() {
-        let room = usize::from(area.height).saturating_sub(rows.len() + plan.len() + 1);
-        let room = room.max(LEAST_DEFECT_ROWS).min(facts.defects.len());
-        let first = scrolled.min(facts.defects.len() - room);
-        let range = format!("{} to {} of {}", first + 1, first + room, facts.defects.len());
+        let all = findings(facts, area.width);
+        let room = findings_room(facts, scene.view, area);
+        let first = scrolled.min(all.len() - room);
+        let below = all.len() - first - room;
+        let range = if below > 0 { format!("↓ {} more lines", format::grouped(below)) } else { String::new() };
         rows.push(lines::rule(theme, area.width, "Findings", &range));
-        rows.extend(facts.defects[first..first + room].iter().map(|defect| {
-            let text = format::keep_start(&visible::text(defect), usize::from(area.width).saturating_sub(4));
-            Line::raw(format!("  {text}"))
-        }));
+        rows.extend(all.into_iter().skip(first).take(room).map(Line::raw));
     }
     rows.extend(plan);
     rows
+}
+
+/// Every finding, in as many lines as it needs.
+fn findings(facts: &ImageFacts, columns: u16) -> Vec<String> {
+    let room = usize::from(columns).saturating_sub(6).max(1);
+    let lines = |defect: &String| {
+        let broken = format::wrap(&visible::text(defect), room);
+        broken
+            .into_iter()
+            .enumerate()
+            .map(|(number, line)| format!("{}{line}", if number == 0 { "  " } else { "    " }))
+    };
+    facts.defects.iter().flat_map(lines).collect()
+}
+
+/// How many lines of the findings have room beside the plan.
+fn findings_room(facts: &ImageFacts, view: &View, area: Rect) -> usize {
+    let others = REPORT_ROWS + 1 + plan_rows(facts, view);
+    let room = usize::from(area.height).saturating_sub(others);
+    room.max(LEAST_DEFECT_ROWS).min(findings(facts, area.width).len())
+}
+
+/// Lines of the plan: what is going to happen, and what stands against it or how it is begun.
+fn plan_rows(facts: &ImageFacts, view: &View) -> usize {
+    let steps = if facts.ok { PLAN_STEPS + 2 } else { 0 };
+    1 + steps + objections(facts, view).len().max(1)
 }
 
 fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
@@ -453,17 +483,14 @@ fn plan(scene: Scene, facts: &ImageFacts, columns: u16) -> Vec<Line<'static>> {
         _ => "name what the file holds".into(),
     };
     if facts.ok {
-        for (number, step) in [
+        let steps: [String; PLAN_STEPS] = [
             format!("Make sure that the unit is {product}."),
             "Send L and the password; the unit resets into its loader.".into(),
             format!("Send {sent} characters: some {time} with what the loader needs."),
             format!("Wait for the banner of the new software: it must {expected}."),
-        ]
-        .into_iter()
-        .enumerate()
-        {
-            rows.push(Line::raw(format!("  {}. {step}", number + 1)));
-        }
+        ];
+        let numbered = steps.into_iter().enumerate();
+        rows.extend(numbered.map(|(number, step)| Line::raw(format!("  {}. {step}", number + 1))));
         rows.push(lines::labelled(theme, "Unit now", unit_version(view)));
         rows.push(lines::labelled(
             theme,
