@@ -9,6 +9,7 @@ use crate::host::Input;
 use crate::host::clock::Clock;
 use crate::host::journal::{Journal, Note};
 use crate::host::link::{Connection, LinkSpec, Options};
+use crate::host::ports;
 use crate::time::Instant;
 use crate::tui::run::{End, World};
 use crate::tui::{self, Failure, ImageFacts};
@@ -41,9 +42,13 @@ pub fn run(global: &Global) -> Result<(), CliError> {
     }
 }
 
-fn open(name: &str, baud: u32, clock: Clock, inputs: SyncSender<Input>) -> Result<Connection, Failure> {
-    let spec: LinkSpec = name.parse().map_err(|error| failure(&link::spec_error(error)))?;
-    Connection::open(&spec, Options { baud }, clock, inputs).map_err(|error| failure(&link::link_error(error)))
+/// What a name typed on the screen means: the same as behind `--port`.
+fn resolve(name: &str) -> Result<LinkSpec, Failure> {
+    link::named(name, || ports::list().unwrap_or_default()).map_err(|error| failure(&error))
+}
+
+fn open(spec: &LinkSpec, baud: u32, clock: Clock, inputs: SyncSender<Input>) -> Result<Connection, Failure> {
+    Connection::open(spec, Options { baud }, clock, inputs).map_err(|error| failure(&link::link_error(error)))
 }
 
 fn failure(error: &CliError) -> Failure {

@@ -82,7 +82,8 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             "Connect to",
             {
                 let mut rows = paragraphs(
-                    &["A serial port (/dev/ttyUSB0, COM3), a pseudo-terminal, or an emulated unit (emu:axtc4co)."],
+                    &["A serial port (/dev/ttyUSB0, COM3) or its adapter's serial number, an address in the network \
+                       (tcp://host:port), or an emulated unit (emu:axtc4co)."],
                     columns,
                 );
                 rows.push(Line::default());

@@ -49,8 +49,10 @@ pub struct World {
     pub recording: Plan,
     /// Whether to use colours.
     pub colour: bool,
-    /// Opens a link by its name.
-    pub open: fn(&str, u32, Clock, SyncSender<host::Input>) -> Result<Connection, Failure>,
+    /// Says which link a name means.
+    pub resolve: fn(&str) -> Result<LinkSpec, Failure>,
+    /// Opens a link.
+    pub open: fn(&LinkSpec, u32, Clock, SyncSender<host::Input>) -> Result<Connection, Failure>,
     /// Says what a lost link means.
     pub explain: fn(LinkError) -> Failure,
     /// Says why a recording cannot be read.
@@ -301,12 +303,13 @@ impl Console {
             match effect {
                 Effect::OpenLink(name) => {
                     self.close_link();
-                    match name.parse::<LinkSpec>() {
+                    match (self.world.resolve)(&name) {
                         Ok(spec) if spec.is_network() => self.dial(name, spec),
-                        Ok(_) | Err(_) => {
-                            let opened = self.open(&name);
+                        Ok(spec) => {
+                            let opened = self.open(&name, spec);
                             leaves |= self.handle(opened);
                         }
+                        Err(failure) => leaves |= self.handle(Input::LinkFailed(failure)),
                     }
                 }
                 Effect::CloseLink => self.close_link(),
@@ -353,9 +356,8 @@ impl Console {
         leaves
     }
 
-    fn open(&mut self, name: &str) -> Input {
-        let spec = name.parse::<LinkSpec>();
-        if let Ok(LinkSpec::Replay(path)) = &spec {
+    fn open(&mut self, name: &str, spec: LinkSpec) -> Input {
+        if let LinkSpec::Replay(path) = &spec {
             return match Recording::open(path) {
                 Ok(recording) => {
                     let player = Player::begin(name, path.clone(), recording, self.now());
@@ -366,8 +368,8 @@ impl Console {
                 Err(error) => Input::LinkFailed((self.world.unreadable)(error)),
             };
         }
-        match (self.world.open)(name, self.world.baud, self.clock, self.sender.clone()) {
-            Ok(connection) => self.begin(name, connection, spec.ok()),
+        match (self.world.open)(&spec, self.world.baud, self.clock, self.sender.clone()) {
+            Ok(connection) => self.begin(name, connection, spec),
             Err(failure) => Input::LinkFailed(failure),
         }
     }
@@ -393,18 +395,18 @@ impl Console {
         let connection =
             result.and_then(|dialled| Connection::over(&spec, dialled, options, self.clock, self.sender.clone()));
         let input = match connection {
-            Ok(connection) => self.begin(&name, connection, Some(spec)),
+            Ok(connection) => self.begin(&name, connection, spec),
             Err(error) => Input::LinkFailed((self.world.explain)(error)),
         };
         self.handle(input)
     }
 
     /// Takes over an open link and starts its recording.
-    fn begin(&mut self, name: &str, connection: Connection, spec: Option<LinkSpec>) -> Input {
+    fn begin(&mut self, name: &str, connection: Connection, spec: LinkSpec) -> Input {
         self.recorder = Recorder::start(&self.world.recording, &connection, self.clock);
         let recording = self.recorder.path().map(|path| path.display().to_string());
         let options = link::Options { baud: self.world.baud };
-        self.comeback = spec.and_then(|spec| Comeback::of(&spec, &connection, options));
+        self.comeback = Comeback::of(&spec, &connection, options);
         self.link = Some(connection);
         let start_of_day = host::clock::day_before(self.clock.time_of_day(), self.skew);
         Input::LinkOpened(LinkInfo {
