@@ -25,7 +25,11 @@ pub fn run(global: &Global) -> Result<(), CliError> {
         link: link.map(|link| link.to_string()),
         baud: global.baud,
         recording: link::recording(global),
+        noted: |link| {
+            journal(link).and_then(|(journal, key)| journal.note(&key)).map(|note| (note.product, note.image))
+        },
         colour: std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty()),
+        resolve,
         open,
         explain: |error| failure(&link::link_error(error)),
         unreadable: |error| failure(&link::recording_error(error)),
@@ -64,8 +68,7 @@ fn check(path: PathBuf) -> ImageFacts {
 
 /// The console says what it notes; that a note could not be written costs a question later, no more.
 fn note(link: &str, upload: Option<(&str, &str)>) {
-    let key = link.parse().ok().and_then(|spec: LinkSpec| link::journal_key(&spec));
-    let (Some(key), Some(journal)) = (key, Journal::of_user()) else { return };
+    let Some((journal, key)) = journal(link) else { return };
     let _ = match upload {
         Some((product, image)) => {
             let unix_seconds = Clock::start().wall(Instant::ZERO).as_second();
@@ -73,4 +76,9 @@ fn note(link: &str, upload: Option<(&str, &str)>) {
         }
         None => journal.end(&key),
     };
+}
+
+/// The journal of uploads, and what it calls the port behind a link; `None` where nothing is noted.
+fn journal(link: &str) -> Option<(Journal, String)> {
+    Some((Journal::of_user()?, link::journal_key(&resolve(link).ok()?)?))
 }

@@ -13,7 +13,7 @@ use ratatui::layout::Rect;
 
 use super::action::Action;
 use super::frame;
-use super::input::{Effect, Failure, Input, LinkInfo};
+use super::input::{Effect, Failure, Input, LinkInfo, Noted};
 use super::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd};
 use super::popup::{self, Answer, Popup, Question};
 use super::screens::bench::{self, Bench};
@@ -579,12 +579,19 @@ impl App {
             Action::StartLoad { password, product } => {
                 let Some(facts) = self.load.image() else { return };
                 let Some(image) = facts.checked.clone() else { return };
+                let file = facts.path.display().to_string();
+                // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
                 let said = self.view.facts.product.as_ref().map(|known| known.value.clone());
-                if let (Some(link), Some(product)) = (self.view.link.name.clone(), said.or(product.clone())) {
-                    let image = facts.path.display().to_string();
-                    effects.push(Effect::UploadBegins { link, product, image });
+                let product = product.or_else(|| self.view.noted().map(|noted| noted.product.clone()));
+                let known = said.or(product.clone());
+                let order = LoadOrder { product, ..LoadOrder::new(image, password) };
+                if self.command(Command::Load(Box::new(order)))
+                    && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
+                {
+                    // Noted before the first byte leaves: what the session sends is drained behind this.
+                    self.view.link.noted = Some(Noted { product: product.clone(), image: file.clone() });
+                    effects.push(Effect::UploadBegins { link, product, image: file });
                 }
-                self.command(Command::Load(Box::new(LoadOrder { product, ..LoadOrder::new(image, password) })));
             }
             Action::DismissReport => self.view.load.report = None,
             Action::RestartExtremes => self.view.restart_extremes(),
@@ -759,6 +766,7 @@ impl App {
             name: Some(info.link),
             baud: info.baud,
             recording: info.recording,
+            noted: info.noted,
             start_millis: info.start_millis,
             state: LinkState::Open { read_only: info.read_only },
             ..Link::default()
@@ -963,10 +971,11 @@ impl App {
             if let Event::Row { at, row, .. } = &event {
                 self.export_row(*at, row, effects);
             }
-            if let (Event::Finished(Outcome::Loaded(report)), Some(link)) = (&event, &self.view.link.name)
+            if let (Event::Finished(Outcome::Loaded(report)), Some(link)) = (&event, self.view.link.name.clone())
                 && report.unit == UnitNow::Application
             {
-                effects.push(Effect::UploadEnds { link: link.clone() });
+                self.view.link.noted = None;
+                effects.push(Effect::UploadEnds { link });
             }
         }
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);

@@ -167,10 +167,21 @@ pub struct LinkInfo {
     pub read_only: bool,
     /// Where the recording is written, if one is.
     pub recording: Option<String>,
+    /// What is noted of an upload on it that has not ended well.
+    pub noted: Option<Noted>,
     /// Local time of day at [`Instant::ZERO`](crate::time::Instant::ZERO): another one in a recording.
     pub start_of_day: Duration,
     /// The same moment in milliseconds since 1970, UTC.
     pub start_millis: i64,
+}
+
+/// An upload that was begun on a link and has not ended well: the unit may wait in its loader, which says nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Noted {
+    /// The unit's product, as it was known before its loader was entered.
+    pub product: String,
+    /// The image's file.
+    pub image: String,
 }
 
 /// One recording.

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::input::{Failure, Playing};
+use super::input::{Failure, Noted, Playing};
+use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::monitor::Monitor;
@@ -45,6 +46,8 @@ pub struct Link {
     pub baud: u32,
     /// Where the recording is written.
     pub recording: Option<String>,
+    /// An upload on it that has not ended well.
+    pub noted: Option<Noted>,
     /// Why nothing is recorded any more, where that was not wanted.
     pub unrecorded: Option<String>,
     /// The start of time, in milliseconds since 1970, UTC.
@@ -227,9 +230,43 @@ impl View {
         self.facts.product.as_ref().and_then(|known| Product::named(&known.value))
     }
 
+    /// The limits of a channel, once the object dictionary has been read; `None` for one without.
+    pub fn limits(&self, channel: &str) -> Option<Limits> {
+        let dictionary = &self.product()?.dictionary;
+        let limit = |index| {
+            let sub = dictionary.object(index)?.entries.iter().find(|entry| entry.name == channel)?.sub;
+            Some(self.read_value(index, sub)?.as_integer()? as f64 / LIMIT_STEPS)
+        };
+        let limits = Limits { low: limit(LOW_WARNING), high: limit(HIGH_WARNING), shutdown: limit(HIGH_SHUTDOWN) };
+        (limits != Limits::default()).then_some(limits)
+    }
+
+    /// The averages as they were when the object dictionary was read: of what, and in °C.
+    pub fn averages(&self) -> Vec<(&str, f64)> {
+        let object = self.product().and_then(|product| product.dictionary.object(AVERAGES));
+        let entries = object.into_iter().flat_map(|object| &object.entries).filter(|entry| entry.sub > 0);
+        let read = |sub| match self.read_value(AVERAGES, sub)? {
+            Value::Real32(value) => Some(f64::from(value)),
+            _ => None,
+        };
+        entries.filter_map(|entry| Some((entry.name.as_str(), read(entry.sub)?))).collect()
+    }
+
+    fn read_value(&self, index: u16, sub: u8) -> Option<Value> {
+        let entries = &self.dictionary.as_ref()?.reading.entries;
+        entries.iter().find(|read| read.at == ObjectAddress::new(index, sub))?.value
+    }
+
     /// Whether the user has to say what the unit is, because nobody else can.
     pub fn needs_label(&self) -> bool {
-        self.facts.product.is_none() && (self.facts.state == UnitState::Loader || self.load.product_unknown)
+        let is_mute = self.facts.state == UnitState::Loader || self.load.product_unknown;
+        self.facts.product.is_none() && is_mute && self.noted().is_none()
+    }
+
+    /// The note of an upload, where it is all there is to know the unit by: what the unit says itself goes first.
+    pub fn noted(&self) -> Option<&Noted> {
+        let is_mute = self.facts.product.is_none() && self.facts.state != UnitState::Application;
+        self.link.noted.as_ref().filter(|_| is_mute)
     }
 
     /// Says something to the user.
@@ -297,7 +334,11 @@ impl View {
         let version = self.facts.version.as_ref().map(|known| format!(" {}", known.value)).unwrap_or_default();
         match (self.facts.state, &self.facts.product) {
             (UnitState::Silent, _) => self.tell(Tone::Bad, "Nobody has answered: check power, cable and port."),
-            (UnitState::Loader, _) => self.tell(Tone::Quiet, "The unit waits in its loader for a file: L loads one."),
+            (UnitState::Loader, _) => {
+                let which =
+                    self.noted().map_or_else(String::new, |noted| format!(", an {} by our notes", noted.product));
+                self.tell(Tone::Quiet, format!("The unit waits in its loader for a file{which}: L loads one."));
+            }
             (UnitState::Unknown | UnitState::Application, Some(product)) => {
                 let text = format!("The unit is an {}{version}.", product.value);
                 self.tell(Tone::Good, text);

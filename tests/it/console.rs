@@ -77,6 +77,7 @@ impl Desk {
                         link,
                         baud: BAUD,
                         read_only: false,
+                        noted: None,
                         recording: None,
                         start_of_day: Duration::ZERO,
                         start_millis: 0,

@@ -19,7 +19,7 @@ use ratatui::crossterm::event::Event as TerminalEvent;
 
 use player::{Player, Step};
 
-use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Options, Playback};
+use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Noted, Options, Playback};
 use crate::host;
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
@@ -61,6 +61,8 @@ pub struct World {
     pub check: fn(PathBuf) -> ImageFacts,
     /// Notes that an upload of this product begins on this link, or (`None`) that the unit on it runs.
     pub note: fn(&str, Option<(&str, &str)>),
+    /// What is noted of an upload on this link that has not ended well: the unit's product, and the image's file.
+    pub noted: fn(&str) -> Option<(String, String)>,
 }
 
 /// How the console ended.
@@ -414,6 +416,7 @@ impl Console {
             baud: self.world.baud,
             read_only: false,
             recording,
+            noted: (self.world.noted)(name).map(|(product, image)| Noted { product, image }),
             start_of_day,
             start_millis: self.clock.wall(Instant::ZERO).as_millisecond()
                 - i64::try_from(self.skew.as_millis()).unwrap_or_default(),

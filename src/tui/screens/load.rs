@@ -369,6 +369,12 @@ fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
         let (image, unit) = (visible::text(image), visible::text(&unit.value));
         against.push(format!("the file is for an {image}, the unit is an {unit}."));
     }
+    if let (Some(noted), Some(image)) = (view.noted(), &facts.product)
+        && !noted.product.eq_ignore_ascii_case(image)
+    {
+        let (image, unit) = (visible::text(image), visible::text(&noted.product));
+        against.push(format!("the file is for an {image}, the unit is an {unit} by our notes."));
+    }
     if view.job.is_some() {
         against.push("something else is being done with the unit. Wait for it to end.".to_owned());
     }
@@ -520,7 +526,13 @@ fn unit_version(view: &View) -> String {
     match (product, version) {
         (Some(product), Some(version)) => format!("{product} {version}"),
         (Some(product), None) => format!("{product}, version not known"),
-        (None, _) => "not known; the unit is asked first".into(),
+        (None, _) => match view.noted() {
+            Some(noted) => {
+                let image = file_name(Path::new(&noted.image));
+                format!("{}, which {image} was begun to be sent to", visible::text(&noted.product))
+            }
+            None => "not known; the unit is asked first".into(),
+        },
     }
 }
 
