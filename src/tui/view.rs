@@ -336,8 +336,8 @@ impl View {
             (UnitState::Silent, _) => self.tell(Tone::Bad, "Nobody has answered: check power, cable and port."),
             (UnitState::Loader, _) => {
                 let which =
-                    self.noted().map_or_else(String::new, |noted| format!(", an {} by our notes", noted.product));
-                self.tell(Tone::Quiet, format!("The unit waits in its loader for a file{which}: L loads one."));
+                    self.noted().map_or_else(String::new, |noted| format!(", an {} by our notes,", noted.product));
+                self.tell(Tone::Quiet, format!("The unit{which} waits in its loader: L loads a file."));
             }
             (UnitState::Unknown | UnitState::Application, Some(product)) => {
                 let text = format!("The unit is an {}{version}.", product.value);

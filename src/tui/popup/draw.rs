@@ -130,7 +130,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 let mut rows = paragraphs(&[&label], columns);
                 rows.push(Line::default());
                 rows.push(typed(theme, "", field.text(), columns));
-                rows.extend(complain(theme, *complaint));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("Enter", "set"), ("Esc", "back")],
@@ -169,7 +169,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                     rows.push(Line::default());
                     rows.extend(format::wrap(&text, columns).into_iter().map(|row| Line::styled(row, theme.warning())));
                 }
-                rows.extend(complain(theme, *complaint));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("F P", "choose"), ("Enter", "switch on"), ("Esc", "back")],
@@ -200,7 +200,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 );
                 rows.push(Line::default());
                 rows.push(typed(theme, "", field.text(), columns));
-                rows.extend(complain(theme, *complaint));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("Enter", "restore"), ("Esc", "back")],
@@ -219,7 +219,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 );
                 rows.push(Line::default());
                 rows.push(typed(theme, "", field.text(), columns));
-                rows.extend(complain(theme, *complaint));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("Enter", "go on"), ("Esc", "back")],
@@ -336,6 +336,8 @@ fn typed(theme: Theme, label: &'static str, text: &str, columns: usize) -> Line<
     ])
 }
 
-fn complain(theme: Theme, complaint: Option<&'static str>) -> Vec<Line<'static>> {
-    complaint.map(|text| vec![Line::default(), Line::styled(text, theme.bad())]).unwrap_or_default()
+fn complain(theme: Theme, complaint: Option<&'static str>, columns: usize) -> Vec<Line<'static>> {
+    let Some(text) = complaint else { return Vec::new() };
+    let broken = format::wrap(text, columns).into_iter().map(|line| Line::styled(line, theme.bad()));
+    std::iter::once(Line::default()).chain(broken).collect()
 }

@@ -373,7 +373,7 @@ fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
         && !noted.product.eq_ignore_ascii_case(image)
     {
         let (image, unit) = (visible::text(image), visible::text(&noted.product));
-        against.push(format!("the file is for an {image}, the unit is an {unit} by our notes."));
+        against.push(format!("the file is for an {image}, our notes say {unit}."));
     }
     if view.job.is_some() {
         against.push("something else is being done with the unit. Wait for it to end.".to_owned());

@@ -148,18 +148,21 @@ impl Overview {
             ));
         } else {
             let chosen = stream.channels.get(self.cursor).map(|channel| channel.name.as_str());
-            shown.push(limits_line(scene, source, chosen.unwrap_or_default()));
+            shown.push(limits_line(scene, source, chosen.unwrap_or_default(), has_columns));
         }
         shown
     }
 }
 
 /// The limits of one channel in a line, or how to see them.
-fn limits_line(scene: Scene, source: Source, channel: &str) -> Line<'static> {
+fn limits_line(scene: Scene, source: Source, channel: &str, has_columns: bool) -> Line<'static> {
     let (theme, view) = (scene.theme, scene.view);
     let text = match (&view.dictionary, view.limits(channel)) {
         _ if source != Source::FieldValue => return Line::default(),
         (None, _) => "  Limits: not read yet, V reads them.".to_owned(),
+        (Some(read), _) if has_columns => {
+            format!("  Limits read {}; V reads them again.", format::time_of_day(scene.start_of_day, read.at))
+        }
         (Some(_), None) => format!("  {channel} has no limits."),
         (Some(read), Some(limits)) => {
             let show = |limit: Option<f64>| limit.map_or_else(|| "-".to_owned(), |limit| format!("{limit:.1}"));
