@@ -12,6 +12,8 @@ use crate::image::{CheckedImage, Report, Severity};
 use crate::time::Duration;
 use crate::version::Version;
 
+/// How much of a file tells whether it may be an image: a record's type and length, behind a byte order mark.
+pub const FIRST_BYTES: usize = 16;
 /// Largest text file that is read: a dump of the largest product has a tenth of it.
 pub const LARGEST_TEXT: u64 = 4 << 20;
 
@@ -252,6 +254,8 @@ pub struct FileEntry {
     pub kind: FileKind,
     /// Length in bytes; 0 for a folder.
     pub bytes: u64,
+    /// The first bytes of a file whose name does not say what it is, [`FIRST_BYTES`] at most.
+    pub begins: Vec<u8>,
     /// When it was last changed, as local date and time, where known.
     pub modified: Option<String>,
 }

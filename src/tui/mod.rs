@@ -20,7 +20,7 @@ mod widgets;
 
 pub use app::{App, Options};
 pub use input::{
-    Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_TEXT, LinkInfo, Noted, Pace, Playback, Playing,
+    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_TEXT, LinkInfo, Noted, Pace, Playback, Playing,
     PortEntry, RecordingEntry,
 };
 

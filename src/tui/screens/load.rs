@@ -309,7 +309,7 @@ impl Load {
             Listing::Read(entries) => entries,
         };
         if !entries.iter().any(|entry| entry.kind == FileKind::File) {
-            let text = "  No .S, .s19, .srec or .hex file here. P types another path.";
+            let text = "  No image here, neither by name nor by how it begins. P types another path.";
             rows.push(Line::styled(text, theme.quiet()));
         }
         let room = usize::from(area.height).saturating_sub(rows.len());
@@ -349,9 +349,20 @@ impl Load {
 }
 
 /// Whether a name is that of an image, by its ending.
-pub fn is_image(name: &str) -> bool {
+pub fn is_image_name(name: &str) -> bool {
     let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
     matches!(ending.as_deref(), Some("s" | "s19" | "srec" | "hex"))
+}
+
+/// Whether a file begins like one, whatever its name: with the type and length of an S-record or of Intel HEX.
+fn begins_like_an_image(begins: &[u8]) -> bool {
+    let text = begins.strip_prefix(b"\xef\xbb\xbf").unwrap_or(begins).trim_ascii_start();
+    let is_hex = |digits: &[u8]| !digits.is_empty() && digits.iter().all(u8::is_ascii_hexdigit);
+    match text {
+        [b'S' | b's', kind, length @ ..] => kind.is_ascii_digit() && length.get(..2).is_some_and(is_hex),
+        [b':', rest @ ..] => rest.get(..8).is_some_and(is_hex),
+        _ => false,
+    }
 }
 
 /// What stands against sending this image now, one sentence each.
@@ -387,12 +398,15 @@ fn offered(entries: Vec<FileEntry>, has_parent: bool) -> Vec<FileEntry> {
         .into_iter()
         .filter(|entry| match entry.kind {
             FileKind::Folder => !entry.name.starts_with('.'),
-            FileKind::File => is_image(&entry.name),
+            FileKind::File => is_image_name(&entry.name) || begins_like_an_image(&entry.begins),
         })
         .collect();
     offered.sort_by_key(|entry| (entry.kind == FileKind::File, entry.name.to_lowercase()));
     if has_parent {
-        offered.insert(0, FileEntry { name: "..".into(), kind: FileKind::Folder, bytes: 0, modified: None });
+        offered.insert(
+            0,
+            FileEntry { name: "..".into(), kind: FileKind::Folder, bytes: 0, begins: Vec::new(), modified: None },
+        );
     }
     offered
 }
@@ -673,7 +687,7 @@ mod tests {
     use super::*;
 
     fn entry(name: &str, kind: FileKind) -> FileEntry {
-        FileEntry { name: name.into(), kind, bytes: 1, modified: None }
+        FileEntry { name: name.into(), kind, bytes: 1, begins: Vec::new(), modified: None }
     }
 
     #[test]
@@ -688,6 +702,18 @@ mod tests {
         ];
         let names: Vec<_> = offered(entries, true).into_iter().map(|entry| entry.name).collect();
         assert_eq!(names, ["..", "zoo", "A.s19", "b.S"]);
-        assert!(["x.elf.S", "x.SREC", "x.hex"].into_iter().all(is_image));
+        assert!(["x.elf.S", "x.SREC", "x.hex"].into_iter().all(is_image_name));
+    }
+
+    #[test]
+    fn a_file_without_the_ending_is_offered_if_it_begins_like_an_image() {
+        for begins in ["S00600004844521B", "\u{feff}S11300", ":020000040000", "\r\ns113"] {
+            let file = FileEntry { begins: begins.as_bytes().to_vec(), ..entry("firmware.bin", FileKind::File) };
+            assert_eq!(offered(vec![file], false).len(), 1, "{begins}");
+        }
+        for begins in ["", "S", "Sxx", "SHORT", ":", ": a smile", "\x7fELF"] {
+            let file = FileEntry { begins: begins.as_bytes().to_vec(), ..entry("firmware.bin", FileKind::File) };
+            assert_eq!(offered(vec![file], false).len(), 0, "{begins}");
+        }
     }
 }
