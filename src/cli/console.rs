@@ -1,5 +1,6 @@
 //! `axcon` without a command: the console on the screen.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::mpsc::SyncSender;
 
@@ -12,7 +13,7 @@ use crate::host::link::{Connection, LinkSpec, Options};
 use crate::host::ports;
 use crate::time::Instant;
 use crate::tui::run::{End, World};
-use crate::tui::{self, Failure, ImageFacts};
+use crate::tui::{self, Failure, ImageFacts, Palette};
 
 /// Runs the console until the user leaves it.
 ///
@@ -28,7 +29,7 @@ pub fn run(global: &Global) -> Result<(), CliError> {
         noted: |link| {
             journal(link).and_then(|(journal, key)| journal.note(&key)).map(|note| (note.product, note.image))
         },
-        colour: std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty()),
+        palette: palette(|name| std::env::var_os(name))?,
         resolve,
         open,
         explain: |error| failure(&link::link_error(error)),
@@ -43,6 +44,20 @@ pub fn run(global: &Global) -> Result<(), CliError> {
             Err(CliError::new(Kind::Failed, anyhow::Error::new(error).context("the console needs a terminal"))
                 .hint("'axcon --help' lists the commands that do without one"))
         }
+    }
+}
+
+/// `NO_COLOR` and `AXCON_THEME`, which says what the terminal's ground is; nobody can ask every terminal.
+fn palette(variable: impl Fn(&str) -> Option<OsString>) -> Result<Palette, CliError> {
+    if variable("NO_COLOR").is_some_and(|value| !value.is_empty()) {
+        return Ok(Palette::Mono);
+    }
+    let theme = variable("AXCON_THEME").unwrap_or_default().to_string_lossy().to_lowercase();
+    match theme.as_str() {
+        "" | "dark" => Ok(Palette::Dark),
+        "light" => Ok(Palette::Light),
+        "none" => Ok(Palette::Mono),
+        _ => Err(CliError::message(Kind::Usage, "AXCON_THEME may be dark, light or none")),
     }
 }
 
@@ -81,4 +96,21 @@ fn note(link: &str, upload: Option<(&str, &str)>) {
 /// The journal of uploads, and what it calls the port behind a link; `None` where nothing is noted.
 fn journal(link: &str) -> Option<(Journal, String)> {
     Some((Journal::of_user()?, link::journal_key(&resolve(link).ok()?)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_environment_chooses_the_colours() {
+        let chosen = |set: &[(&str, &str)]| {
+            palette(|name| set.iter().find(|(known, _)| *known == name).map(|(_, value)| value.into())).ok()
+        };
+        assert_eq!(chosen(&[]), Some(Palette::Dark));
+        assert_eq!(chosen(&[("AXCON_THEME", "Light")]), Some(Palette::Light));
+        assert_eq!(chosen(&[("AXCON_THEME", "light"), ("NO_COLOR", "1")]), Some(Palette::Mono));
+        assert_eq!(chosen(&[("NO_COLOR", "")]), Some(Palette::Dark), "empty is as if it were not set");
+        assert_eq!(chosen(&[("AXCON_THEME", "pink")]), None);
+    }
 }

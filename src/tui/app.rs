@@ -27,7 +27,7 @@ use super::screens::recordings::Recordings;
 use super::screens::stream::Stream;
 use super::screens::terminal::{Meaning, Terminal};
 use super::screens::{Scene, ScreenId};
-use super::theme::Theme;
+use super::theme::{Palette, Theme};
 use super::view::{Export, Link, LinkState, Tone, View};
 use super::widgets::{format, lines};
 use crate::dump::{self, Dump};
@@ -51,8 +51,8 @@ pub struct Options {
     pub link: Option<String>,
     /// Where the file picker starts.
     pub directory: PathBuf,
-    /// Whether to use colours (`NO_COLOR`).
-    pub colour: bool,
+    /// Which colours to begin with (`NO_COLOR`, `AXCON_THEME`).
+    pub palette: Palette,
     /// Columns and rows of the terminal at the start.
     pub size: (u16, u16),
 }
@@ -103,7 +103,7 @@ impl App {
     /// A console that has seen nothing yet. [`App::start`] comes next.
     pub fn new(options: Options) -> Self {
         App {
-            theme: Theme::new(options.colour),
+            theme: Theme::new(options.palette),
             size: options.size,
             start_of_day: Duration::ZERO,
             now: Instant::ZERO,
@@ -436,6 +436,10 @@ impl App {
                 self.view.tell(Tone::Bad, format!("Not stopped: {what}."));
             }
             Cmd::Suspend => effects.push(Effect::Suspend),
+            Cmd::Palette => {
+                self.theme = Theme::new(self.theme.palette().next());
+                self.view.tell(Tone::Quiet, format!("Colours: {}.", self.theme.palette().words()));
+            }
             Cmd::Reconnect => {
                 if matches!(self.view.link.state, LinkState::Lost(_)) {
                     self.perform(Action::Reconnect, effects);

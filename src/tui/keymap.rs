@@ -24,6 +24,8 @@ pub enum Cmd {
     Quit,
     /// Stop the program until the shell continues it.
     Suspend,
+    /// Other colours.
+    Palette,
     /// Open the lost link again.
     Reconnect,
     /// One up.
@@ -172,6 +174,12 @@ pub const EVERYWHERE: &[Binding] = &[
         cmd: Cmd::Quit,
         short: "quit",
         long: "leave; asks first if something would be left half done",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::F(2))],
+        cmd: Cmd::Palette,
+        short: "",
+        long: "colours for a dark terminal, for a light one, or none",
     },
     Binding {
         keys: &[Press::Ctrl('z')],

@@ -19,7 +19,7 @@ use ratatui::crossterm::event::Event as TerminalEvent;
 
 use player::{Player, Step};
 
-use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Noted, Options, Playback};
+use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Noted, Options, Palette, Playback};
 use crate::host;
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
@@ -47,8 +47,8 @@ pub struct World {
     pub baud: u32,
     /// Where sessions are recorded.
     pub recording: Plan,
-    /// Whether to use colours.
-    pub colour: bool,
+    /// Which colours to begin with.
+    pub palette: Palette,
     /// Says which link a name means.
     pub resolve: fn(&str) -> Result<LinkSpec, Failure>,
     /// Opens a link.
@@ -88,7 +88,7 @@ pub fn run(world: World) -> io::Result<End> {
     let app = App::new(Options {
         link: world.link.clone(),
         directory: std::env::current_dir().unwrap_or_else(|_| PathBuf::from(".")),
-        colour: world.colour,
+        palette: world.palette,
         size: (size.width, size.height),
     });
     let (answer, answers) = channel();
