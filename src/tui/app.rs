@@ -362,11 +362,15 @@ impl App {
             return self.on(Cmd::Suspend, effects);
         }
         if let Some(popup) = &mut self.popup {
-            let is_waiting = matches!(popup, Popup::Waiting(_));
+            let is_waiting = matches!(popup, Popup::Waiting { .. });
             match popup.on(key) {
                 // A link that takes long to open must not hold the user.
                 Answer::Stay if is_waiting && keymap::find(&[EVERYWHERE], key) == Some(Cmd::Quit) => {
                     effects.push(Effect::Quit);
+                }
+                Answer::Stay if is_waiting && key.code == KeyCode::Esc && self.leaving.is_none() => {
+                    self.popup = None;
+                    self.disconnect(effects);
                 }
                 Answer::Stay => {}
                 Answer::Close => self.popup = None,
@@ -678,7 +682,8 @@ impl App {
             effects.push(Effect::CloseLink);
         }
         self.session = None;
-        self.popup = Some(Popup::Waiting(format!("Opening {}.", super::visible::text(&link))));
+        let what = format!("Opening {}.", super::visible::text(&link));
+        self.popup = Some(Popup::Waiting { what, hint: ("Esc", "do not wait") });
         self.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
         effects.push(Effect::OpenLink(link));
     }
@@ -699,7 +704,8 @@ impl App {
             self.command(Command::Keys(b"x".to_vec()));
         }
         self.dirty = true;
-        self.popup = Some(Popup::Waiting("Leaving the unit in order; at most 2 seconds. Q does not wait.".into()));
+        let what = "Leaving the unit in order, which takes 2 seconds at most.".into();
+        self.popup = Some(Popup::Waiting { what, hint: ("Q", "leave at once") });
         self.leaving = Some((next, self.now + WINDING_UP));
     }
 

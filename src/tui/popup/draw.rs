@@ -23,7 +23,7 @@ pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Fr
     let inner = usize::from(columns).saturating_sub(4);
     let (title, mut rows, hints) = match popup {
         Popup::Asking(question) => ask(question, view, theme, inner),
-        Popup::Waiting(what) => ("One moment".to_owned(), paragraphs(&[what], inner), Vec::new()),
+        Popup::Waiting { what, hint } => ("One moment".to_owned(), paragraphs(&[what], inner), vec![*hint]),
         Popup::Failed { title, failure } => {
             let mut rows = paragraphs(&[&visible::sentence(&failure.text)], inner);
             for hint in &failure.hints {
@@ -52,12 +52,12 @@ pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Fr
     let y = match popup {
         // What is found has to stay in sight.
         Popup::Asking(Question::Find(_)) => area.bottom() - height,
-        Popup::Asking(_) | Popup::Waiting(_) | Popup::Failed { .. } => area.y + (area.height - height) / 2,
+        Popup::Asking(_) | Popup::Waiting { .. } | Popup::Failed { .. } => area.y + (area.height - height) / 2,
     };
     let window = Rect { x: area.x + (area.width - columns) / 2, y, width: columns, height };
     let style = match popup {
         Popup::Failed { .. } => theme.bad(),
-        Popup::Asking(_) | Popup::Waiting(_) => theme.heading(),
+        Popup::Asking(_) | Popup::Waiting { .. } => theme.heading(),
     };
     let block = Block::bordered()
         .border_type(BorderType::Rounded)

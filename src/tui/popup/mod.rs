@@ -24,8 +24,13 @@ pub use draw::draw;
 pub enum Popup {
     /// The user has to answer.
     Asking(Question),
-    /// The user has to wait; what for.
-    Waiting(String),
+    /// The user has to wait.
+    Waiting {
+        /// What for.
+        what: String,
+        /// The key that does not wait, and what it does.
+        hint: (&'static str, &'static str),
+    },
     /// Something has failed; what, and what to try.
     Failed {
         /// In a few words.
@@ -150,7 +155,7 @@ impl Popup {
         match self {
             Popup::Asking(question) => question.on(key),
             // The answer is on its way; only it ends the wait.
-            Popup::Waiting(_) => Answer::Stay,
+            Popup::Waiting { .. } => Answer::Stay,
             Popup::Failed { .. } => match key.code {
                 KeyCode::Enter | KeyCode::Esc | KeyCode::Char(_) => Answer::Close,
                 _ => Answer::Stay,
