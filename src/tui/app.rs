@@ -281,14 +281,7 @@ impl App {
         if let Some(help) = &self.help {
             return help.draw(self.theme, self.front, area, frame);
         }
-        let scene = Scene {
-            view: &self.view,
-            record: self.record(),
-            scrollback: &self.scrollback,
-            theme: self.theme,
-            now: self.now,
-            start_of_day: self.start_of_day,
-        };
+        let scene = self.scene();
         match self.front {
             ScreenId::Connect => self.connect.draw(scene, area, frame),
             ScreenId::Overview => self.overview.draw(scene, area, frame),
@@ -299,6 +292,17 @@ impl App {
             ScreenId::Diagnostics => self.diagnostics.draw(scene, area, frame),
             ScreenId::Recordings => self.recordings.draw(scene, area, frame),
             ScreenId::Bench => self.bench.draw(scene, area, frame),
+        }
+    }
+
+    fn scene(&self) -> Scene<'_> {
+        Scene {
+            view: &self.view,
+            record: self.record(),
+            scrollback: &self.scrollback,
+            theme: self.theme,
+            now: self.now,
+            start_of_day: self.start_of_day,
         }
     }
 
@@ -347,13 +351,46 @@ impl App {
         let cmd = match mouse.row {
             1 => frame::tab_at(&self.view, front, usize::from(columns), column).map(Cmd::Go),
             row if row + 2 == rows => frame::menu_at(column),
-            _ => None,
+            row => self.choose_at(columns, rows, row),
         };
         if let Some(cmd) = cmd {
             self.dirty = true;
             self.help = None;
             self.on(cmd, effects);
         }
+    }
+
+    /// A click into a list: what stands there is chosen, and what is chosen already is done.
+    fn choose_at(&mut self, columns: u16, rows: u16, y: u16) -> Option<Cmd> {
+        if self.help.is_some() {
+            return None;
+        }
+        let body = frame::body(Rect::new(0, 0, columns, rows));
+        let (_, area) = lines::split(body, frame::lost(&self.view, self.theme, usize::from(columns)).len() as u16);
+        self.dirty = true;
+        let again = match self.front {
+            ScreenId::Connect => {
+                let entry = self.connect.entry_at(self.scene(), area, y)?;
+                self.connect.choose(entry)
+            }
+            ScreenId::Load => {
+                let entry = self.load.entry_at(&self.view, area, y)?;
+                self.load.choose(entry)
+            }
+            ScreenId::Recordings => {
+                let entry = self.recordings.entry_at(self.scene(), area, y)?;
+                self.recordings.choose(entry)
+            }
+            ScreenId::Dictionary => {
+                let row = self.dictionary.row_at(&self.view, area, y)?;
+                self.dictionary.choose(row);
+                false
+            }
+            ScreenId::Overview | ScreenId::Terminal | ScreenId::Stream | ScreenId::Diagnostics | ScreenId::Bench => {
+                false
+            }
+        };
+        again.then_some(Cmd::Accept)
     }
 
     fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {

@@ -222,14 +222,7 @@ impl Dictionary {
         let all = self.all_rows(view);
         let total = all.len();
         let rows = self.chosen(all);
-        let (upper, detail) = match area.width >= BESIDE_AT {
-            true => {
-                let width = area.width - DETAIL_COLUMNS;
-                let beside = Rect { x: area.x + width + 2, width: DETAIL_COLUMNS - 2, ..area };
-                (Rect { width, ..area }, beside)
-            }
-            false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
-        };
+        let (upper, detail) = parts(area);
         let (head, table) = lines::split(upper, 2);
         let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len(), total))];
         let columns = usize::from(upper.width);
@@ -272,6 +265,20 @@ impl Dictionary {
         lines::draw(frame, detail, rows[cursor].detail(scene, detail.width, detail.height > DETAIL_ROWS));
     }
 
+    /// The row of the table that is drawn in row `y` of the screen.
+    pub fn row_at(&self, view: &View, area: Rect, y: u16) -> Option<usize> {
+        let (_, table) = lines::split(parts(area).0, 2);
+        let rows = self.rows(view).len();
+        let first = lines::first_visible(self.cursor.min(rows.saturating_sub(1)), rows, usize::from(table.height));
+        let row = first + usize::from(y.checked_sub(table.y)?);
+        (y < table.bottom() && row < rows).then_some(row)
+    }
+
+    /// Puts the cursor on a row.
+    pub fn choose(&mut self, row: usize) {
+        self.cursor = row;
+    }
+
     fn remark(&self, scene: Scene, shown: usize, total: usize) -> String {
         let view = scene.view;
         let mut parts = Vec::new();
@@ -295,6 +302,18 @@ impl Dictionary {
             parts.push(format!("with '{}'", visible::text(&self.words)));
         }
         parts.join(", ")
+    }
+}
+
+/// Where the table with its heading stands, and where the chosen entry is explained.
+fn parts(area: Rect) -> (Rect, Rect) {
+    match area.width >= BESIDE_AT {
+        true => {
+            let width = area.width - DETAIL_COLUMNS;
+            let beside = Rect { x: area.x + width + 2, width: DETAIL_COLUMNS - 2, ..area };
+            (Rect { width, ..area }, beside)
+        }
+        false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
     }
 }
 

@@ -321,6 +321,23 @@ impl Load {
         rows
     }
 
+    /// The file or folder that is drawn in row `y` of the screen.
+    pub fn entry_at(&self, view: &View, area: Rect, y: u16) -> Option<usize> {
+        let is_picking =
+            view.job != Some(Job::Load) && view.load.report.is_none() && matches!(self.stage, Stage::Picking);
+        let Listing::Read(entries) = &self.listing else { return None };
+        let above = 1 + u16::from(!entries.iter().any(|entry| entry.kind == FileKind::File));
+        let room = usize::from(area.height.saturating_sub(above));
+        let row = usize::from(y.checked_sub(area.y + above).filter(|_| is_picking)?);
+        let number = lines::first_visible(self.cursor, entries.len(), room) + row;
+        (row < room && number < entries.len()).then_some(number)
+    }
+
+    /// Puts the cursor on an entry. Says whether it was there already.
+    pub fn choose(&mut self, number: usize) -> bool {
+        std::mem::replace(&mut self.cursor, number) == number
+    }
+
     fn running(&self, scene: Scene, area: Rect) -> Vec<Line<'static>> {
         let theme = scene.theme;
         let name = self.image().map(|facts| file_name(&facts.path)).unwrap_or_default();

@@ -169,6 +169,21 @@ impl Recordings {
         }
     }
 
+    /// The entry that is drawn in row `y` of the screen.
+    pub fn entry_at(&self, scene: Scene, area: Rect, y: u16) -> Option<usize> {
+        let above = 1 + if scene.view.playing.is_some() { PLAYER_ROWS } else { 0 };
+        let below = self.detail(scene, area.width).len() as u16;
+        let room = area.height.saturating_sub(above + below);
+        let row = y.checked_sub(area.y + above).filter(|row| *row < room)?;
+        let first = lines::first_visible(self.cursor, self.entries().len(), usize::from(room));
+        Some(first + usize::from(row)).filter(|number| *number < self.entries().len())
+    }
+
+    /// Puts the cursor on an entry. Says whether it was there already.
+    pub fn choose(&mut self, number: usize) -> bool {
+        std::mem::replace(&mut self.cursor, number) == number
+    }
+
     /// Where the chosen one lies, and what to do with it.
     fn detail(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
         let Some(entry) = self.entries().get(self.cursor) else { return Vec::new() };
