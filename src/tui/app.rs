@@ -629,7 +629,8 @@ impl App {
                 let said = self.view.facts.product.as_ref().map(|known| known.value.clone());
                 let product = product.or_else(|| self.view.noted().map(|noted| noted.product.clone()));
                 let known = said.or(product.clone());
-                let order = LoadOrder { product, ..LoadOrder::new(image, password) };
+                let packed = self.load.is_packed();
+                let order = LoadOrder { product, packed, ..LoadOrder::new(image, password) };
                 if self.command(Command::Load(Box::new(order)))
                     && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
                 {

@@ -76,6 +76,10 @@ pub enum Cmd {
     Only,
     /// Compare with a file.
     Compare,
+    /// Send long records.
+    Pack,
+    /// Hold the line low for a moment.
+    Break,
     /// Play faster.
     Faster,
     /// Play slower.

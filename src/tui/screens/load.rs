@@ -49,6 +49,12 @@ pub const BINDINGS: &[Binding] = &[
     },
     Binding { keys: &[Press::Plain(KeyCode::Char('p'))], cmd: Cmd::Type, short: "path", long: "type a path" },
     Binding {
+        keys: &[Press::Plain(KeyCode::Char('k'))],
+        cmd: Cmd::Pack,
+        short: "",
+        long: "send long records: the same words in a sixth less time",
+    },
+    Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
         cmd: Cmd::Refresh,
         short: "read again",
@@ -60,12 +66,14 @@ const ENTER: &[Press] = &[Press::Plain(KeyCode::Enter)];
 const ESC: &[Press] = &[Press::Plain(KeyCode::Esc)];
 const FINDINGS: Binding = footer(&[Press::Plain(KeyCode::Down)], Cmd::Down, "findings");
 const AGAIN: Binding = footer(&[Press::Plain(KeyCode::Char('r'))], Cmd::Refresh, "read again");
+const PACK: Binding = footer(&[Press::Plain(KeyCode::Char('k'))], Cmd::Pack, "pack");
 const OTHER: Binding = footer(ESC, Cmd::Back, "other file");
 
 /// What the footer shows at each stage; the keys themselves are those of [`BINDINGS`].
 const CHECKING_KEYS: &[Binding] = &[OTHER];
 const REPORT_KEYS: &[Binding] = &[FINDINGS, OTHER, AGAIN];
-const READY_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), FINDINGS, OTHER, AGAIN];
+const READY_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), PACK, OTHER, AGAIN];
+const READY_KEYS_WITH_FINDINGS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), PACK, FINDINGS, OTHER];
 const RUNNING_KEYS: &[Binding] = &[footer(ESC, Cmd::Back, "cancel")];
 const VERDICT_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "close the report")];
 
@@ -96,6 +104,8 @@ pub struct Load {
     listing: Listing,
     cursor: usize,
     stage: Stage,
+    /// Long records are sent instead of the file's own.
+    packed: bool,
 }
 
 /// What is in the folder.
@@ -119,7 +129,7 @@ enum Stage {
 impl Load {
     /// Starts in a folder.
     pub fn new(directory: PathBuf) -> Self {
-        Load { directory, listing: Listing::Unread, cursor: 0, stage: Stage::Picking }
+        Load { directory, listing: Listing::Unread, cursor: 0, stage: Stage::Picking, packed: false }
     }
 
     /// The screen comes to the front: a folder that has never been read is read now.
@@ -159,6 +169,11 @@ impl Load {
             Stage::Report { facts, .. } => Some(facts),
             Stage::Picking | Stage::Checking(_) => None,
         }
+    }
+
+    /// Whether long records are to be sent.
+    pub fn is_packed(&self) -> bool {
+        self.packed
     }
 
     /// Checks a file.
@@ -203,6 +218,7 @@ impl Load {
                         return Some(self.check(path));
                     }
                     Cmd::Type => return Some(Action::Ask(Question::image(&self.directory))),
+                    Cmd::Pack => self.packed = !self.packed,
                     Cmd::Accept if objections(facts, view).is_empty() => {
                         return Some(Action::Ask(Question::start_load(view, facts)));
                     }
@@ -224,7 +240,10 @@ impl Load {
         match &self.stage {
             Stage::Picking => BINDINGS,
             Stage::Checking(_) => CHECKING_KEYS,
-            Stage::Report { facts, .. } if objections(facts, view).is_empty() => READY_KEYS,
+            Stage::Report { facts, .. } if objections(facts, view).is_empty() => match facts.defects.is_empty() {
+                true => READY_KEYS,
+                false => READY_KEYS_WITH_FINDINGS,
+            },
             Stage::Report { .. } => REPORT_KEYS,
         }
     }
@@ -242,7 +261,7 @@ impl Load {
                     lines::rule(scene.theme, area.width, "Image", ""),
                     Line::raw(format!("  Reading and checking {} ...", file_name(path))),
                 ],
-                Stage::Report { facts, scrolled } => report(scene, facts, *scrolled, area),
+                Stage::Report { facts, scrolled } => report(scene, facts, self.packed, *scrolled, area),
             }
         };
         lines::draw(frame, area, rows);
@@ -442,7 +461,7 @@ fn file_row(theme: Theme, entry: &FileEntry, is_chosen: bool, columns: usize) ->
 }
 
 /// Everything about the file, what stands against it, and what will happen.
-fn report(scene: Scene, facts: &ImageFacts, scrolled: usize, area: Rect) -> Vec<Line<'static>> {
+fn report(scene: Scene, facts: &ImageFacts, packed: bool, scrolled: usize, area: Rect) -> Vec<Line<'static>> {
     let theme = scene.theme;
     let version = facts.version.map(|version| format!(" {version}")).unwrap_or_default();
     let product = facts.product.as_deref().map_or("does not say what it is".into(), visible::text);
@@ -456,7 +475,7 @@ fn report(scene: Scene, facts: &ImageFacts, scrolled: usize, area: Rect) -> Vec<
         ),
         lines::labelled(theme, "Check", check_word(theme, facts)),
     ];
-    let plan = plan(scene, facts, area.width);
+    let plan = plan(scene, facts, packed, area.width);
     if !facts.defects.is_empty() {
         let all = findings(facts, area.width);
         let room = findings_room(facts, scene.view, area);
@@ -508,7 +527,7 @@ fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
     }
 }
 
-fn plan(scene: Scene, facts: &ImageFacts, columns: u16) -> Vec<Line<'static>> {
+fn plan(scene: Scene, facts: &ImageFacts, packed: bool, columns: u16) -> Vec<Line<'static>> {
     let (theme, view) = (scene.theme, scene.view);
     let mut rows = vec![lines::rule(theme, columns, "Plan", "")];
     let product =
@@ -523,7 +542,10 @@ fn plan(scene: Scene, facts: &ImageFacts, columns: u16) -> Vec<Line<'static>> {
         let steps: [String; PLAN_STEPS] = [
             format!("Make sure that the unit is {product}."),
             "Send L and the password; the unit resets into its loader.".into(),
-            format!("Send {sent} characters: some {time} with what the loader needs."),
+            match packed {
+                false => format!("Send {sent} characters: some {time} with what the loader needs."),
+                true => format!("Send fewer than {sent} characters, in long records: less than {time}."),
+            },
             format!("Wait for the banner of the new software: it must {expected}."),
         ];
         let numbered = steps.into_iter().enumerate();
