@@ -61,6 +61,8 @@ pub enum Action {
     ListRecordings,
     /// Play a recording differently.
     Play(Playback),
+    /// Hold the line low for a moment.
+    Break,
     /// Have something done to the emulated unit.
     Order(String),
     /// Leave the program, the unit left in order.

@@ -191,6 +191,7 @@ impl App {
                 self.bench.answered(&line, answer);
                 self.dirty = true;
             }
+            Input::BreakSent(result) => self.break_sent(now, result, &mut effects),
             Input::Signal => self.leave(Next::Quit, &mut effects),
         }
         self.drain(&mut effects);
@@ -510,6 +511,8 @@ impl App {
             | Cmd::FindNext
             | Cmd::Only
             | Cmd::Compare
+            | Cmd::Pack
+            | Cmd::Break
             | Cmd::Faster
             | Cmd::Slower
             | Cmd::OpenWire
@@ -650,6 +653,8 @@ impl App {
             Action::EndExport => self.end_export(None),
             Action::ExportDictionary(path) => self.export_dictionary(path, effects),
             Action::Compare(path) => effects.push(Effect::ReadFile(path)),
+            Action::Break if self.can_send() => effects.push(Effect::Break),
+            Action::Break => {}
             Action::ListRecordings => effects.push(Effect::ListRecordings),
             Action::Play(playback) => effects.push(Effect::Play(playback)),
             Action::Order(line) if bench::emulated(&self.view).is_some() => {
@@ -846,6 +851,17 @@ impl App {
         self.scrollback.note(self.now, text.clone());
         self.view.tell(Tone::Quiet, format!("{text} is set, in the chart and in the recording."));
         effects.push(Effect::Mark(text));
+    }
+
+    fn break_sent(&mut self, now: Instant, result: Result<(), String>, effects: &mut Vec<Effect>) {
+        self.dirty = true;
+        match result {
+            Ok(()) => {
+                self.scrollback.note(now, "break sent".into());
+                effects.push(Effect::Mark("break sent".into()));
+            }
+            Err(why) => self.view.tell(Tone::Bad, format!("No break sent: {why}.")),
+        }
     }
 
     fn export_stream(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {

@@ -80,6 +80,8 @@ pub enum Input {
         /// What the unit had to say, or why it refused.
         answer: Result<Option<String>, String>,
     },
+    /// Answer to [`Effect::Break`]: why the link cannot do that.
+    BreakSent(Result<(), String>),
     /// The system wants the program to end: leave without asking.
     Signal,
 }
@@ -124,6 +126,8 @@ pub enum Effect {
     ListRecordings,
     /// Play the recording differently. Answered by [`Input::Playing`] whenever it has moved.
     Play(Playback),
+    /// Hold the line low for a quarter of a second. Answered by [`Input::BreakSent`].
+    Break,
     /// Have the emulated unit at the other end do something, in the words `axcon emulate` takes. Answered by
     /// [`Input::Ordered`].
     Order(String),

@@ -342,6 +342,11 @@ impl Console {
                 Effect::Mark(text) => self.recorder.mark(self.now(), &text),
                 Effect::Play(playback) => self.steer(playback),
                 Effect::Order(line) => self.order(line),
+                Effect::Break => {
+                    let sent = self.link.as_ref().map(Connection::send_break);
+                    let sent = sent.unwrap_or(Ok(())).map_err(|error| error.to_string());
+                    leaves |= self.handle(Input::BreakSent(sent));
+                }
                 Effect::CheckImage(path) => {
                     let check = self.world.check;
                     self.ask(move || Input::ImageChecked(Box::new(check(path))));

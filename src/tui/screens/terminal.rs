@@ -60,6 +60,12 @@ pub const BINDINGS: &[Binding] = &[
         short: "next",
         long: "the next place further up that has them",
     },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('b'))],
+        cmd: Cmd::Break,
+        short: "",
+        long: "send a break: the line held low for a quarter of a second",
+    },
 ];
 
 /// Bytes in a row of the hex view.
@@ -193,6 +199,7 @@ impl Terminal {
                     Mode::Hex(_) => Mode::Text(None),
                 }
             }
+            Cmd::Break => return Some(Action::Break),
             Cmd::Times => self.with_times = !self.with_times,
             Cmd::Find => return Some(Action::Ask(Question::find(&self.words))),
             Cmd::FindNext => {
