@@ -13,8 +13,8 @@ use ratatui::crossterm::event::{
 };
 
 use super::{
-    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, Pace, Playback, Playing,
-    PortEntry, RecordingEntry,
+    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Noted, Options, Pace, Palette, Playback,
+    Playing, PortEntry, RecordingEntry,
 };
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
@@ -24,7 +24,7 @@ use crate::endpoint::Transmit;
 use crate::image::make;
 use crate::record::Span;
 use crate::session::{
-    DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, Verdict,
+    DictionaryReading, Event, Facts, Job, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, UnitState, Verdict,
 };
 use crate::time::{Duration, Instant};
 use crate::version::Version;
@@ -50,7 +50,8 @@ struct Stage {
 
 impl Stage {
     fn new(size: (u16, u16)) -> Self {
-        let options = Options { link: None, directory: PathBuf::from("/home/service/images"), colour: false, size };
+        let options =
+            Options { link: None, directory: PathBuf::from("/home/service/images"), palette: Palette::Mono, size };
         let mut app = App::new(options);
         let effects = app.start();
         Stage { app, size, now: Instant::ZERO, effects }
@@ -83,7 +84,11 @@ impl Stage {
 
     /// Connected, with the stream on for a while and a loose wire.
     fn streaming(size: (u16, u16)) -> Self {
-        let mut stage = Stage::connected(size);
+        Stage::connected(size).with_rows()
+    }
+
+    fn with_rows(self) -> Self {
+        let mut stage = self;
         for second in 0..90u32 {
             let swing = f64::from(second % 30) * 0.37;
             let third = if (40..52).contains(&second) || second >= 80 {
@@ -97,16 +102,8 @@ impl Stage {
         stage
     }
 
-    fn opened(&mut self, link: &str) {
-        self.input(Input::LinkOpened(LinkInfo {
-            link: link.into(),
-            baud: 115_200,
-            read_only: false,
-            noted: None,
-            recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
-            start_of_day: NOON,
-            start_millis: 1_769_860_800_000,
-        }));
+    fn opened(&mut self, link: &str) -> &mut Self {
+        self.input(Input::LinkOpened(link_info(link)))
     }
 
     fn lost(&mut self) -> &mut Self {
@@ -124,6 +121,8 @@ impl Stage {
             let value = match (at.index, at.sub) {
                 (0x6110, 2) => Some(Value::Unsigned16(2)),
                 (0x6112, 4) => Some(Value::Unsigned8(0)),
+                (0x4000, 3) => Some(Value::Integer16(1000)),
+                (0x2100, sub @ 1..) => Some(Value::Real32(137.5 + f32::from(sub))),
                 _ => entry.default.map(|default| default.on_node(127)),
             };
             let text = format!("{} = {}", object.name, value.map_or_else(|| "?".to_owned(), |value| value.to_string()));
@@ -160,9 +159,16 @@ impl Stage {
             name: name.into(),
             kind: FileKind::File,
             bytes,
+            begins: Vec::new(),
             modified: Some("2026-01-31 12:00".into()),
         };
-        let folder = |name: &str| FileEntry { name: name.into(), kind: FileKind::Folder, bytes: 0, modified: None };
+        let folder = |name: &str| FileEntry {
+            name: name.into(),
+            kind: FileKind::Folder,
+            bytes: 0,
+            begins: Vec::new(),
+            modified: None,
+        };
         let entries = vec![
             file("AXTC4CO_V1.2.0.elf.S", 242_846),
             folder("bad"),
@@ -202,6 +208,16 @@ impl Stage {
         self
     }
 
+    /// Clicks on a text, where it stands first.
+    fn click(&mut self, text: &str) -> &mut Self {
+        let picture = self.picture();
+        let (row, line) = picture.lines().enumerate().find(|(_, line)| line.contains(text)).expect(text);
+        let column = line.split(text).next().map_or(0, |before| before.chars().count()) as u16 + 1;
+        let kind = MouseEventKind::Down(MouseButton::Left);
+        let mouse = MouseEvent { kind, column, row: row as u16, modifiers: KeyModifiers::NONE };
+        self.input(Input::Terminal(TerminalEvent::Mouse(mouse)))
+    }
+
     /// What a terminal sends for Ctrl-].
     fn prefix(&mut self) -> &mut Self {
         self.key(KeyCode::Char('5'), KeyModifiers::CONTROL)
@@ -223,9 +239,32 @@ impl Stage {
     }
 
     fn fold(&mut self, event: Event) -> &mut Self {
-        let facts = Facts::default();
-        self.app.fold(self.now, &event, &facts);
+        self.fold_with(event, &Facts::default())
+    }
+
+    fn fold_with(&mut self, event: Event, facts: &Facts) -> &mut Self {
+        self.app.fold(self.now, &event, facts);
         self
+    }
+
+    fn finished(&mut self, outcome: Outcome) -> &mut Self {
+        self.fold_with(Event::Finished(outcome), &Facts::default())
+    }
+
+    /// Connected to a port with a unit that waits in its loader; on that port an upload was begun once.
+    fn in_loader(size: (u16, u16), noted: Option<Noted>) -> Self {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { noted, ..link_info("/dev/ttyUSB0") }));
+        stage.fold_with(Event::FactsChanged, &Facts { state: UnitState::Loader, ..Facts::default() });
+        stage.finished(Outcome::Identified);
+        stage
+    }
+
+    /// The upload has been started with the password.
+    fn loading(size: (u16, u16)) -> Self {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.press(KeyCode::Enter).keys("AXIO-2010").press(KeyCode::Enter);
+        stage
     }
 
     /// What has left for the unit since the last question.
@@ -258,6 +297,22 @@ impl Stage {
     fn shows(&self, text: &str) -> bool {
         self.picture().contains(text)
     }
+}
+
+fn link_info(link: &str) -> LinkInfo {
+    LinkInfo {
+        link: link.into(),
+        baud: 115_200,
+        read_only: false,
+        noted: None,
+        recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
+        start_of_day: NOON,
+        start_millis: 1_769_860_800_000,
+    }
+}
+
+fn noted(product: &str) -> Option<Noted> {
+    Some(Noted { product: product.into(), image: "/home/service/images/AXTC4CO_V1.2.0.elf.S".into() })
 }
 
 fn axtc4co() -> &'static Product {
@@ -504,8 +559,121 @@ pictures! {
         stage
     };
     load_link_lost: |size| {
+        let mut stage = Stage::loading(size);
+        stage.wait(1000).lost();
+        stage
+    };
+    load_in_loader_with_a_note: |size| {
+        Stage::in_loader(size, noted("AXTC4CO")).with_image(good_image())
+    };
+    load_in_loader_noted_for_another_product: |size| {
+        Stage::in_loader(size, noted("AXRTD8CO")).with_image(good_image())
+    };
+    label_question: |size| {
+        let mut stage = Stage::in_loader(size, None).with_image(good_image());
+        stage.press(KeyCode::Enter).keys("AXRTD8CO").press(KeyCode::Enter);
+        stage
+    };
+    password_question: |size| {
         let mut stage = Stage::connected(size).with_image(good_image());
-        stage.fold(Event::Progress(progress())).lost();
+        stage.press(KeyCode::Enter).keys("AXIO");
+        stage
+    };
+    waiting_for_a_link: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter);
+        stage
+    };
+    terminal_find_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3").prefix().keys("/menu");
+        stage
+    };
+    order_question: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("emu:axtc4co").keys("9/short 2");
+        stage
+    };
+    temperature_question: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("emu:axtc4co").keys("9").press(KeyCode::Enter).keys("hot").press(KeyCode::Enter);
+        stage
+    };
+    disconnect_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter).keys("1").press(KeyCode::Down).press(KeyCode::Enter);
+        stage
+    };
+    quit_viewing_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3v").prefix().keys("q");
+        stage
+    };
+    connect_link_lost: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("1").lost();
+        stage
+    };
+    diagnostics_link_lost: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("s").wait(2000).bytes(b"Diagnostics\r\n Supply Voltage: 24.0 V\r\n").wait(1500).lost();
+        stage
+    };
+    diagnostics_without_answer: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("s").wait(60_000);
+        stage
+    };
+    recordings_link_lost: |size| {
+        let mut stage = Stage::connected(size).with_recordings();
+        stage.lost();
+        stage
+    };
+    bench_link_lost: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("emu:axtc4co").bytes(MENU).wait(3000).keys("9o").lost();
+        stage
+    };
+    help_link_lost: |size| {
+        let mut stage = Stage::connected(size);
+        stage.press(KeyCode::F(1)).lost();
+        stage
+    };
+    dictionary_refused: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter);
+        let reason = "not in the operational state".to_owned();
+        stage.finished(Outcome::Refused { job: Job::ReadDictionary, reason, heard: None });
+        stage
+    };
+    dictionary_incomplete: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter);
+        let at = ObjectAddress::new(0x1001, 0);
+        let entry = ReadEntry { at, value: Some(Value::Unsigned8(0)), text: "Error Register = 0".into(), span: Span::default(), known: true };
+        let reading = DictionaryReading { entries: vec![entry], complete: false, unrecognised_lines: 0 };
+        stage.finished(Outcome::DictionaryRead(Box::new(reading)));
+        stage
+    };
+    stream_refused: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("6t").press(KeyCode::Enter);
+        stage.finished(Outcome::Refused { job: Job::StreamOn, reason: "invalid period".into(), heard: None });
+        stage
+    };
+    stream_late_while_exporting: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6e").press(KeyCode::Enter).wait(10_000);
+        stage
+    };
+    overview_with_limits: |size| {
+        let mut stage = Stage::with_dictionary(size).with_rows();
+        stage.keys("2").press(KeyCode::Down);
+        stage
+    };
+    recording_over: |size| {
+        let mut stage = Stage::connected(size);
+        stage.input(Input::Unrecorded("cannot write /home/user/a.cast: no space left on device".into()));
         stage
     };
     dictionary_of_no_unit: |size| {
@@ -735,9 +903,26 @@ fn every_screen_survives_every_size() {
 
 #[test]
 fn every_question_survives_every_size_it_is_drawn_at() {
-    for keys in ["t", "d", "v"] {
-        let mut stage = Stage::connected(SMALL);
-        stage.keys(keys);
+    let questions: [(&str, fn() -> Stage); 15] = [
+        ("Switch the data stream on", || typed(Stage::connected(SMALL), "t")),
+        ("Type Yes", || typed(Stage::connected(SMALL), "d")),
+        ("View the object", || typed(Stage::connected(SMALL), "v")),
+        ("label", || pressed(Stage::in_loader(SMALL, None).with_image(good_image()), KeyCode::Enter)),
+        ("Password", || pressed(Stage::connected(SMALL).with_image(good_image()), KeyCode::Enter)),
+        ("Opening", || pressed(Stage::with_ports(SMALL), KeyCode::Enter)),
+        ("Connect to", || typed(Stage::with_ports(SMALL), "p")),
+        ("╭ Find", || typed(Stage::with_dictionary(SMALL), "/")),
+        ("Image file", || typed(Stage::connected(SMALL).picking(), "p")),
+        ("CSV", || typed(Stage::streaming(SMALL), "6e")),
+        ("Write the object", || typed(Stage::with_dictionary(SMALL), "e")),
+        ("Compare with", || typed(Stage::with_dictionary(SMALL), "w")),
+        ("Cancel the upload", || pressed(Stage::loading(SMALL), KeyCode::Esc)),
+        ("being loaded", || typed(Stage::loading(SMALL), "q")),
+        ("Close the link", || typed(Stage::loading(SMALL), "1x")),
+    ];
+    for (words, question) in questions {
+        let mut stage = question();
+        assert!(stage.shows(words), "{words}: {}", stage.picture());
         for columns in 70..100 {
             for rows in 20..30 {
                 stage.size = (columns, rows);
@@ -745,6 +930,16 @@ fn every_question_survives_every_size_it_is_drawn_at() {
             }
         }
     }
+}
+
+fn typed(mut stage: Stage, keys: &str) -> Stage {
+    stage.keys(keys);
+    stage
+}
+
+fn pressed(mut stage: Stage, code: KeyCode) -> Stage {
+    stage.press(code);
+    stage
 }
 
 #[test]
@@ -762,8 +957,12 @@ fn connecting_asks_the_unit_who_it_is() {
 
 #[test]
 fn the_link_given_at_the_start_is_opened_at_once() {
-    let mut app =
-        App::new(Options { link: Some("emu:axtc4co".into()), directory: "/".into(), colour: true, size: SMALL });
+    let mut app = App::new(Options {
+        link: Some("emu:axtc4co".into()),
+        directory: "/".into(),
+        palette: Palette::Dark,
+        size: SMALL,
+    });
     assert_eq!(app.start(), [Effect::ListPorts, Effect::ListRecordings, Effect::OpenLink("emu:axtc4co".into())]);
 }
 
@@ -927,6 +1126,110 @@ fn leaving_with_the_view_open_offers_to_close_it() {
 }
 
 #[test]
+fn a_view_opened_by_a_typed_key_is_asked_about_on_every_way_out_and_closed() {
+    for way in ["q", "1x"] {
+        let mut stage = Stage::connected(SMALL);
+        stage.keys("3v").sent();
+        assert!(stage.shows("halted by V"), "{}", stage.picture());
+        stage.prefix().keys("2").keys(way);
+        assert!(stage.shows("The unit's view is open"), "{way}: {}", stage.picture());
+        stage.keys("y");
+        let effects = stage.asked();
+        assert_eq!(effects.first(), Some(&Effect::Transmit(Transmit::open(*b"x"))), "{way}");
+        assert!(matches!(effects.last(), Some(Effect::Quit | Effect::CloseLink)), "{way}: {effects:?}");
+    }
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3vx").prefix().keys("q");
+    assert_eq!(stage.asked().last(), Some(&Effect::Quit), "it was closed again: nothing to ask");
+}
+
+#[test]
+fn a_silent_unit_holds_a_signal_for_two_seconds_and_q_for_none() {
+    let reading = || {
+        let mut stage = Stage::connected(SMALL);
+        stage.keys("v").press(KeyCode::Enter).wait(200).asked();
+        stage.input(Input::Signal);
+        assert!(!stage.effects.contains(&Effect::Quit), "the unit is left in order first");
+        stage
+    };
+    let mut stage = reading();
+    stage.wait(1999);
+    assert!(!stage.effects.contains(&Effect::Quit));
+    stage.wait(1);
+    assert!(stage.effects.contains(&Effect::Quit));
+    let mut stage = reading();
+    assert!(stage.shows("Leaving the unit in order"), "{}", stage.picture());
+    stage.keys("q");
+    assert!(stage.effects.contains(&Effect::Quit));
+    let mut stage = reading();
+    stage.lost();
+    assert!(stage.effects.contains(&Effect::Quit), "nobody is there to wait for");
+}
+
+#[test]
+fn another_link_is_opened_once_the_first_has_been_left_in_order() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3v").prefix().keys("1").press(KeyCode::Down).press(KeyCode::Enter);
+    stage.asked();
+    assert!(stage.shows("Then /dev/ttyUSB1 is opened."), "{}", stage.picture());
+    stage.keys("y");
+    let opens = Effect::OpenLink("/dev/ttyUSB1".into());
+    assert_eq!(stage.asked(), [Effect::Transmit(Transmit::open(*b"x")), Effect::CloseLink, opens]);
+}
+
+#[test]
+fn ctrl_z_stops_the_program_but_not_in_the_middle_of_a_job() {
+    let ctrl_z = |stage: &mut Stage| {
+        stage.asked();
+        stage.key(KeyCode::Char('z'), KeyModifiers::CONTROL).asked()
+    };
+    assert_eq!(ctrl_z(&mut Stage::connected(SMALL)), [Effect::Suspend]);
+    assert_eq!(ctrl_z(&mut typed(Stage::connected(SMALL), "t")), [Effect::Suspend], "also in front of a question");
+    let mut stage = Stage::loading(SMALL);
+    assert_eq!(ctrl_z(&mut stage), []);
+    assert!(stage.shows("Not stopped: a job runs."), "{}", stage.picture());
+    let mut stage = typed(Stage::connected(SMALL), "3");
+    assert_eq!(ctrl_z(&mut stage), [Effect::Transmit(Transmit::open([0x1a]))], "the bare terminal passes it on");
+}
+
+#[test]
+fn an_upload_is_noted_once_it_is_taken_and_before_its_first_byte() {
+    let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO")).with_image(good_image());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("Password for loading software"), "the note spares the label: {}", stage.picture());
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    stage.press(KeyCode::Enter).keys("AXIO-2010").asked();
+    stage.press(KeyCode::Enter);
+    let effects = stage.asked();
+    let note = effects
+        .iter()
+        .position(|effect| matches!(effect, Effect::UploadBegins { product, .. } if product == "AXTC4CO"));
+    let first = effects.iter().position(|effect| matches!(effect, Effect::Transmit(_)));
+    assert!(note.is_some() && (first.is_none() || note < first), "{effects:?}");
+}
+
+#[test]
+fn the_end_of_every_finding_can_be_read() {
+    let facts = bad_image();
+    let last = facts.defects.last().and_then(|text| text.split_whitespace().last()).expect("findings").to_owned();
+    let mut stage = Stage::connected(SMALL).with_image(facts.clone());
+    let mut seen = stage.picture();
+    for _ in 0..200 {
+        stage.press(KeyCode::Down);
+        seen.push_str(&stage.picture());
+    }
+    for defect in &facts.defects {
+        for word in defect.split_whitespace() {
+            assert!(seen.contains(word), "no '{word}' of '{defect}'");
+        }
+    }
+    assert!(stage.shows(&last), "{}", stage.picture());
+    let end = stage.picture();
+    stage.press(KeyCode::Up);
+    assert_ne!(stage.picture(), end, "one step back is one line");
+}
+
+#[test]
 fn defaults_are_restored_only_after_yes_written_like_this() {
     let mut stage = Stage::connected(SMALL);
     stage.sent();
@@ -1035,7 +1338,7 @@ fn folders_are_walked_and_the_way_back_finds_the_folder_again() {
     stage.input(Input::FilesListed { directory: "/home/service/images/bad".into(), entries: Ok(Vec::new()) });
     stage.press(KeyCode::Esc);
     assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images".into())]);
-    let bad = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, modified: None };
+    let bad = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, begins: Vec::new(), modified: None };
     stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(vec![bad]) });
     assert!(stage.shows("› bad/"));
 }
@@ -1076,4 +1379,103 @@ fn a_signal_ends_the_program_without_a_question() {
     stage.keys("m").asked();
     stage.input(Input::Signal);
     assert_eq!(stage.asked(), [Effect::Quit]);
+}
+
+/// The screens with something chosen, and what stands on the chosen row.
+fn scenes_with_a_choice() -> [(&'static str, Stage); 4] {
+    let mut with_ports = Stage::with_ports(SMALL);
+    with_ports.press(KeyCode::Down);
+    [
+        ("› /dev/ttyUSB1", with_ports),
+        ("› bad/", pressed(Stage::connected(SMALL).picking(), KeyCode::Down)),
+        ("› ", pressed(Stage::with_dictionary(SMALL), KeyCode::Down)),
+        ("› 2026-01-31", Stage::with_ports(SMALL).with_recordings()),
+    ]
+}
+
+#[test]
+fn what_is_chosen_is_seen_without_colours_and_colours_are_those_of_the_ground() {
+    use ratatui::style::{Color, Modifier};
+    for (words, mut stage) in scenes_with_a_choice() {
+        let colours_of = |stage: &Stage| {
+            let buffer = stage.draw().buffer().clone();
+            let mut colours: Vec<Color> = buffer.content().iter().flat_map(|cell| [cell.fg, cell.bg]).collect();
+            colours.dedup();
+            colours.retain(|colour| *colour != Color::Reset);
+            colours
+        };
+        assert_eq!(colours_of(&stage), [], "{words}: none without colours");
+        let picture = stage.picture();
+        let row = picture.lines().position(|line| line.contains(words)).expect(words);
+        let buffer = stage.draw().buffer().clone();
+        let cells = &buffer.content()[row * usize::from(SMALL.0)..][4..20];
+        assert!(cells.iter().all(|cell| cell.modifier.contains(Modifier::REVERSED)), "{words} has its bar");
+        stage.press(KeyCode::F(2));
+        let dark = colours_of(&stage);
+        stage.press(KeyCode::F(2));
+        let light = colours_of(&stage);
+        assert!(dark.contains(&Color::Cyan) && !light.is_empty(), "{words}: {dark:?} {light:?}");
+        let pale = [Color::Yellow, Color::Cyan, Color::White, Color::Gray];
+        assert!(!light.iter().any(|colour| pale.contains(colour)), "{words}: {light:?} on a light ground");
+        assert!(stage.shows("Colours: for a light ground."), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn a_link_that_takes_long_to_open_is_given_up_by_esc() {
+    let mut stage = pressed(Stage::with_ports(SMALL), KeyCode::Enter);
+    stage.asked();
+    assert!(stage.shows("Opening /dev/ttyUSB0.") && stage.shows("Esc do not wait"), "{}", stage.picture());
+    stage.press(KeyCode::Esc);
+    assert_eq!(stage.asked(), [Effect::CloseLink]);
+    stage.press(KeyCode::Down).press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB1".into())], "another can be chosen");
+}
+
+#[test]
+fn a_click_chooses_an_entry_of_a_list_and_a_second_one_does_it() {
+    for size in [SMALL, LARGE] {
+        let mut stage = Stage::with_ports(size);
+        stage.asked();
+        stage.click("/dev/ttyUSB1");
+        assert_eq!((stage.asked(), stage.shows("› /dev/ttyUSB1")), (Vec::new(), true), "{}", stage.picture());
+        stage.click("/dev/ttyUSB1");
+        assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB1".into())]);
+        let mut stage = Stage::connected(size).picking();
+        stage.asked();
+        stage.click("bad/").click("bad/");
+        assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images/bad".into())]);
+        let mut stage = Stage::with_ports(size).with_recordings();
+        stage.asked();
+        stage.click("2026-01-30").click("2026-01-30");
+        assert_eq!(stage.asked(), [Effect::OpenLink("replay:/home/user/2026-01-30 09:15:00.cast".into())]);
+        let mut stage = Stage::with_dictionary(size);
+        stage.click("1003:00");
+        assert!(
+            stage.picture().lines().any(|line| line.contains("› ") && line.contains("1003:00")),
+            "{}",
+            stage.picture()
+        );
+    }
+}
+
+#[test]
+fn a_break_is_sent_by_its_key_and_stands_between_the_lines_and_in_the_recording() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").asked();
+    stage.prefix().keys("b");
+    assert_eq!(stage.asked(), [Effect::Break]);
+    stage.input(Input::BreakSent(Ok(())));
+    assert_eq!(stage.asked(), [Effect::Mark("break sent".into())]);
+    assert!(stage.shows("── break sent"), "{}", stage.picture());
+    stage.input(Input::BreakSent(Err("this link cannot send one".into())));
+    assert!(stage.shows("No break sent: this link cannot send one."), "{}", stage.picture());
+}
+
+#[test]
+fn long_records_are_chosen_with_a_key_and_the_plan_says_so() {
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    assert!(stage.shows("K pack") && !stage.shows("in long records"), "{}", stage.picture());
+    stage.keys("k");
+    assert!(stage.shows("in long records"), "{}", stage.picture());
 }
