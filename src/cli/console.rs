@@ -11,6 +11,7 @@ use crate::host::clock::Clock;
 use crate::host::journal::{Journal, Note};
 use crate::host::link::{Connection, LinkSpec, Options};
 use crate::host::ports;
+use crate::image::DefectId;
 use crate::time::Instant;
 use crate::tui::run::{End, World};
 use crate::tui::{self, Failure, ImageFacts, Palette};
@@ -74,9 +75,9 @@ fn failure(error: &CliError) -> Failure {
     Failure { text: error.to_string(), hints: error.hints.clone() }
 }
 
-fn check(path: PathBuf) -> ImageFacts {
-    match image_cli::read(&path, None, &[]) {
-        Ok(report) => ImageFacts::of_report(path, &report),
+fn check(path: PathBuf, allow: &[DefectId]) -> ImageFacts {
+    match image_cli::read(&path, None, allow) {
+        Ok(report) => ImageFacts::of_report(path, &report, allow),
         Err(error) => ImageFacts::unreadable(path, error.to_string()),
     }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::input::Playback;
 use super::popup::Question;
 use super::screens::ScreenId;
+use crate::image::DefectId;
 use crate::secret::Secret;
 use crate::session::Command;
 
@@ -28,6 +29,8 @@ pub enum Action {
     ListFiles(PathBuf),
     /// Read and check an image.
     CheckImage(PathBuf),
+    /// Check the image once more, and allow this error.
+    Allow(DefectId),
     /// Put a question.
     Ask(Question),
     /// Ask the session.

@@ -8,7 +8,7 @@ use ratatui::crossterm::event::Event as TerminalEvent;
 
 use crate::device;
 use crate::endpoint::Transmit;
-use crate::image::{CheckedImage, Report, Severity};
+use crate::image::{CheckedImage, DefectId, Report, Severity};
 use crate::time::Duration;
 use crate::version::Version;
 
@@ -102,7 +102,12 @@ pub enum Effect {
     /// List a folder. Answered by [`Input::FilesListed`].
     ListFiles(PathBuf),
     /// Read and check an image file. Answered by [`Input::ImageChecked`], also when the file cannot be read.
-    CheckImage(PathBuf),
+    CheckImage {
+        /// Which.
+        path: PathBuf,
+        /// Errors in spite of which it may be sent.
+        allow: Vec<DefectId>,
+    },
     /// Write a new file. One that is there already is left alone, and that is an error. Answered by
     /// [`Input::FileWritten`].
     CreateFile {
@@ -292,14 +297,24 @@ pub struct ImageFacts {
     pub time: Duration,
     /// Every defect in one line each, errors first: `line 12, column 43: ...`.
     pub defects: Vec<String>,
+    /// Which errors stand, each once.
+    pub errors: Vec<DefectId>,
+    /// Errors in spite of which it may be sent, because the user says so.
+    pub allowed: Vec<DefectId>,
     /// The image itself, if it may be sent.
     pub checked: Option<CheckedImage>,
 }
 
 impl ImageFacts {
-    /// What a check has found; errors come first.
-    pub fn of_report(path: PathBuf, report: &Report) -> Self {
+    /// What a check has found that allowed these errors; the others come first.
+    pub fn of_report(path: PathBuf, report: &Report, allow: &[DefectId]) -> Self {
         let identity = report.facts.identity.as_ref();
+        let mut errors: Vec<DefectId> = Vec::new();
+        for defect in report.defects.iter().filter(|defect| defect.severity == Severity::Error) {
+            if !errors.contains(&defect.id) {
+                errors.push(defect.id);
+            }
+        }
         let mut defects: Vec<_> = report.defects.iter().collect();
         defects.sort_by_key(|defect| defect.severity != Severity::Error);
         let mut defects: Vec<String> = defects
@@ -313,9 +328,11 @@ impl ImageFacts {
             defects.push(format!("{} more defects are not listed", report.unlisted()));
         }
         // What does not say what it is cannot be compared with the unit, nor with its banner.
-        let ok = report.is_ok() && identity.is_some();
+        let ok = report.is_ok() && (identity.is_some() || allow.contains(&DefectId::NoIdentity));
         if report.is_ok() && !ok {
-            defects.insert(0, "error: only the command line sends an image that does not say what it is".into());
+            errors.push(DefectId::NoIdentity);
+            let id = DefectId::NoIdentity;
+            defects.insert(0, format!("error {id}: nobody could tell afterwards what the unit runs"));
         }
         ImageFacts {
             path,
@@ -326,6 +343,8 @@ impl ImageFacts {
             characters: report.facts.characters as usize,
             time: device::transfer_time(report.facts.characters, report.facts.data_bytes),
             defects,
+            errors,
+            allowed: allow.to_vec(),
             checked: report.image().filter(|_| ok),
         }
     }
@@ -341,6 +360,8 @@ impl ImageFacts {
             characters: 0,
             time: Duration::ZERO,
             defects: vec![why],
+            errors: Vec::new(),
+            allowed: Vec::new(),
             checked: None,
         }
     }

@@ -78,6 +78,8 @@ pub enum Cmd {
     Compare,
     /// Send long records.
     Pack,
+    /// Send in spite of an error.
+    Allow,
     /// Hold the line low for a moment.
     Break,
     /// Play faster.

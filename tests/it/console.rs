@@ -103,11 +103,11 @@ impl Desk {
                 Effect::ListFiles(directory) => {
                     self.input(Input::FilesListed { directory, entries: Ok(Vec::new()) });
                 }
-                Effect::CheckImage(path) => {
+                Effect::CheckImage { path, allow } => {
                     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
                     let file = new_image();
-                    let report = axcon::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
-                    self.input(Input::ImageChecked(Box::new(ImageFacts::of_report(path, &report))));
+                    let report = axcon::image::check(file.as_slice(), None, &targets, None, &allow).expect("a slice");
+                    self.input(Input::ImageChecked(Box::new(ImageFacts::of_report(path, &report, &allow))));
                 }
                 Effect::Quit => self.over = true,
                 Effect::CreateFile { path, bytes } => {

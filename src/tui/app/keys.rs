@@ -219,6 +219,7 @@ impl App {
             | Cmd::Only
             | Cmd::Compare
             | Cmd::Pack
+            | Cmd::Allow
             | Cmd::Break
             | Cmd::Faster
             | Cmd::Slower

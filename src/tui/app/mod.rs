@@ -329,7 +329,12 @@ impl App {
             Action::ListFiles(directory) => effects.push(Effect::ListFiles(directory)),
             Action::CheckImage(path) => {
                 self.load.check(path.clone());
-                effects.push(Effect::CheckImage(path));
+                effects.push(Effect::CheckImage { path, allow: self.load.allowed().to_vec() });
+            }
+            Action::Allow(error) => {
+                if let Some(action) = self.load.allow(error) {
+                    self.perform(action, effects);
+                }
             }
             Action::Ask(question) => self.ask(question),
             Action::Command(command) => {

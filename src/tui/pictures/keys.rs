@@ -6,6 +6,7 @@ use ratatui::crossterm::event::{
 
 use super::stage::*;
 use crate::endpoint::Transmit;
+use crate::image::DefectId;
 use crate::time::Duration;
 use crate::tui::{
     App, Effect, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, Pace, Palette, Playback, Playing,
@@ -547,4 +548,25 @@ fn long_records_are_chosen_with_a_key_and_the_plan_says_so() {
     assert!(stage.shows("K pack") && !stage.shows("in long records"), "{}", stage.picture());
     stage.keys("k");
     assert!(stage.shows("in long records"), "{}", stage.picture());
+}
+
+#[test]
+fn an_error_is_allowed_by_its_name_in_one_file_only_and_the_plan_says_so() {
+    let mut stage = Stage::connected(SMALL).with_image(bad_image());
+    stage.keys("obad-character").press(KeyCode::Enter);
+    assert!(stage.shows("part of the program unknown"), "{}", stage.picture());
+    let faulty = ImageFacts { ok: false, checked: None, errors: vec![DefectId::IdentityCrc], ..good_image() };
+    let path = faulty.path.clone();
+    let mut stage = Stage::connected(SMALL).with_image(faulty);
+    assert!(stage.shows("O override"), "{}", stage.picture());
+    stage.asked();
+    stage.keys("o");
+    assert!(stage.shows("waits in its loader") && stage.shows("identity-crc"), "{}", stage.picture());
+    stage.keys("identity-crc").press(KeyCode::Enter);
+    let allow = vec![DefectId::IdentityCrc];
+    assert_eq!(stage.asked(), [Effect::CheckImage { path: path.clone(), allow: allow.clone() }]);
+    stage.input(Input::ImageChecked(Box::new(ImageFacts { allowed: allow, ..good_image() })));
+    assert!(stage.shows("passed in spite of identity-crc"), "{}", stage.picture());
+    stage.keys("p/other.S").press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::CheckImage { path: "/other.S".into(), allow: Vec::new() }]);
 }

@@ -320,7 +320,7 @@ pub(super) fn good_image() -> ImageFacts {
     let file = make::make(&recipe).expect("an image of the usual size");
     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
     let report = crate::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
-    ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report)
+    ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report, &[])
 }
 
 /// What the checker says of a good file in which an editor has replaced digits and cut the end off.
@@ -336,7 +336,7 @@ pub(super) fn bad_image() -> ImageFacts {
     let file: String = text.lines().take(2000).enumerate().map(spoil).collect();
     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
     let report = crate::image::check(file.as_bytes(), None, &targets, None, &[]).expect("a slice");
-    ImageFacts::of_report("/home/service/images/bad.S".into(), &report)
+    ImageFacts::of_report("/home/service/images/bad.S".into(), &report, &[])
 }
 
 pub(super) fn progress() -> Progress {

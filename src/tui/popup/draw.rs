@@ -205,6 +205,21 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             },
             vec![("Enter", "restore"), ("Esc", "back")],
         ),
+        Question::Allow { typed: field, errors, complaint } => (
+            "Send in spite of an error?",
+            {
+                let names: Vec<&str> = errors.iter().map(|error| error.name()).collect();
+                let named = format!("Type the name of one: {}.", names.join(", "));
+                let consequence = "What is sent is not what was built, or not for this unit. It may not run, and the unit \
+                                   then waits in its loader, without scanning and CAN, for a file that is sound.";
+                let mut rows = paragraphs(&[consequence, &named], columns);
+                rows.push(Line::default());
+                rows.push(typed(theme, "", field.text(), columns));
+                rows.extend(complain(theme, *complaint, columns));
+                rows
+            },
+            vec![("Enter", "allow it and check again"), ("Esc", "back")],
+        ),
         Question::Label { typed: field, image, complaint } => (
             "Which product is the unit?",
             {

@@ -13,6 +13,7 @@ use super::input::{Failure, ImageFacts};
 use super::view::View;
 use super::widgets::field::{PasswordField, TextField};
 use super::widgets::format;
+use crate::image::DefectId;
 use crate::session::{Command, Phase};
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
@@ -84,6 +85,15 @@ pub enum Question {
     Defaults {
         /// What has been typed.
         typed: TextField,
+        /// What is wrong with it.
+        complaint: Option<&'static str>,
+    },
+    /// In spite of which error shall the image be sent?
+    Allow {
+        /// What has been typed.
+        typed: TextField,
+        /// Which errors there are.
+        errors: Vec<DefectId>,
         /// What is wrong with it.
         complaint: Option<&'static str>,
     },
@@ -222,6 +232,11 @@ impl Question {
         }
     }
 
+    /// Asks in spite of which of these errors an image shall be sent.
+    pub fn allow(errors: Vec<DefectId>) -> Question {
+        Question::Allow { typed: TextField::default(), errors, complaint: None }
+    }
+
     /// Asks for what an upload still needs.
     pub fn start_load(view: &View, facts: &ImageFacts) -> Question {
         if view.needs_label() {
@@ -312,6 +327,16 @@ impl Question {
                 *complaint = Some("Only the word Yes, written like this, starts it.");
                 Answer::Stay
             }
+            Question::Allow { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
+            Question::Allow { typed, errors, complaint } => {
+                let named = errors.iter().find(|error| error.name() == typed.text().trim());
+                *complaint = Some(match named {
+                    Some(error) if error.can_be_allowed() => return Answer::Act(Action::Allow(*error)),
+                    Some(_) => "It leaves part of the program unknown: there is nothing to send.",
+                    None => "No such error stands in the findings.",
+                });
+                Answer::Stay
+            }
             Question::Label { typed, image, complaint } => {
                 let label = typed.text().trim().to_owned();
                 if label.is_empty() {
@@ -345,6 +370,7 @@ impl Question {
             }
             Question::Defaults { typed: field, complaint }
             | Question::Label { typed: field, complaint, .. }
+            | Question::Allow { typed: field, complaint, .. }
             | Question::Temperature { typed: field, complaint, .. } => {
                 *complaint = None;
                 field.push(character);
@@ -409,6 +435,7 @@ impl Question {
             | Question::Order(field)
             | Question::Temperature { typed: field, .. }
             | Question::Defaults { typed: field, .. }
+            | Question::Allow { typed: field, .. }
             | Question::Label { typed: field, .. } => Some(field),
             Question::Password { .. }
             | Question::View

@@ -30,6 +30,7 @@ use crate::host::replay::{Recording, RecordingError};
 use crate::host::signal::{self, Signals};
 use crate::host::socket::Dialled;
 use crate::host::terminal::{self, Screen};
+use crate::image::DefectId;
 use crate::time::{Duration, Instant};
 
 /// Least time between two pictures that no key asked for: thirty a second.
@@ -57,8 +58,8 @@ pub struct World {
     pub explain: fn(LinkError) -> Failure,
     /// Says why a recording cannot be read.
     pub unreadable: fn(RecordingError) -> Failure,
-    /// Reads and checks an image file.
-    pub check: fn(PathBuf) -> ImageFacts,
+    /// Reads and checks an image file, and allows these errors.
+    pub check: fn(PathBuf, &[DefectId]) -> ImageFacts,
     /// Notes that an upload of this product begins on this link, or (`None`) that the unit on it runs.
     pub note: fn(&str, Option<(&str, &str)>),
     /// What is noted of an upload on this link that has not ended well: the unit's product, and the image's file.
@@ -347,9 +348,9 @@ impl Console {
                     let sent = sent.unwrap_or(Ok(())).map_err(|error| error.to_string());
                     leaves |= self.handle(Input::BreakSent(sent));
                 }
-                Effect::CheckImage(path) => {
+                Effect::CheckImage { path, allow } => {
                     let check = self.world.check;
-                    self.ask(move || Input::ImageChecked(Box::new(check(path))));
+                    self.ask(move || Input::ImageChecked(Box::new(check(path, &allow))));
                 }
                 Effect::UploadBegins { link, product, image } => (self.world.note)(&link, Some((&product, &image))),
                 Effect::UploadEnds { link } => (self.world.note)(&link, None),

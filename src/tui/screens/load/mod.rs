@@ -21,6 +21,7 @@ use report::{findings, findings_room, objections, report};
 use verdict::verdict;
 
 use super::Scene;
+use crate::image::DefectId;
 use crate::session::Job;
 use crate::tui::action::Action;
 use crate::tui::input::{FileEntry, ImageFacts};
@@ -61,6 +62,12 @@ pub const BINDINGS: &[Binding] = &[
         long: "send long records: the same words in a sixth less time",
     },
     Binding {
+        keys: &[Press::Plain(KeyCode::Char('o'))],
+        cmd: Cmd::Allow,
+        short: "",
+        long: "send in spite of an error, by its name",
+    },
+    Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
         cmd: Cmd::Refresh,
         short: "read again",
@@ -78,6 +85,8 @@ const OTHER: Binding = footer(ESC, Cmd::Back, "other file");
 /// What the footer shows at each stage; the keys themselves are those of [`BINDINGS`].
 const CHECKING_KEYS: &[Binding] = &[OTHER];
 const REPORT_KEYS: &[Binding] = &[FINDINGS, OTHER, AGAIN];
+const REFUSED_KEYS: &[Binding] =
+    &[FINDINGS, OTHER, AGAIN, footer(&[Press::Plain(KeyCode::Char('o'))], Cmd::Allow, "override")];
 const READY_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), PACK, OTHER, AGAIN];
 const READY_KEYS_WITH_FINDINGS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), PACK, FINDINGS, OTHER];
 const RUNNING_KEYS: &[Binding] = &[footer(ESC, Cmd::Back, "cancel")];
@@ -96,6 +105,8 @@ pub struct Load {
     stage: Stage,
     /// Long records are sent instead of the file's own.
     packed: bool,
+    /// Errors in spite of which the file may be sent.
+    allow: Vec<DefectId>,
 }
 
 /// What is in the folder.
@@ -119,7 +130,7 @@ enum Stage {
 impl Load {
     /// Starts in a folder.
     pub fn new(directory: PathBuf) -> Self {
-        Load { directory, listing: Listing::Unread, cursor: 0, stage: Stage::Picking, packed: false }
+        Load { directory, listing: Listing::Unread, cursor: 0, stage: Stage::Picking, packed: false, allow: Vec::new() }
     }
 
     /// The screen comes to the front: a folder that has never been read is read now.
@@ -147,8 +158,26 @@ impl Load {
         self.packed
     }
 
-    /// Checks a file.
+    /// Errors in spite of which the file may be sent.
+    pub fn allowed(&self) -> &[DefectId] {
+        &self.allow
+    }
+
+    /// Allows one more error, and checks the file again.
+    pub fn allow(&mut self, error: DefectId) -> Option<Action> {
+        let path = self.image()?.path.clone();
+        let action = self.check(path);
+        self.allow.push(error);
+        Some(action)
+    }
+
+    /// Checks a file. What was allowed in another one is not allowed in it.
     pub fn check(&mut self, path: PathBuf) -> Action {
+        if self.image().is_none_or(|facts| facts.path != path)
+            && !matches!(&self.stage, Stage::Checking(of) if *of == path)
+        {
+            self.allow.clear();
+        }
         self.stage = Stage::Checking(path.clone());
         Action::CheckImage(path)
     }
@@ -190,6 +219,9 @@ impl Load {
                     }
                     Cmd::Type => return Some(Action::Ask(Question::image(&self.directory))),
                     Cmd::Pack => self.packed = !self.packed,
+                    Cmd::Allow if !facts.errors.is_empty() => {
+                        return Some(Action::Ask(Question::allow(facts.errors.clone())));
+                    }
                     Cmd::Accept if objections(facts, view).is_empty() => {
                         return Some(Action::Ask(Question::start_load(view, facts)));
                     }
@@ -215,6 +247,7 @@ impl Load {
                 true => READY_KEYS,
                 false => READY_KEYS_WITH_FINDINGS,
             },
+            Stage::Report { facts, .. } if !facts.errors.is_empty() => REFUSED_KEYS,
             Stage::Report { .. } => REPORT_KEYS,
         }
     }

@@ -116,6 +116,10 @@ fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
         count => format!(", {} findings", format::grouped(count)),
     };
     match facts.ok {
+        true if !facts.allowed.is_empty() => {
+            let names: Vec<&str> = facts.allowed.iter().map(|id| id.name()).collect();
+            Span::styled(format!("passed in spite of {}{findings}", names.join(", ")), theme.warning())
+        }
         true => Span::styled(format!("passed{findings}"), theme.good()),
         false => Span::styled(format!("failed{findings}"), theme.bad()),
     }
