@@ -225,6 +225,21 @@ fn a_program_that_was_stopped_from_outside_takes_its_screen_again() {
 }
 
 #[test]
+fn a_recording_that_finds_no_room_is_told_and_stays_told() {
+    let world = World::new();
+    let menu = b"AXTC4CO V1.1.0\r\nV - view object dictionary\r\nT - toggle stream\r\nS - diagnostics\r\n";
+    let unit = Puppet::start(Box::new(|keys| if keys.contains(&b'm') { menu.repeat(200) } else { Vec::new() }));
+    // A file may not grow beyond some kB, as on a disk that is full.
+    let script = "trap '' XFSZ; ulimit -f 8; exec \"$@\"";
+    let args = ["-c", script, "sh", env!("CARGO_BIN_EXE_axcon"), "--record", "r.cast", "--port", unit.port()];
+    let mut screen = Screen::start(world.command_of(std::path::Path::new("/bin/sh"), &args), 24, 80);
+    let shown = screen.wait("connected, not recorded");
+    assert!(!shown.contains("rec "), "{shown}");
+    screen.keys("q");
+    assert_eq!(screen.wait_end(), Some(0));
+}
+
+#[test]
 fn a_hang_up_in_the_middle_of_the_dictionary_leaves_the_view() {
     for signal in [rustix::process::Signal::HUP, rustix::process::Signal::TERM] {
         let (world, unit) = (World::new(), silent_unit());

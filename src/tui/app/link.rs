@@ -201,8 +201,8 @@ impl App {
     /// What happens from now on is not in the recording. That stays in sight: who has to prove something later must know.
     pub(super) fn unrecorded(&mut self, now: Instant, why: String) {
         self.dirty = true;
-        self.scrollback.note(now, format!("not recorded any more: {}", visible::text(&why)));
-        self.view.tell(Tone::Bad, format!("Not recorded any more: {why}."));
+        self.scrollback.note(now, format!("not recorded from here on: {}", visible::text(&why)));
+        self.view.tell(Tone::Bad, format!("Not recorded: {why}."));
         (self.view.link.recording, self.view.link.unrecorded) = (None, Some(why));
     }
 
