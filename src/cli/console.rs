@@ -1,5 +1,6 @@
 //! `axcon` without a command: the console on the screen.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::mpsc::SyncSender;
 
@@ -9,9 +10,11 @@ use crate::host::Input;
 use crate::host::clock::Clock;
 use crate::host::journal::{Journal, Note};
 use crate::host::link::{Connection, LinkSpec, Options};
+use crate::host::ports;
+use crate::image::DefectId;
 use crate::time::Instant;
 use crate::tui::run::{End, World};
-use crate::tui::{self, Failure, ImageFacts};
+use crate::tui::{self, Failure, ImageFacts, Palette};
 
 /// Runs the console until the user leaves it.
 ///
@@ -24,7 +27,11 @@ pub fn run(global: &Global) -> Result<(), CliError> {
         link: link.map(|link| link.to_string()),
         baud: global.baud,
         recording: link::recording(global),
-        colour: std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty()),
+        noted: |link| {
+            journal(link).and_then(|(journal, key)| journal.note(&key)).map(|note| (note.product, note.image))
+        },
+        palette: palette(|name| std::env::var_os(name))?,
+        resolve,
         open,
         explain: |error| failure(&link::link_error(error)),
         unreadable: |error| failure(&link::recording_error(error)),
@@ -41,26 +48,43 @@ pub fn run(global: &Global) -> Result<(), CliError> {
     }
 }
 
-fn open(name: &str, baud: u32, clock: Clock, inputs: SyncSender<Input>) -> Result<Connection, Failure> {
-    let spec: LinkSpec = name.parse().map_err(|error| failure(&link::spec_error(error)))?;
-    Connection::open(&spec, Options { baud }, clock, inputs).map_err(|error| failure(&link::link_error(error)))
+/// `NO_COLOR` and `AXCON_THEME`, which says what the terminal's ground is; nobody can ask every terminal.
+fn palette(variable: impl Fn(&str) -> Option<OsString>) -> Result<Palette, CliError> {
+    if variable("NO_COLOR").is_some_and(|value| !value.is_empty()) {
+        return Ok(Palette::Mono);
+    }
+    let theme = variable("AXCON_THEME").unwrap_or_default().to_string_lossy().to_lowercase();
+    match theme.as_str() {
+        "" | "dark" => Ok(Palette::Dark),
+        "light" => Ok(Palette::Light),
+        "none" => Ok(Palette::Mono),
+        _ => Err(CliError::message(Kind::Usage, "AXCON_THEME may be dark, light or none")),
+    }
+}
+
+/// What a name typed on the screen means: the same as behind `--port`.
+fn resolve(name: &str) -> Result<LinkSpec, Failure> {
+    link::named(name, || ports::list().unwrap_or_default()).map_err(|error| failure(&error))
+}
+
+fn open(spec: &LinkSpec, baud: u32, clock: Clock, inputs: SyncSender<Input>) -> Result<Connection, Failure> {
+    Connection::open(spec, Options { baud }, clock, inputs).map_err(|error| failure(&link::link_error(error)))
 }
 
 fn failure(error: &CliError) -> Failure {
     Failure { text: error.to_string(), hints: error.hints.clone() }
 }
 
-fn check(path: PathBuf) -> ImageFacts {
-    match image_cli::read(&path, None, &[]) {
-        Ok(report) => ImageFacts::of_report(path, &report),
+fn check(path: PathBuf, allow: &[DefectId]) -> ImageFacts {
+    match image_cli::read(&path, None, allow) {
+        Ok(report) => ImageFacts::of_report(path, &report, allow),
         Err(error) => ImageFacts::unreadable(path, error.to_string()),
     }
 }
 
 /// The console says what it notes; that a note could not be written costs a question later, no more.
 fn note(link: &str, upload: Option<(&str, &str)>) {
-    let key = link.parse().ok().and_then(|spec: LinkSpec| link::journal_key(&spec));
-    let (Some(key), Some(journal)) = (key, Journal::of_user()) else { return };
+    let Some((journal, key)) = journal(link) else { return };
     let _ = match upload {
         Some((product, image)) => {
             let unix_seconds = Clock::start().wall(Instant::ZERO).as_second();
@@ -68,4 +92,26 @@ fn note(link: &str, upload: Option<(&str, &str)>) {
         }
         None => journal.end(&key),
     };
+}
+
+/// The journal of uploads, and what it calls the port behind a link; `None` where nothing is noted.
+fn journal(link: &str) -> Option<(Journal, String)> {
+    Some((Journal::of_user()?, link::journal_key(&resolve(link).ok()?)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_environment_chooses_the_colours() {
+        let chosen = |set: &[(&str, &str)]| {
+            palette(|name| set.iter().find(|(known, _)| *known == name).map(|(_, value)| value.into())).ok()
+        };
+        assert_eq!(chosen(&[]), Some(Palette::Dark));
+        assert_eq!(chosen(&[("AXCON_THEME", "Light")]), Some(Palette::Light));
+        assert_eq!(chosen(&[("AXCON_THEME", "light"), ("NO_COLOR", "1")]), Some(Palette::Mono));
+        assert_eq!(chosen(&[("NO_COLOR", "")]), Some(Palette::Dark), "empty is as if it were not set");
+        assert_eq!(chosen(&[("AXCON_THEME", "pink")]), None);
+    }
 }

@@ -22,22 +22,27 @@ use crate::telnet::Refusal;
 /// If the name makes no sense, or none was given and there is not exactly one candidate.
 pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
     match global.port() {
-        Some(text) => {
-            let spec: LinkSpec = text.parse().map_err(spec_error)?;
-            match &spec {
-                // What is no file may be an adapter's serial number: it stays the same, whatever the port is called today.
-                LinkSpec::Serial(path) if !path.exists() => {
-                    let named = by_serial_number(&ports::list().unwrap_or_default(), text)?;
-                    Ok(named.or_else(|| by_id(text)).unwrap_or(spec))
-                }
-                LinkSpec::Serial(_)
-                | LinkSpec::Emulated(_)
-                | LinkSpec::Replay(_)
-                | LinkSpec::Tcp(_)
-                | LinkSpec::Rfc2217(_) => Ok(spec),
-            }
-        }
+        Some(text) => named(text, || ports::list().unwrap_or_default()),
         None => only_port(ports::list().map_err(|error| CliError::new(Kind::PortNone, error))?),
+    }
+}
+
+/// The link with this name: a path or an address, the serial number of an adapter among the `found` ports, or the name
+/// the system gives a port by what it is.
+///
+/// # Errors
+/// If the name makes no sense, or several ports have that serial number.
+pub fn named(text: &str, found: impl FnOnce() -> Vec<Port>) -> Result<LinkSpec, CliError> {
+    let spec: LinkSpec = text.parse().map_err(spec_error)?;
+    match &spec {
+        // What is no file may be an adapter's serial number: it stays the same, whatever the port is called today.
+        LinkSpec::Serial(path) if !path.exists() => {
+            let named = by_serial_number(&found(), text)?;
+            Ok(named.or_else(|| by_id(text)).unwrap_or(spec))
+        }
+        LinkSpec::Serial(_) | LinkSpec::Emulated(_) | LinkSpec::Replay(_) | LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_) => {
+            Ok(spec)
+        }
     }
 }
 

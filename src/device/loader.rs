@@ -72,6 +72,20 @@ pub const ERASE_TIME: Duration = Duration::from_millis(20);
 /// Programming one word (public data sheet of the 56F83xx, likely the part).
 pub const PROGRAM_TIME: Duration = Duration::from_micros(20);
 
+/// How long an image of so many characters with so many bytes of data takes, from its first record to its last: the line
+/// at 115200 baud with ten bits a character, and what erasing and programming a page after the other takes besides. An
+/// estimate, for plans only.
+pub fn transfer_time(characters: u64, data_bytes: u64) -> Duration {
+    let line = Duration::from_secs_f64(characters as f64 / CHARACTERS_PER_SECOND);
+    let pages = u32::try_from(data_bytes.div_ceil(2 * PAGE_WORDS)).unwrap_or(u32::MAX);
+    line + (ERASE_TIME + PROGRAM_TIME * PAGE_WORDS as u32) * pages
+}
+
+/// What the units' line carries at 115200 baud, 8N1.
+const CHARACTERS_PER_SECOND: f64 = 11_520.0;
+/// Words of the smallest page any part of the family has.
+const PAGE_WORDS: u64 = 256;
+
 /// The longest that erasing all of the program flash can take: page by page, with the smallest pages any part of the
 /// family has. A part with larger sectors, or one that erases in bulk, is quicker.
 pub fn longest_erase(flash: &FlashMap) -> Duration {

@@ -2,6 +2,11 @@
 
 use std::io;
 use std::sync::mpsc::SyncSender;
+#[cfg(unix)]
+use std::sync::mpsc::TrySendError;
+
+#[cfg(unix)]
+use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM};
 
 use super::Input;
 
@@ -19,11 +24,19 @@ impl Signals {
     /// # Errors
     /// If the system refuses.
     pub fn start(inputs: SyncSender<Input>) -> io::Result<Self> {
-        use std::sync::mpsc::TrySendError;
+        Signals::listen(inputs, &[SIGINT, SIGTERM, SIGHUP])
+    }
 
-        use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    /// Starts listening, also for the signal that continues a stopped program: its screen is to be drawn anew.
+    ///
+    /// # Errors
+    /// If the system refuses.
+    pub fn of_screen(inputs: SyncSender<Input>) -> io::Result<Self> {
+        Signals::listen(inputs, &[SIGINT, SIGTERM, SIGHUP, SIGCONT])
+    }
 
-        let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    fn listen(inputs: SyncSender<Input>, numbers: &[i32]) -> io::Result<Self> {
+        let mut signals = signal_hook::iterator::Signals::new(numbers)?;
         let handle = signals.handle();
         let over = handle.clone();
         std::thread::Builder::new().name("signals".into()).spawn(move || {
@@ -62,4 +75,23 @@ impl Signals {
     pub fn start(_inputs: SyncSender<Input>) -> io::Result<Self> {
         Ok(Signals {})
     }
+
+    /// Nothing to listen to.
+    ///
+    /// # Errors
+    /// Never.
+    pub fn of_screen(inputs: SyncSender<Input>) -> io::Result<Self> {
+        Signals::start(inputs)
+    }
+}
+
+/// Whether a signal continues a program that was stopped.
+pub fn continues(signal: i32) -> bool {
+    #[cfg(unix)]
+    return signal == SIGCONT;
+    #[cfg(not(unix))]
+    return {
+        let _ = signal;
+        false
+    };
 }

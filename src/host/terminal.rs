@@ -84,16 +84,25 @@ impl Screen {
         Ok(())
     }
 
-    /// Gives the terminal back, stops the process as Ctrl-Z does, and takes the terminal again when it is continued.
-    /// Everything is drawn anew with the next frame.
+    /// Gives the terminal back, stops the process and those it was started with, as Ctrl-Z does elsewhere, and takes the
+    /// terminal again when they are continued. Where no shell could continue them the system ignores it.
     ///
     /// # Errors
     /// If the terminal refuses.
-    #[cfg(unix)]
     pub fn suspend(&mut self) -> io::Result<()> {
         restore();
+        #[cfg(unix)]
+        rustix::process::kill_current_process_group(rustix::process::Signal::TSTP)?;
+        self.retake()
+    }
+
+    /// Takes the terminal again, whatever a shell has made of it meanwhile. Everything is drawn anew with the next frame.
+    ///
+    /// # Errors
+    /// If the terminal refuses.
+    pub fn retake(&mut self) -> io::Result<()> {
+        restore();
         self.has_mouse = false;
-        rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::STOP)?;
         take_screen()?;
         // Not `clear`: that asks the terminal for the cursor, whose answer the key thread would take.
         let size = self.terminal.size()?;

@@ -320,8 +320,29 @@ pub struct Progress {
     pub address: u32,
     /// Time since the first record left.
     pub elapsed: Duration,
+    /// Time since the unit had taken the first data: behind the header a loader may erase for ten seconds, which says
+    /// nothing of how fast it takes data.
+    pub moving: Duration,
+    /// Characters it has taken since then.
+    pub moved: usize,
     /// How long the unit has held us by XOFF, if it does.
     pub held: Option<Duration>,
+}
+
+impl Progress {
+    /// Characters a second since the first data; 0 before.
+    pub fn rate(&self) -> f64 {
+        let seconds = self.moving.as_secs_f64();
+        if seconds > 0.0 { self.moved as f64 / seconds } else { 0.0 }
+    }
+
+    /// Time until all characters have been taken, where that can be told.
+    pub fn eta(&self) -> Option<Duration> {
+        let rest = self.bytes_total.saturating_sub(self.bytes) as f64;
+        let rate = self.rate();
+        // Less than a character a second is a unit that holds us: nobody knows for how long.
+        (rate >= 1.0).then(|| Duration::from_secs_f64(rest / rate))
+    }
 }
 
 /// Steps of an upload, in their order.
@@ -376,6 +397,49 @@ pub struct LoadReport {
     pub remark: Option<String>,
 }
 
+impl LoadReport {
+    /// What whoever started it should do now, by what is true of the unit; to follow other words.
+    pub fn advice(&self) -> &'static str {
+        match (self.verdict, self.unit) {
+            (Verdict::Done, _) => "nothing: the unit runs what was sent",
+            (Verdict::WrongApplication, _) => {
+                "do not put the unit into service: compare its version with the file's and send the right one; if it \
+                 comes out the same, keep the recording"
+            }
+            (Verdict::Refused, _) if self.product.is_none() => {
+                "look at the label of the unit and say which product it is"
+            }
+            (Verdict::Refused, _) if self.misfit == Some(DefectId::Downgrade) => {
+                "nothing was changed: take newer software, unless the old one is wanted"
+            }
+            (Verdict::Refused, _) => "nothing was changed: take the file that is made for this unit",
+            (Verdict::UnitRefused, UnitNow::Application) => {
+                "the unit runs what it ran: check the password, capital and small letters count, and try again"
+            }
+            (Verdict::NoAnswer, _) => "nothing was changed: look at power, cable and port, then try again",
+            (_, UnitNow::Loader) if self.records == 0 && self.found_in_loader => {
+                "nothing was sent: the unit waits in its loader, as it was found; send the file"
+            }
+            (_, UnitNow::Loader) if self.records == 0 => {
+                "nothing was sent: the unit waits in its loader with the software it had; send the file, or switch the \
+                 unit off and on"
+            }
+            (_, UnitNow::Loader) if self.phase == Phase::Finish && self.records == self.records_total => {
+                "the unit waits in its loader: send a file that is made for it; 'axcon image info' says what this one is"
+            }
+            (_, UnitNow::Loader) => {
+                "keep the unit powered and send the file again: it waits in its loader and has no complete software; a \
+                 power cycle does no harm, it comes back to the loader"
+            }
+            (_, UnitNow::Application) => "the unit runs its software: nothing was changed, try again",
+            (_, UnitNow::Unknown) => {
+                "switch the unit off and on, then send again: what it says at power-up tells whether software runs or a \
+                 loader waits"
+            }
+        }
+    }
+}
+
 /// Verdict on an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -404,4 +468,57 @@ pub enum UnitNow {
     Loader,
     /// Nobody can say.
     Unknown,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(verdict: Verdict, unit: UnitNow, records: usize) -> LoadReport {
+        LoadReport {
+            verdict,
+            phase: Phase::Transfer,
+            unit,
+            product: Some("AXTC4CO".into()),
+            version_before: None,
+            version_after: None,
+            records,
+            records_total: 3074,
+            address: None,
+            duration: Duration::ZERO,
+            what: String::new(),
+            heard: String::new(),
+            found_in_loader: false,
+            misfit: None,
+            remark: None,
+        }
+    }
+
+    #[test]
+    fn before_anything_was_sent_nobody_is_told_that_the_software_is_gone() {
+        let early = report(Verdict::Interrupted, UnitNow::Loader, 0).advice();
+        assert!(early.starts_with("nothing was sent") && !early.contains("no complete software"), "{early}");
+        let late = report(Verdict::Interrupted, UnitNow::Loader, 1).advice();
+        assert!(late.contains("no complete software"), "{late}");
+    }
+
+    #[test]
+    fn the_time_left_counts_from_the_first_data_and_not_from_the_erasing_before_it() {
+        let mut progress = Progress {
+            phase: Phase::Transfer,
+            records: 1,
+            records_total: 101,
+            bytes: 20,
+            bytes_total: 10_020,
+            address: 0,
+            elapsed: Duration::from_secs(10),
+            moving: Duration::ZERO,
+            moved: 0,
+            held: None,
+        };
+        assert_eq!((progress.rate(), progress.eta()), (0.0, None));
+        progress = Progress { bytes: 5_020, elapsed: Duration::from_secs(15), ..progress };
+        progress = Progress { moving: Duration::from_secs(5), moved: 5_000, ..progress };
+        assert_eq!((progress.rate(), progress.eta()), (1000.0, Some(Duration::from_secs(5))));
+    }
 }

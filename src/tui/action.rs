@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::input::Playback;
 use super::popup::Question;
 use super::screens::ScreenId;
+use crate::image::DefectId;
 use crate::secret::Secret;
 use crate::session::Command;
 
@@ -17,14 +18,19 @@ pub enum Action {
     Open(String),
     /// Open the lost link again.
     Reconnect,
-    /// Close the link.
-    Disconnect,
+    /// Close the link, the unit left in order.
+    Disconnect {
+        /// The link to open instead.
+        then: Option<String>,
+    },
     /// List the ports.
     ListPorts,
     /// List a folder.
     ListFiles(PathBuf),
     /// Read and check an image.
     CheckImage(PathBuf),
+    /// Check the image once more, and allow this error.
+    Allow(DefectId),
     /// Put a question.
     Ask(Question),
     /// Ask the session.
@@ -58,10 +64,10 @@ pub enum Action {
     ListRecordings,
     /// Play a recording differently.
     Play(Playback),
+    /// Hold the line low for a moment.
+    Break,
     /// Have something done to the emulated unit.
     Order(String),
-    /// Leave the program.
+    /// Leave the program, the unit left in order.
     Quit,
-    /// Leave the unit's view sub-menu first, then the program.
-    LeaveViewAndQuit,
 }

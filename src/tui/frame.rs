@@ -69,6 +69,7 @@ pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
     let link = match &view.link.state {
         LinkState::Closed => "not connected",
         LinkState::Opening => "opening",
+        LinkState::Open { read_only: false } if view.link.unrecorded.is_some() => "connected, not recorded",
         LinkState::Open { read_only: false } => "connected",
         LinkState::Open { read_only: true } => "read only",
         LinkState::Lost(_) => "link lost",

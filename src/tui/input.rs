@@ -6,11 +6,14 @@ use std::path::PathBuf;
 
 use ratatui::crossterm::event::Event as TerminalEvent;
 
+use crate::device;
 use crate::endpoint::{Arrived, Transmit};
-use crate::image::{CheckedImage, Report, Severity};
+use crate::image::{CheckedImage, DefectId, Report, Severity};
 use crate::time::Duration;
 use crate::version::Version;
 
+/// How much of a file tells whether it may be an image: a record's type and length, behind a byte order mark.
+pub const FIRST_BYTES: usize = 16;
 /// Largest text file that is read: a dump of the largest product has a tenth of it.
 pub const LARGEST_TEXT: u64 = 4 << 20;
 
@@ -39,6 +42,8 @@ pub enum Input {
     Sent(Vec<u8>),
     /// In a recording: a remark.
     Mark(String),
+    /// Nothing more of this connection is recorded, and why.
+    Unrecorded(String),
     /// The recording has ended, well or (why) not.
     RecordingOver(Option<Failure>),
     /// Answer to [`Effect::ListFiles`].
@@ -77,6 +82,8 @@ pub enum Input {
         /// What the unit had to say, or why it refused.
         answer: Result<Option<String>, String>,
     },
+    /// Answer to [`Effect::Break`]: why the link cannot do that.
+    BreakSent(Result<(), String>),
     /// The system wants the program to end: leave without asking.
     Signal,
 }
@@ -97,7 +104,12 @@ pub enum Effect {
     /// List a folder. Answered by [`Input::FilesListed`].
     ListFiles(PathBuf),
     /// Read and check an image file. Answered by [`Input::ImageChecked`], also when the file cannot be read.
-    CheckImage(PathBuf),
+    CheckImage {
+        /// Which.
+        path: PathBuf,
+        /// Errors in spite of which it may be sent.
+        allow: Vec<DefectId>,
+    },
     /// Write a new file. One that is there already is left alone, and that is an error. Answered by
     /// [`Input::FileWritten`].
     CreateFile {
@@ -121,6 +133,8 @@ pub enum Effect {
     ListRecordings,
     /// Play the recording differently. Answered by [`Input::Playing`] whenever it has moved.
     Play(Playback),
+    /// Hold the line low for a quarter of a second. Answered by [`Input::BreakSent`].
+    Break,
     /// Have the emulated unit at the other end do something, in the words `axcon emulate` takes. Answered by
     /// [`Input::Ordered`].
     Order(String),
@@ -138,6 +152,8 @@ pub enum Effect {
         /// The link.
         link: String,
     },
+    /// Give the terminal back and stop the program until its shell continues it.
+    Suspend,
     /// End the program, after the effects before this one.
     Quit,
 }
@@ -164,10 +180,21 @@ pub struct LinkInfo {
     pub read_only: bool,
     /// Where the recording is written, if one is.
     pub recording: Option<String>,
+    /// What is noted of an upload on it that has not ended well.
+    pub noted: Option<Noted>,
     /// Local time of day at [`Instant::ZERO`](crate::time::Instant::ZERO): another one in a recording.
     pub start_of_day: Duration,
     /// The same moment in milliseconds since 1970, UTC.
     pub start_millis: i64,
+}
+
+/// An upload that was begun on a link and has not ended well: the unit may wait in its loader, which says nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Noted {
+    /// The unit's product, as it was known before its loader was entered.
+    pub product: String,
+    /// The image's file.
+    pub image: String,
 }
 
 /// One recording.
@@ -238,6 +265,8 @@ pub struct FileEntry {
     pub kind: FileKind,
     /// Length in bytes; 0 for a folder.
     pub bytes: u64,
+    /// The first bytes of a file whose name does not say what it is, [`FIRST_BYTES`] at most.
+    pub begins: Vec<u8>,
     /// When it was last changed, as local date and time, where known.
     pub modified: Option<String>,
 }
@@ -266,16 +295,28 @@ pub struct ImageFacts {
     pub records: usize,
     /// Characters that will be sent.
     pub characters: usize,
+    /// What sending them takes, roughly.
+    pub time: Duration,
     /// Every defect in one line each, errors first: `line 12, column 43: ...`.
     pub defects: Vec<String>,
+    /// Which errors stand, each once.
+    pub errors: Vec<DefectId>,
+    /// Errors in spite of which it may be sent, because the user says so.
+    pub allowed: Vec<DefectId>,
     /// The image itself, if it may be sent.
     pub checked: Option<CheckedImage>,
 }
 
 impl ImageFacts {
-    /// What a check has found; errors come first.
-    pub fn of_report(path: PathBuf, report: &Report) -> Self {
+    /// What a check has found that allowed these errors; the others come first.
+    pub fn of_report(path: PathBuf, report: &Report, allow: &[DefectId]) -> Self {
         let identity = report.facts.identity.as_ref();
+        let mut errors: Vec<DefectId> = Vec::new();
+        for defect in report.defects.iter().filter(|defect| defect.severity == Severity::Error) {
+            if !errors.contains(&defect.id) {
+                errors.push(defect.id);
+            }
+        }
         let mut defects: Vec<_> = report.defects.iter().collect();
         defects.sort_by_key(|defect| defect.severity != Severity::Error);
         let mut defects: Vec<String> = defects
@@ -289,9 +330,11 @@ impl ImageFacts {
             defects.push(format!("{} more defects are not listed", report.unlisted()));
         }
         // What does not say what it is cannot be compared with the unit, nor with its banner.
-        let ok = report.is_ok() && identity.is_some();
+        let ok = report.is_ok() && (identity.is_some() || allow.contains(&DefectId::NoIdentity));
         if report.is_ok() && !ok {
-            defects.insert(0, "error: only the command line sends an image that does not say what it is".into());
+            errors.push(DefectId::NoIdentity);
+            let id = DefectId::NoIdentity;
+            defects.insert(0, format!("error {id}: nobody could tell afterwards what the unit runs"));
         }
         ImageFacts {
             path,
@@ -300,7 +343,10 @@ impl ImageFacts {
             version: identity.map(|identity| identity.version),
             records: report.facts.records as usize,
             characters: report.facts.characters as usize,
+            time: device::transfer_time(report.facts.characters, report.facts.data_bytes),
             defects,
+            errors,
+            allowed: allow.to_vec(),
             checked: report.image().filter(|_| ok),
         }
     }
@@ -314,7 +360,10 @@ impl ImageFacts {
             version: None,
             records: 0,
             characters: 0,
+            time: Duration::ZERO,
             defects: vec![why],
+            errors: Vec::new(),
+            allowed: Vec::new(),
             checked: None,
         }
     }

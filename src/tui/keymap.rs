@@ -22,6 +22,10 @@ pub enum Cmd {
     Help,
     /// Leave the program.
     Quit,
+    /// Stop the program until the shell continues it.
+    Suspend,
+    /// Other colours.
+    Palette,
     /// Open the lost link again.
     Reconnect,
     /// One up.
@@ -72,6 +76,12 @@ pub enum Cmd {
     Only,
     /// Compare with a file.
     Compare,
+    /// Send long records.
+    Pack,
+    /// Send in spite of an error.
+    Allow,
+    /// Hold the line low for a moment.
+    Break,
     /// Play faster.
     Faster,
     /// Play slower.
@@ -170,6 +180,18 @@ pub const EVERYWHERE: &[Binding] = &[
         cmd: Cmd::Quit,
         short: "quit",
         long: "leave; asks first if something would be left half done",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::F(2))],
+        cmd: Cmd::Palette,
+        short: "",
+        long: "colours for a dark terminal, for a light one, or none",
+    },
+    Binding {
+        keys: &[Press::Ctrl('z')],
+        cmd: Cmd::Suspend,
+        short: "",
+        long: "back to the shell; fg goes on; not while a job runs",
     },
     Binding { keys: &[Press::Plain(KeyCode::Tab)], cmd: Cmd::Next, short: "", long: "next screen" },
     Binding { keys: &[Press::Plain(KeyCode::BackTab)], cmd: Cmd::Previous, short: "", long: "screen before" },

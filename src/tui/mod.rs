@@ -20,9 +20,10 @@ mod widgets;
 
 pub use app::{App, Options};
 pub use input::{
-    Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_TEXT, LinkInfo, Pace, Playback, Playing,
-    PortEntry, RecordingEntry,
+    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_TEXT, LinkInfo, Noted, Pace,
+    Playback, Playing, PortEntry, RecordingEntry,
 };
+pub use theme::Palette;
 
 #[cfg(test)]
 mod pictures;

@@ -3,314 +3,21 @@
 //! What a person reads is held in snapshots, at the smallest size and at a large one; what keys do is said in
 //! sentences. The unit is played by the bytes it would send.
 
-use std::path::PathBuf;
+mod keys;
+mod stage;
 
 use insta::assert_snapshot;
-use ratatui::Terminal;
-use ratatui::backend::TestBackend;
-use ratatui::crossterm::event::{
-    Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
-};
+use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode};
 
-use super::{
-    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, Pace, Playback, Playing,
-    PortEntry, RecordingEntry,
-};
+use stage::*;
+
+use super::{Failure, ImageFacts, Input, LinkInfo, Pace, Playing};
 use crate::canopen::{ObjectAddress, Value};
-use crate::device::Product;
-use crate::device::dictionary::{Entry, Object};
 use crate::dump::Dump;
-use crate::endpoint::Transmit;
-use crate::image::make;
 use crate::record::Span;
-use crate::session::{
-    DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, Verdict,
-};
-use crate::time::{Duration, Instant};
+use crate::session::{DictionaryReading, Event, Job, LoadReport, Outcome, Phase, ReadEntry, UnitNow, Verdict};
+use crate::time::Duration;
 use crate::version::Version;
-
-const SMALL: (u16, u16) = (80, 24);
-const LARGE: (u16, u16) = (200, 60);
-/// 12:00:00 is the start of time here.
-const NOON: Duration = Duration::from_secs(12 * 3600);
-
-const BANNER: &[u8] = b"\r\nAxiomatic Technologies Corporation\r\nAXTC4CO 4 Thermocouple Scanner\r\n\
-    Software Version V1.1.0, built 2026-01-31 12:00:00\r\n\r\n";
-const MENU: &[u8] = b"\r\nMain Menu - AXTC4CO V1.1.0\r\n  V - View Object Dictionary\r\n\
-    \x20 D - Default Object Dictionary\r\n  T - Toggle RS-232 Stream On/Off\r\n  S - Show/Stop Diagnostics\r\n\
-    \x20 L - Load New Software\r\nCANopen: Node-ID 127 (0x7F), Baud Rate 125 kbit/s, State Pre-Operational\r\n";
-
-/// The console, a user and a world that does what the test says.
-struct Stage {
-    app: App,
-    size: (u16, u16),
-    now: Instant,
-    effects: Vec<Effect>,
-}
-
-impl Stage {
-    fn new(size: (u16, u16)) -> Self {
-        let options = Options { link: None, directory: PathBuf::from("/home/service/images"), colour: false, size };
-        let mut app = App::new(options);
-        let effects = app.start();
-        Stage { app, size, now: Instant::ZERO, effects }
-    }
-
-    /// Connected to a port with a unit that has answered.
-    fn connected(size: (u16, u16)) -> Self {
-        let mut stage = Stage::with_ports(size);
-        stage.press(KeyCode::Enter);
-        stage.opened("/dev/ttyUSB0");
-        stage.bytes(BANNER).bytes(MENU);
-        stage.wait(3000);
-        stage
-    }
-
-    fn with_ports(size: (u16, u16)) -> Self {
-        let mut stage = Stage::new(size);
-        let port = |link: &str, description: &str, busy_by: Option<&str>| PortEntry {
-            link: link.into(),
-            description: description.into(),
-            busy_by: busy_by.map(str::to_owned),
-        };
-        stage.input(Input::PortsListed(Ok(vec![
-            port("/dev/ttyUSB0", "USB, FTDI FT232R USB UART, 0403:6001, AX12345", None),
-            port("/dev/ttyUSB1", "USB, Prolific PL2303, 067b:2303", Some("picocom, process 4711")),
-            port("/dev/ttyS0", "serial port of this computer", None),
-        ])));
-        stage
-    }
-
-    /// Connected, with the stream on for a while and a loose wire.
-    fn streaming(size: (u16, u16)) -> Self {
-        let mut stage = Stage::connected(size);
-        for second in 0..90u32 {
-            let swing = f64::from(second % 30) * 0.37;
-            let third = if (40..52).contains(&second) || second >= 80 {
-                "OpenCct ".into()
-            } else {
-                format!("{:8.3}", 410.0 + swing)
-            };
-            let row = format!("{:8.3};{:8.3};{:8.3};{third};Disabled\r\n", 23.5, 181.25 + swing, 96.0 - swing);
-            stage.wait(1000).bytes(row.as_bytes());
-        }
-        stage
-    }
-
-    fn opened(&mut self, link: &str) {
-        self.input(Input::LinkOpened(LinkInfo {
-            link: link.into(),
-            baud: 115_200,
-            read_only: false,
-            recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
-            start_of_day: NOON,
-            start_millis: 1_769_860_800_000,
-        }));
-    }
-
-    fn lost(&mut self) -> &mut Self {
-        self.input(Input::LinkGone(Failure {
-            text: "cannot read from /dev/ttyUSB0: the port has gone".into(),
-            hints: vec!["Plug the adapter in again.".into()],
-        }))
-    }
-
-    /// On the dictionary screen, the unit's read: two channels set differently, one entry not shown.
-    fn with_dictionary(size: (u16, u16)) -> Self {
-        let mut stage = Stage::connected(size);
-        stage.keys("v").press(KeyCode::Enter);
-        let reading = |(at, object, entry): (ObjectAddress, &Object, &Entry)| {
-            let value = match (at.index, at.sub) {
-                (0x6110, 2) => Some(Value::Unsigned16(2)),
-                (0x6112, 4) => Some(Value::Unsigned8(0)),
-                _ => entry.default.map(|default| default.on_node(127)),
-            };
-            let text = format!("{} = {}", object.name, value.map_or_else(|| "?".to_owned(), |value| value.to_string()));
-            ReadEntry { at, value, text, span: Span::default(), known: true }
-        };
-        let entries = axtc4co().dictionary.entries().filter(|(at, _, _)| *at != ObjectAddress::new(0x5010, 0));
-        let reading =
-            DictionaryReading { entries: entries.map(reading).collect(), complete: true, unrecognised_lines: 3 };
-        stage.fold(Event::Finished(Outcome::DictionaryRead(Box::new(reading))));
-        stage
-    }
-
-    /// On the screen of recordings, two there.
-    fn with_recordings(mut self) -> Self {
-        let entry = |begun: &str, port: &str, part, length| RecordingEntry {
-            link: format!("replay:/home/user/{begun}.cast"),
-            begun: begun.into(),
-            port: port.into(),
-            part,
-            length,
-            bytes: 1_234_567,
-        };
-        self.keys("8").input(Input::RecordingsListed(Ok(vec![
-            entry("2026-01-31 11:00:00", "/dev/ttyUSB0", 1, Some(Duration::from_secs(300))),
-            entry("2026-01-30 09:15:00", "rfc2217://terminal-server-in-hall-4:4001", 2, None),
-        ])));
-        self
-    }
-
-    /// On the load screen, the folder read.
-    fn picking(mut self) -> Self {
-        self.keys("l");
-        let file = |name: &str, bytes| FileEntry {
-            name: name.into(),
-            kind: FileKind::File,
-            bytes,
-            modified: Some("2026-01-31 12:00".into()),
-        };
-        let folder = |name: &str| FileEntry { name: name.into(), kind: FileKind::Folder, bytes: 0, modified: None };
-        let entries = vec![
-            file("AXTC4CO_V1.2.0.elf.S", 242_846),
-            folder("bad"),
-            file("AXTC4CO_V1.1.0.elf.S", 242_846),
-            file("readme.txt", 99),
-        ];
-        self.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(entries) });
-        self
-    }
-
-    /// On the load screen, a file checked.
-    fn with_image(self, facts: ImageFacts) -> Self {
-        let mut stage = self.picking();
-        stage.keys("p").keys(&facts.path.to_string_lossy()).press(KeyCode::Enter);
-        stage.input(Input::ImageChecked(Box::new(facts)));
-        stage
-    }
-
-    fn input(&mut self, input: Input) -> &mut Self {
-        let effects = self.app.handle(self.now, input);
-        self.effects.extend(effects);
-        self
-    }
-
-    fn key(&mut self, code: KeyCode, modifiers: KeyModifiers) -> &mut Self {
-        self.input(Input::Terminal(TerminalEvent::Key(KeyEvent::new(code, modifiers))))
-    }
-
-    fn press(&mut self, code: KeyCode) -> &mut Self {
-        self.key(code, KeyModifiers::NONE)
-    }
-
-    fn keys(&mut self, text: &str) -> &mut Self {
-        text.chars().for_each(|character| {
-            self.press(KeyCode::Char(character));
-        });
-        self
-    }
-
-    /// What a terminal sends for Ctrl-].
-    fn prefix(&mut self) -> &mut Self {
-        self.key(KeyCode::Char('5'), KeyModifiers::CONTROL)
-    }
-
-    fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
-        self.input(Input::Bytes(bytes.to_vec()))
-    }
-
-    /// Lets time pass, waking the console when it wants to be.
-    fn wait(&mut self, millis: u64) -> &mut Self {
-        let end = self.now + Duration::from_millis(millis);
-        while let Some(due) = self.app.poll_timeout().filter(|&due| due <= end) {
-            self.now = self.now.max(due);
-            self.input(Input::Timeout);
-        }
-        self.now = end;
-        self
-    }
-
-    fn fold(&mut self, event: Event) -> &mut Self {
-        let facts = Facts::default();
-        self.app.fold(self.now, &event, &facts);
-        self
-    }
-
-    /// What has left for the unit since the last question.
-    fn sent(&mut self) -> Vec<u8> {
-        let sent = self.effects.iter().filter_map(|effect| match effect {
-            Effect::Transmit(Transmit { bytes, .. }) => Some(bytes.clone()),
-            _ => None,
-        });
-        let sent = sent.flatten().collect();
-        self.effects.clear();
-        sent
-    }
-
-    fn asked(&mut self) -> Vec<Effect> {
-        std::mem::take(&mut self.effects)
-    }
-
-    fn draw(&self) -> TestBackend {
-        let mut terminal = Terminal::new(TestBackend::new(self.size.0, self.size.1)).expect("a test backend");
-        terminal.draw(|frame| self.app.draw(frame)).expect("drawing in memory");
-        terminal.backend().clone()
-    }
-
-    fn picture(&self) -> String {
-        let lines = self.draw().to_string();
-        // The backend quotes its lines; the quotes keep blanks at the end in sight and are of no use here.
-        lines.lines().map(|line| line.trim_matches('"').trim_end()).collect::<Vec<_>>().join("\n")
-    }
-
-    fn shows(&self, text: &str) -> bool {
-        self.picture().contains(text)
-    }
-}
-
-fn axtc4co() -> &'static Product {
-    Product::named("AXTC4CO").expect("built in")
-}
-
-fn good_image() -> ImageFacts {
-    let recipe =
-        make::Recipe { target: &axtc4co().target(), version: Version::new(1, 2, 0), words: 0xC000, flaw: None };
-    let file = make::make(&recipe).expect("an image of the usual size");
-    let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
-    let report = crate::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
-    ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report)
-}
-
-fn bad_image() -> ImageFacts {
-    let defects =
-        (1..=40).map(|n| format!("line {}, column 43: the checksum is A{:X}, it should be 5C", n * 7, n % 16));
-    let path = "/home/service/images/bad.S".into();
-    ImageFacts { path, ok: false, defects: defects.collect(), checked: None, ..good_image() }
-}
-
-fn progress() -> Progress {
-    Progress {
-        phase: Phase::Transfer,
-        records: 1448,
-        records_total: 3074,
-        bytes: 114_392,
-        bytes_total: 242_846,
-        address: 0x5a80,
-        elapsed: Duration::from_secs(10),
-        held: None,
-    }
-}
-
-fn report(verdict: Verdict, unit: UnitNow) -> LoadReport {
-    LoadReport {
-        verdict,
-        phase: Phase::Transfer,
-        unit,
-        product: Some("AXTC4CO".into()),
-        version_before: Some(Version::new(1, 1, 0)),
-        version_after: None,
-        records: 1448,
-        records_total: 3074,
-        address: Some(0x5a80),
-        duration: Duration::from_secs(11),
-        what: "The loader reported error 0004 (wrong checksum) and restarted.".into(),
-        heard: "Error # 0004\u{1b}[2J Restarting.".into(),
-        found_in_loader: false,
-        misfit: None,
-        remark: None,
-    }
-}
 
 macro_rules! pictures {
     ($($name:ident: $stage:expr;)*) => {
@@ -495,8 +202,121 @@ pictures! {
         stage
     };
     load_link_lost: |size| {
+        let mut stage = Stage::loading(size);
+        stage.wait(1000).lost();
+        stage
+    };
+    load_in_loader_with_a_note: |size| {
+        Stage::in_loader(size, noted("AXTC4CO")).with_image(good_image())
+    };
+    load_in_loader_noted_for_another_product: |size| {
+        Stage::in_loader(size, noted("AXRTD8CO")).with_image(good_image())
+    };
+    label_question: |size| {
+        let mut stage = Stage::in_loader(size, None).with_image(good_image());
+        stage.press(KeyCode::Enter).keys("AXRTD8CO").press(KeyCode::Enter);
+        stage
+    };
+    password_question: |size| {
         let mut stage = Stage::connected(size).with_image(good_image());
-        stage.fold(Event::Progress(progress())).lost();
+        stage.press(KeyCode::Enter).keys("AXIO");
+        stage
+    };
+    waiting_for_a_link: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter);
+        stage
+    };
+    terminal_find_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3").prefix().keys("/menu");
+        stage
+    };
+    order_question: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("emu:axtc4co").keys("9/short 2");
+        stage
+    };
+    temperature_question: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("emu:axtc4co").keys("9").press(KeyCode::Enter).keys("hot").press(KeyCode::Enter);
+        stage
+    };
+    disconnect_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter).keys("1").press(KeyCode::Down).press(KeyCode::Enter);
+        stage
+    };
+    quit_viewing_question: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("3v").prefix().keys("q");
+        stage
+    };
+    connect_link_lost: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("1").lost();
+        stage
+    };
+    diagnostics_link_lost: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("s").wait(2000).bytes(b"Diagnostics\r\n Supply Voltage: 24.0 V\r\n").wait(1500).lost();
+        stage
+    };
+    diagnostics_without_answer: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("s").wait(60_000);
+        stage
+    };
+    recordings_link_lost: |size| {
+        let mut stage = Stage::connected(size).with_recordings();
+        stage.lost();
+        stage
+    };
+    bench_link_lost: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("emu:axtc4co").bytes(MENU).wait(3000).keys("9o").lost();
+        stage
+    };
+    help_link_lost: |size| {
+        let mut stage = Stage::connected(size);
+        stage.press(KeyCode::F(1)).lost();
+        stage
+    };
+    dictionary_refused: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter);
+        let reason = "not in the operational state".to_owned();
+        stage.finished(Outcome::Refused { job: Job::ReadDictionary, reason, heard: None });
+        stage
+    };
+    dictionary_incomplete: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter);
+        let at = ObjectAddress::new(0x1001, 0);
+        let entry = ReadEntry { at, value: Some(Value::Unsigned8(0)), text: "Error Register = 0".into(), span: Span::default(), known: true };
+        let reading = DictionaryReading { entries: vec![entry], complete: false, unrecognised_lines: 0 };
+        stage.finished(Outcome::DictionaryRead(Box::new(reading)));
+        stage
+    };
+    stream_refused: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("6t").press(KeyCode::Enter);
+        stage.finished(Outcome::Refused { job: Job::StreamOn, reason: "invalid period".into(), heard: None });
+        stage
+    };
+    stream_late_while_exporting: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6e").press(KeyCode::Enter).wait(10_000);
+        stage
+    };
+    overview_with_limits: |size| {
+        let mut stage = Stage::with_dictionary(size).with_rows();
+        stage.keys("2").press(KeyCode::Down);
+        stage
+    };
+    recording_over: |size| {
+        let mut stage = Stage::connected(size);
+        stage.input(Input::Unrecorded("cannot write /home/user/a.cast: no space left on device".into()));
         stage
     };
     dictionary_of_no_unit: |size| {
@@ -611,6 +431,7 @@ pictures! {
             link: "replay:/home/user/20260131T110000Z-ttyUSB0-7.cast".into(),
             baud: 115_200,
             read_only: true,
+            noted: None,
             recording: None,
             start_of_day: NOON,
             start_millis: 1_769_860_800_000,
@@ -725,9 +546,26 @@ fn every_screen_survives_every_size() {
 
 #[test]
 fn every_question_survives_every_size_it_is_drawn_at() {
-    for keys in ["t", "d", "v"] {
-        let mut stage = Stage::connected(SMALL);
-        stage.keys(keys);
+    let questions: [(&str, fn() -> Stage); 15] = [
+        ("Switch the data stream on", || typed(Stage::connected(SMALL), "t")),
+        ("Type Yes", || typed(Stage::connected(SMALL), "d")),
+        ("View the object", || typed(Stage::connected(SMALL), "v")),
+        ("label", || pressed(Stage::in_loader(SMALL, None).with_image(good_image()), KeyCode::Enter)),
+        ("Password", || pressed(Stage::connected(SMALL).with_image(good_image()), KeyCode::Enter)),
+        ("Opening", || pressed(Stage::with_ports(SMALL), KeyCode::Enter)),
+        ("Connect to", || typed(Stage::with_ports(SMALL), "p")),
+        ("╭ Find", || typed(Stage::with_dictionary(SMALL), "/")),
+        ("Image file", || typed(Stage::connected(SMALL).picking(), "p")),
+        ("CSV", || typed(Stage::streaming(SMALL), "6e")),
+        ("Write the object", || typed(Stage::with_dictionary(SMALL), "e")),
+        ("Compare with", || typed(Stage::with_dictionary(SMALL), "w")),
+        ("Cancel the upload", || pressed(Stage::loading(SMALL), KeyCode::Esc)),
+        ("being loaded", || typed(Stage::loading(SMALL), "q")),
+        ("Close the link", || typed(Stage::loading(SMALL), "1x")),
+    ];
+    for (words, question) in questions {
+        let mut stage = question();
+        assert!(stage.shows(words), "{words}: {}", stage.picture());
         for columns in 70..100 {
             for rows in 20..30 {
                 stage.size = (columns, rows);
@@ -735,334 +573,4 @@ fn every_question_survives_every_size_it_is_drawn_at() {
             }
         }
     }
-}
-
-#[test]
-fn connecting_asks_the_unit_who_it_is() {
-    let mut stage = Stage::with_ports(SMALL);
-    stage.asked();
-    stage.press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())]);
-    stage.opened("/dev/ttyUSB0");
-    stage.wait(10_000);
-    let sent = stage.sent();
-    assert!(sent.contains(&b'm'), "{sent:?}");
-    assert!(!sent.iter().any(|byte| b"VvDdTtSsLl".contains(byte)), "nothing but the menu is asked for: {sent:?}");
-}
-
-#[test]
-fn the_link_given_at_the_start_is_opened_at_once() {
-    let mut app =
-        App::new(Options { link: Some("emu:axtc4co".into()), directory: "/".into(), colour: true, size: SMALL });
-    assert_eq!(app.start(), [Effect::ListPorts, Effect::ListRecordings, Effect::OpenLink("emu:axtc4co".into())]);
-}
-
-#[test]
-fn opening_another_link_closes_the_first() {
-    let mut stage = Stage::connected(SMALL);
-    stage.asked();
-    stage.keys("1").press(KeyCode::Down).press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::CloseLink, Effect::OpenLink("/dev/ttyUSB1".into())]);
-}
-
-#[test]
-fn a_lost_link_is_opened_again_by_c_and_the_terminal_keeps_its_lines() {
-    let mut stage = Stage::connected(SMALL);
-    stage.lost().asked();
-    stage.keys("c");
-    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())]);
-    stage.opened("/dev/ttyUSB0");
-    stage.keys("3");
-    assert!(stage.shows("Software Version V1.1.0") && stage.shows("link lost"), "{}", stage.picture());
-}
-
-#[test]
-fn a_recording_is_steered_by_its_keys() {
-    let mut stage = Stage::with_ports(SMALL).with_recordings();
-    stage.keys(" +").press(KeyCode::Left);
-    stage.asked();
-    stage.press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::OpenLink("replay:/home/user/2026-01-31 11:00:00.cast".into())]);
-    stage.input(Input::LinkOpened(LinkInfo {
-        link: "replay:x".into(),
-        baud: 115_200,
-        read_only: true,
-        recording: None,
-        start_of_day: NOON,
-        start_millis: 0,
-    }));
-    let seconds = Duration::from_secs;
-    let plays = |stage: &mut Stage, position, pace| {
-        stage.input(Input::Playing(Playing { position: seconds(position), length: Some(seconds(100)), pace }));
-        stage.asked();
-    };
-    plays(&mut stage, 50, Pace::Times(5));
-    for (key, wanted) in [
-        (KeyCode::Char(' '), Playback::Pace(Pace::Paused)),
-        (KeyCode::Char('+'), Playback::Pace(Pace::Times(10))),
-        (KeyCode::Char('-'), Playback::Pace(Pace::Times(2))),
-        (KeyCode::Left, Playback::Seek(seconds(40))),
-        (KeyCode::Right, Playback::Seek(seconds(60))),
-        (KeyCode::Home, Playback::Seek(seconds(0))),
-        (KeyCode::End, Playback::Seek(seconds(100))),
-    ] {
-        stage.press(key);
-        assert_eq!(stage.asked(), [Effect::Play(wanted)]);
-    }
-    plays(&mut stage, 50, Pace::Paused);
-    stage.keys(" ");
-    assert_eq!(stage.asked(), [Effect::Play(Playback::Pace(Pace::Times(5)))], "as fast as before the pause");
-    plays(&mut stage, 100, Pace::AtOnce);
-    plays(&mut stage, 100, Pace::Paused);
-    stage.keys(" ");
-    assert_eq!(stage.asked(), [Effect::Play(Playback::Again(Pace::Times(1)))], "from the beginning");
-}
-
-#[test]
-fn a_click_is_the_key_it_stands_on_and_the_wheel_moves() {
-    for size in [SMALL, LARGE] {
-        let mut stage = Stage::with_dictionary(size);
-        let click = |stage: &mut Stage, kind, text: &str| {
-            let picture = stage.picture();
-            let (row, line) = picture.lines().enumerate().find(|(_, line)| line.contains(text)).expect(text);
-            let column = line.split(text).next().map_or(0, |before| before.chars().count()) as u16 + 1;
-            let mouse = MouseEvent { kind, column, row: row as u16, modifiers: KeyModifiers::NONE };
-            stage.input(Input::Terminal(TerminalEvent::Mouse(mouse)));
-        };
-        let left = MouseEventKind::Down(MouseButton::Left);
-        click(&mut stage, MouseEventKind::ScrollDown, "Object");
-        assert!(stage.shows("› "), "{}", stage.picture());
-        assert!(stage.shows("1001:00 Error Register"), "{}", stage.picture());
-        for (tab, shows) in
-            [("6 Stream", "The stream is off"), ("8 Rec", "Looking for recordings"), ("5 Dict", "Object")]
-        {
-            click(&mut stage, left, tab);
-            assert!(stage.shows(shows), "{}", stage.picture());
-        }
-        click(&mut stage, left, "T stream");
-        assert!(stage.shows("Switch the data stream on"), "{}", stage.picture());
-        click(&mut stage, left, "5 Dict");
-        assert!(stage.shows("Switch the data stream on"), "a question wants an answer first");
-    }
-}
-
-#[test]
-fn rows_go_on_to_their_file_when_the_same_link_is_back_and_end_with_another() {
-    let row = b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n";
-    let appended = |stage: &mut Stage| {
-        stage.wait(1000).bytes(row);
-        stage.asked().iter().any(|effect| matches!(effect, Effect::AppendFile { .. }))
-    };
-    let mut stage = Stage::streaming(SMALL);
-    stage.keys("6e").press(KeyCode::Enter).asked();
-    assert!(appended(&mut stage));
-    stage.lost().keys("c").opened("/dev/ttyUSB0");
-    assert!(appended(&mut stage), "the same link");
-    stage.wait(10_000).keys("1").press(KeyCode::Down).press(KeyCode::Enter);
-    assert!(stage.shows("rows are in axtc4co-stream-"), "{}", stage.picture());
-    stage.opened("/dev/ttyUSB1");
-    assert!(!appended(&mut stage), "another unit's rows are not mixed in");
-}
-
-#[test]
-fn only_an_emulated_unit_is_given_orders() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("9");
-    stage.asked();
-    stage.keys("ohp").press(KeyCode::Right).press(KeyCode::Enter);
-    assert_eq!(stage.asked(), []);
-    let mut stage = Stage::with_ports(SMALL);
-    stage.press(KeyCode::Enter).opened("EMU:AXTC4CO");
-    stage.keys("9").asked();
-    stage.press(KeyCode::Down).press(KeyCode::Enter).keys("x").press(KeyCode::Enter);
-    assert!(stage.shows("A number of degrees"), "{}", stage.picture());
-    stage.press(KeyCode::Backspace).keys("451.5").press(KeyCode::Enter);
-    stage.input(Input::Ordered { line: "set 2 temperature 451.5".into(), answer: Ok(None) });
-    stage.press(KeyCode::Left).keys("p");
-    let order = |line: &str| Effect::Order(line.into());
-    assert_eq!(
-        stage.asked(),
-        [order("set 2 temperature 451.5"), order("set 2 temperature 441.5"), order("power cycle 1")]
-    );
-}
-
-#[test]
-fn menu_keys_do_what_the_manual_says_in_either_case() {
-    let mut stage = Stage::connected(SMALL);
-    stage.sent();
-    stage.keys("S").wait(2000);
-    assert_eq!(stage.sent(), b"s");
-    assert!(stage.shows("Waiting for the unit's first page"), "{}", stage.picture());
-    let mut stage = Stage::connected(SMALL);
-    stage.sent();
-    stage.keys("v");
-    assert_eq!(stage.sent(), b"", "V halts scanning: it is asked first");
-    stage.keys("t");
-    assert_eq!(stage.sent(), b"v");
-    assert!(stage.shows("halted by V"));
-    stage.keys("x");
-    assert_eq!(stage.sent(), b"x");
-    assert!(!stage.shows("halted by V"));
-}
-
-#[test]
-fn leaving_with_the_view_open_offers_to_close_it() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("vt").prefix().keys("2q");
-    stage.asked();
-    stage.press(KeyCode::Enter);
-    let effects = stage.asked();
-    assert_eq!(effects, [Effect::Transmit(Transmit::open(*b"x")), Effect::Quit]);
-}
-
-#[test]
-fn defaults_are_restored_only_after_yes_written_like_this() {
-    let mut stage = Stage::connected(SMALL);
-    stage.sent();
-    stage.keys("dyes").press(KeyCode::Enter);
-    stage.wait(1000);
-    assert_eq!(stage.sent(), b"");
-    stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("Yes").press(KeyCode::Enter);
-    assert_eq!(stage.sent(), b"d");
-}
-
-#[test]
-fn t_switches_a_running_stream_off_and_asks_before_it_switches_one_on() {
-    let mut stage = Stage::streaming(SMALL);
-    stage.sent();
-    stage.keys("t");
-    assert_eq!(stage.sent(), b"t");
-    let mut stage = Stage::connected(SMALL);
-    stage.sent();
-    stage.keys("t");
-    assert_eq!(stage.sent(), b"");
-    assert!(stage.shows("field value, object 6100h"));
-    stage.press(KeyCode::Esc);
-    assert!(!stage.shows("field value, object 6100h"));
-}
-
-#[test]
-fn letters_typed_into_a_question_are_no_commands() {
-    let mut stage = Stage::with_ports(SMALL);
-    stage.asked();
-    stage.keys("pq1?lt");
-    assert_eq!(stage.asked(), []);
-    stage.press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::OpenLink("q1?lt".into())]);
-}
-
-#[test]
-fn on_the_terminal_screen_letters_go_to_the_unit_and_the_prefix_takes_one_back() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("3").sent();
-    stage.keys("q1").press(KeyCode::Enter).press(KeyCode::Left).press(KeyCode::Up).press(KeyCode::Tab);
-    assert_eq!(stage.sent(), b"q1\r\t");
-    stage.prefix().keys("q");
-    assert_eq!(stage.asked(), [Effect::Quit]);
-    stage.prefix().prefix();
-    assert_eq!(stage.sent(), b"\x1d");
-}
-
-#[test]
-fn pasted_text_goes_to_the_unit_only_after_a_yes() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("3").sent();
-    stage.input(Input::Terminal(TerminalEvent::Paste("m\n\x1b[D\n".into())));
-    assert_eq!(stage.sent(), b"");
-    stage.keys("y");
-    assert_eq!(stage.sent(), b"m\r[D\r", "the escape character is not passed on");
-}
-
-#[test]
-fn the_terminal_stays_where_it_was_scrolled_to_while_more_comes() {
-    let mut stage = Stage::connected(SMALL);
-    (0..100).for_each(|n| {
-        stage.bytes(format!("line {n}\r\n").as_bytes());
-    });
-    stage.keys("3").press(KeyCode::PageUp);
-    assert!(stage.shows("stopped") && !stage.shows("line 99"));
-    let stopped = stage.picture();
-    let place = stopped.lines().nth(10).map(str::to_owned);
-    stage.bytes(b"more\r\n");
-    assert_eq!(stage.picture().lines().nth(10).map(str::to_owned), place);
-    stage.press(KeyCode::End);
-    assert!(stage.shows("follows") && stage.shows("more"));
-}
-
-#[test]
-fn an_upload_cannot_start_while_anything_stands_against_it() {
-    let cases = [
-        (bad_image(), "the file has errors"),
-        (ImageFacts { product: Some("AXRTD8CO".into()), ..good_image() }, "the file is for an AXRTD8CO"),
-    ];
-    for (facts, why) in cases {
-        let mut stage = Stage::connected(SMALL).with_image(facts);
-        stage.sent();
-        assert!(stage.shows(why), "{}", stage.picture());
-        stage.press(KeyCode::Enter);
-        assert!(!stage.shows("Password"));
-        assert_eq!(stage.sent(), b"");
-    }
-    let mut stage = Stage::with_ports(SMALL).with_image(good_image());
-    stage.press(KeyCode::Enter);
-    assert!(stage.shows("no unit is connected") && !stage.shows("Password"));
-}
-
-#[test]
-fn an_answer_about_a_file_nobody_waits_for_is_ignored() {
-    let mut stage = Stage::connected(SMALL).picking();
-    stage.input(Input::ImageChecked(Box::new(good_image())));
-    assert!(stage.shows("Choose a file"));
-}
-
-#[test]
-fn folders_are_walked_and_the_way_back_finds_the_folder_again() {
-    let mut stage = Stage::connected(SMALL).picking();
-    stage.asked();
-    stage.press(KeyCode::Down).press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images/bad".into())]);
-    stage.input(Input::FilesListed { directory: "/home/service/images/bad".into(), entries: Ok(Vec::new()) });
-    stage.press(KeyCode::Esc);
-    assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images".into())]);
-    let bad = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, modified: None };
-    stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(vec![bad]) });
-    assert!(stage.shows("› bad/"));
-}
-
-#[test]
-fn nothing_a_unit_sends_reaches_the_screen_as_a_control_code() {
-    let mut stage = Stage::connected(LARGE);
-    let every: Vec<u8> = (0..=255).collect();
-    stage.bytes(&every).bytes(b"\r\n");
-    for keys in ["2", "3"] {
-        stage.keys(keys);
-        assert!(stage.picture().chars().all(|character| character == '\n' || !character.is_control()));
-    }
-    stage.prefix().keys("h");
-    assert!(stage.picture().chars().all(|character| character == '\n' || !character.is_control()));
-}
-
-#[test]
-fn an_idle_console_wants_nothing_and_draws_nothing() {
-    let mut stage = Stage::connected(SMALL);
-    stage.wait(60_000);
-    stage.app.drawn();
-    assert_eq!(stage.app.poll_timeout(), None);
-    stage.input(Input::Timeout);
-    stage.input(Input::Terminal(TerminalEvent::FocusGained));
-    assert!(!stage.app.is_dirty());
-    let mut release = KeyEvent::new(KeyCode::Char('2'), KeyModifiers::NONE);
-    release.kind = KeyEventKind::Release;
-    stage.input(Input::Terminal(TerminalEvent::Key(release)));
-    assert!(!stage.app.is_dirty(), "the release of a key is not a key");
-    stage.keys("3");
-    assert!(stage.app.is_dirty());
-}
-
-#[test]
-fn a_signal_ends_the_program_without_a_question() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("m").asked();
-    stage.input(Input::Signal);
-    assert_eq!(stage.asked(), [Effect::Quit]);
 }

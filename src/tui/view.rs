@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::input::{Failure, Playing};
+use super::input::{Failure, Noted, Playing};
+use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::monitor::Monitor;
@@ -45,6 +46,10 @@ pub struct Link {
     pub baud: u32,
     /// Where the recording is written.
     pub recording: Option<String>,
+    /// An upload on it that has not ended well.
+    pub noted: Option<Noted>,
+    /// Why nothing is recorded any more, where that was not wanted.
+    pub unrecorded: Option<String>,
     /// The start of time, in milliseconds since 1970, UTC.
     pub start_millis: i64,
     /// How it stands.
@@ -91,6 +96,38 @@ pub struct DictionaryRead {
     /// When it was complete.
     pub at: Instant,
 }
+
+/// A channel's temperature limits in °C, as far as the unit showed them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// Below it there is a low warning (4000h).
+    pub low: Option<f64>,
+    /// From it on there is a high warning (4010h).
+    pub high: Option<f64>,
+    /// From it on there is a high shutdown (4020h).
+    pub shutdown: Option<f64>,
+}
+
+impl Limits {
+    /// What a value is beyond these, in a word. The unit itself waits for its reaction delay (4030h) before it says so.
+    pub fn word(self, value: f64) -> Option<&'static str> {
+        match self {
+            Limits { shutdown: Some(limit), .. } if value >= limit => Some("shutdown"),
+            Limits { high: Some(limit), .. } if value >= limit => Some("high"),
+            Limits { low: Some(limit), .. } if value < limit => Some("low"),
+            Limits { .. } => None,
+        }
+    }
+}
+
+/// Objects of both products with a limit for each channel (manuals, sections 3.4.12 to 3.4.14).
+const LOW_WARNING: u16 = 0x4000;
+const HIGH_WARNING: u16 = 0x4010;
+const HIGH_SHUTDOWN: u16 = 0x4020;
+/// Means of the valid channels, by bank and of all (manuals, section 3.4.3).
+const AVERAGES: u16 = 0x2100;
+/// They are in tenths of a degree.
+const LIMIT_STEPS: f64 = 10.0;
 
 /// A file that rows are written to as they come.
 #[derive(Debug)]
@@ -177,14 +214,59 @@ impl View {
         self.link.state == LinkState::Open { read_only: false }
     }
 
+    /// Whether a job runs that has to be ended before the unit is left alone. Being asked who it is, or listened to,
+    /// leaves a unit as it was.
+    pub fn has_job_to_end(&self) -> bool {
+        self.job.is_some_and(|job| !matches!(job, Job::Identify | Job::Overhear))
+    }
+
+    /// Whether something would stay half done if the link were closed now.
+    pub fn is_in_the_middle(&self) -> bool {
+        self.has_job_to_end() || self.viewing
+    }
+
     /// The product, where it is one we know.
     pub fn product(&self) -> Option<&'static Product> {
         self.facts.product.as_ref().and_then(|known| Product::named(&known.value))
     }
 
+    /// The limits of a channel, once the object dictionary has been read; `None` for one without.
+    pub fn limits(&self, channel: &str) -> Option<Limits> {
+        let dictionary = &self.product()?.dictionary;
+        let limit = |index| {
+            let sub = dictionary.object(index)?.entries.iter().find(|entry| entry.name == channel)?.sub;
+            Some(self.read_value(index, sub)?.as_integer()? as f64 / LIMIT_STEPS)
+        };
+        let limits = Limits { low: limit(LOW_WARNING), high: limit(HIGH_WARNING), shutdown: limit(HIGH_SHUTDOWN) };
+        (limits != Limits::default()).then_some(limits)
+    }
+
+    /// The averages as they were when the object dictionary was read: of what, and in °C.
+    pub fn averages(&self) -> Vec<(&str, f64)> {
+        let object = self.product().and_then(|product| product.dictionary.object(AVERAGES));
+        let entries = object.into_iter().flat_map(|object| &object.entries).filter(|entry| entry.sub > 0);
+        let read = |sub| match self.read_value(AVERAGES, sub)? {
+            Value::Real32(value) => Some(f64::from(value)),
+            _ => None,
+        };
+        entries.filter_map(|entry| Some((entry.name.as_str(), read(entry.sub)?))).collect()
+    }
+
+    fn read_value(&self, index: u16, sub: u8) -> Option<Value> {
+        let entries = &self.dictionary.as_ref()?.reading.entries;
+        entries.iter().find(|read| read.at == ObjectAddress::new(index, sub))?.value
+    }
+
     /// Whether the user has to say what the unit is, because nobody else can.
     pub fn needs_label(&self) -> bool {
-        self.facts.product.is_none() && (self.facts.state == UnitState::Loader || self.load.product_unknown)
+        let is_mute = self.facts.state == UnitState::Loader || self.load.product_unknown;
+        self.facts.product.is_none() && is_mute && self.noted().is_none()
+    }
+
+    /// The note of an upload, where it is all there is to know the unit by: what the unit says itself goes first.
+    pub fn noted(&self) -> Option<&Noted> {
+        let is_mute = self.facts.product.is_none() && self.facts.state != UnitState::Application;
+        self.link.noted.as_ref().filter(|_| is_mute)
     }
 
     /// Says something to the user.
@@ -206,7 +288,11 @@ impl View {
     fn finished(&mut self, now: Instant, outcome: &Outcome) {
         self.job = None;
         match outcome {
-            Outcome::DictionaryRead(reading) => self.dictionary_read(now, reading),
+            Outcome::DictionaryRead(reading) => {
+                // Its view was left again.
+                self.viewing = false;
+                self.dictionary_read(now, reading);
+            }
             Outcome::Identified => self.identified(),
             Outcome::StreamRuns { was_on: true } => {
                 self.tell(Tone::Good, "The stream was on already and now sends what you asked for.");
@@ -248,7 +334,11 @@ impl View {
         let version = self.facts.version.as_ref().map(|known| format!(" {}", known.value)).unwrap_or_default();
         match (self.facts.state, &self.facts.product) {
             (UnitState::Silent, _) => self.tell(Tone::Bad, "Nobody has answered: check power, cable and port."),
-            (UnitState::Loader, _) => self.tell(Tone::Quiet, "The unit waits in its loader for a file: L loads one."),
+            (UnitState::Loader, _) => {
+                let which =
+                    self.noted().map_or_else(String::new, |noted| format!(", an {} by our notes,", noted.product));
+                self.tell(Tone::Quiet, format!("The unit{which} waits in its loader: L loads a file."));
+            }
             (UnitState::Unknown | UnitState::Application, Some(product)) => {
                 let text = format!("The unit is an {}{version}.", product.value);
                 self.tell(Tone::Good, text);

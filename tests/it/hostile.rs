@@ -117,7 +117,7 @@ fn no_picture_of_the_console_holds_what_a_terminal_obeys() {
         let mut app = App::new(Options {
             link: Some("/dev/ttyUSB0".into()),
             directory: PathBuf::from("/images"),
-            colour: true,
+            palette: axcon::tui::Palette::Dark,
             size: (columns, rows),
         });
         let mut now = Instant::ZERO;
@@ -129,6 +129,7 @@ fn no_picture_of_the_console_holds_what_a_terminal_obeys() {
                     baud: 115_200,
                     read_only: false,
                     recording: Some("\x1b]0;x\x07".into()),
+                    noted: None,
                     start_of_day: Duration::ZERO,
                     start_millis: 0,
                 };

@@ -166,20 +166,93 @@ fn a_cable_that_is_plugged_in_again_is_connected_by_itself() {
     assert!(recording.contains("\"m\",\"link lost\"") && recording.contains("\"m\",\"link back as"), "{recording}");
 }
 
+/// A shell with job control whose foreground job is the console on a unit that says nothing by itself.
+fn console_of_a_shell(world: &World, unit: &Puppet) -> Screen {
+    let script = "set -m; \"$@\"; echo the shell is back; read line; fg; echo all over";
+    let program = env!("CARGO_BIN_EXE_axcon");
+    let args = ["-c", script, "sh", program, "--port", unit.port()];
+    Screen::start(world.command_of(std::path::Path::new("/bin/sh"), &args), 24, 80)
+}
+
+/// Answers like a unit whose menu is asked for, and is silent else.
+fn silent_unit() -> Puppet {
+    let menu = b"AXTC4CO V1.1.0\r\nV - view object dictionary\r\nT - toggle stream\r\nS - diagnostics\r\n";
+    Puppet::start(Box::new(|keys| if keys.contains(&b'm') { menu.to_vec() } else { Vec::new() }))
+}
+
 #[test]
-fn ctrl_z_gives_the_terminal_back_until_the_program_goes_on() {
-    let world = World::new();
-    let mut screen = console(&world, &[]);
-    screen.wait("application runs");
+fn ctrl_z_gives_the_terminal_back_and_fg_draws_everything_anew() {
+    let (world, unit) = (World::new(), silent_unit());
+    let mut screen = console_of_a_shell(&world, &unit);
+    screen.wait("The unit is an AXTC4CO 1.1.0.");
     screen.keys("\x1a");
+    screen.wait("the shell is back");
     assert!(screen.is_given_back(), "{}", screen.text());
-    // The shell writes something of its own meanwhile.
-    screen.signal(rustix::process::Signal::CONT);
+    screen.keys("\r");
+    // Nothing comes from the unit: only going on itself draws.
     screen.wait("application runs");
     assert!(!screen.is_as_the_shell_left_it());
     screen.keys("q");
+    screen.wait("all over");
     assert_eq!(screen.wait_end(), Some(0));
     assert!(screen.is_given_back());
+}
+
+#[test]
+fn ctrl_z_is_ignored_where_no_shell_could_continue_the_program() {
+    let (world, unit) = (World::new(), silent_unit());
+    let mut screen = Screen::start(world.command(&["--port", unit.port()]), 24, 80);
+    screen.wait("The unit is an AXTC4CO 1.1.0.");
+    screen.keys("\x1a");
+    screen.keys("?");
+    screen.wait("any other key");
+    screen.keys("xq");
+    assert_eq!(screen.wait_end(), Some(0));
+    assert!(screen.is_given_back());
+}
+
+#[test]
+fn a_program_that_was_stopped_from_outside_takes_its_screen_again() {
+    let (world, unit) = (World::new(), silent_unit());
+    let mut screen = Screen::start(world.command(&["--port", unit.port()]), 24, 80);
+    screen.wait("The unit is an AXTC4CO 1.1.0.");
+    screen.signal(rustix::process::Signal::STOP);
+    screen.spoil();
+    screen.signal(rustix::process::Signal::CONT);
+    screen.wait("application runs");
+    screen.keys("q");
+    assert_eq!(screen.wait_end(), Some(0));
+}
+
+#[test]
+fn a_recording_that_finds_no_room_is_told_and_stays_told() {
+    let world = World::new();
+    let menu = b"AXTC4CO V1.1.0\r\nV - view object dictionary\r\nT - toggle stream\r\nS - diagnostics\r\n";
+    let unit = Puppet::start(Box::new(|keys| if keys.contains(&b'm') { menu.repeat(200) } else { Vec::new() }));
+    // A file may not grow beyond some kB, as on a disk that is full.
+    let script = "trap '' XFSZ; ulimit -f 8; exec \"$@\"";
+    let args = ["-c", script, "sh", env!("CARGO_BIN_EXE_axcon"), "--record", "r.cast", "--port", unit.port()];
+    let mut screen = Screen::start(world.command_of(std::path::Path::new("/bin/sh"), &args), 24, 80);
+    let shown = screen.wait("connected, not recorded");
+    assert!(!shown.contains("rec "), "{shown}");
+    screen.keys("q");
+    assert_eq!(screen.wait_end(), Some(0));
+}
+
+#[test]
+fn a_hang_up_in_the_middle_of_the_dictionary_leaves_the_view() {
+    for signal in [rustix::process::Signal::HUP, rustix::process::Signal::TERM] {
+        let (world, unit) = (World::new(), silent_unit());
+        let mut screen = Screen::start(world.command(&["--port", unit.port()]), 24, 80);
+        screen.wait("The unit is an AXTC4CO 1.1.0.");
+        screen.keys("v\r");
+        screen.wait("reading the dictionary");
+        screen.signal(signal);
+        assert_eq!(screen.wait_end(), Some(130), "{signal:?}");
+        let heard = unit.heard();
+        let view = heard.iter().rposition(|&key| key == b'v').expect("the view was opened");
+        assert!(heard[view..].contains(&b'x'), "{signal:?}: {:?}", String::from_utf8_lossy(&heard));
+    }
 }
 
 #[test]

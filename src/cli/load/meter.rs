@@ -16,7 +16,6 @@ pub struct Meter {
     port: String,
     style: Style,
     phase: Option<Phase>,
-    pace: Pace,
 }
 
 enum Style {
@@ -58,29 +57,28 @@ impl Meter {
             (false, true) => Style::Bar,
             (false, false) => Style::Phases,
         };
-        Meter { port: port.to_owned(), style, phase: None, pace: Pace::default() }
+        Meter { port: port.to_owned(), style, phase: None }
     }
 
     /// For one of several uploads, on its line of a board.
     pub fn on_board(port: &str, board: Arc<Board>, line: usize) -> Self {
-        Meter { port: port.to_owned(), style: Style::Line(board, line), phase: None, pace: Pace::default() }
+        Meter { port: port.to_owned(), style: Style::Line(board, line), phase: None }
     }
 
     /// Shows how far it is. That nobody reads it any more is no reason to end an upload.
     pub fn show(&mut self, progress: &Progress, output: &mut Output) {
-        self.pace.note(progress);
         let is_new_phase = self.phase.replace(progress.phase) != Some(progress.phase);
         match &self.style {
             Style::Json => {
                 let _ = output.object(&self.object(progress));
             }
             Style::Bar => {
-                let line = format!("\r{}\x1b[K", text(progress, self.pace, columns()));
+                let line = format!("\r{}\x1b[K", text(progress, columns()));
                 let _ = output.err.write_all(line.as_bytes()).and_then(|()| output.err.flush());
             }
             Style::Phases if is_new_phase => output.remark(&format!("{} ...", phase_name(progress.phase))),
             Style::Phases => {}
-            Style::Line(board, line) => board.set(*line, text(progress, self.pace, board.room())),
+            Style::Line(board, line) => board.set(*line, text(progress, board.room())),
         }
     }
 
@@ -101,44 +99,10 @@ impl Meter {
             address: progress.address,
             bytes: progress.bytes,
             bytes_total: progress.bytes_total,
-            rate: self.pace.rate(progress).unwrap_or_default().round(),
-            eta_s: self.pace.eta(progress).map(|eta| (eta * 10.0).round() / 10.0),
+            rate: progress.rate().round(),
+            eta_s: progress.eta().map(|eta| (eta.as_secs_f64() * 10.0).round() / 10.0),
             held_s: progress.held.map(|held| held.as_secs_f64()),
         }
-    }
-}
-
-/// How fast the loader takes the records. Counted from the first data it has taken: the erasing before that takes as long
-/// whatever follows.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pace {
-    /// When that was, since the first record left, and how many characters were taken then.
-    since: Option<(Duration, usize)>,
-}
-
-impl Pace {
-    fn note(&mut self, progress: &Progress) {
-        // The header is the first record. A transfer that begins again counts anew.
-        let begins_again = self.since.is_some_and(|(_, bytes)| progress.bytes < bytes);
-        if progress.records < 2 {
-            self.since = None;
-        } else if self.since.is_none() || begins_again {
-            self.since = Some((progress.elapsed, progress.bytes));
-        }
-    }
-
-    /// Characters a second, once they can be told.
-    fn rate(self, progress: &Progress) -> Option<f64> {
-        let (since, bytes) = self.since?;
-        let seconds = progress.elapsed.saturating_sub(since).as_secs_f64();
-        let taken = progress.bytes.saturating_sub(bytes);
-        (seconds > 0.0 && taken > 0).then(|| taken as f64 / seconds)
-    }
-
-    /// Seconds left, once they can be told.
-    fn eta(self, progress: &Progress) -> Option<f64> {
-        let rest = progress.bytes_total.saturating_sub(progress.bytes) as f64;
-        self.rate(progress).map(|rate| rest / rate)
     }
 }
 
@@ -148,7 +112,7 @@ fn columns() -> usize {
 }
 
 /// One line of fewer than so many columns: a line that fills its terminal wraps on many. What is left of them is the bar.
-fn text(progress: &Progress, pace: Pace, columns: usize) -> String {
+fn text(progress: &Progress, columns: usize) -> String {
     let Progress { records, records_total, bytes, bytes_total, address, .. } = *progress;
     let share = if bytes_total == 0 { 0.0 } else { bytes as f64 / bytes_total as f64 };
     let kilobytes = |bytes: usize| bytes.div_ceil(1000);
@@ -157,12 +121,12 @@ fn text(progress: &Progress, pace: Pace, columns: usize) -> String {
         members.push(format!("{address:#07x}"));
     }
     members.push(format!("{}/{} kB", kilobytes(bytes), kilobytes(bytes_total)));
-    match (progress.held.filter(|held| *held >= LONG_HOLD), pace.rate(progress)) {
-        (Some(held), _) => members.push(format!("XOFF {:.0} s", held.as_secs_f64())),
-        (None, Some(rate)) => members.push(format!("{:.1} kB/s", rate / 1000.0)),
-        (None, None) => {}
+    match progress.held.filter(|held| *held >= LONG_HOLD) {
+        Some(held) => members.push(format!("XOFF {:.0} s", held.as_secs_f64())),
+        None if progress.rate() > 0.0 => members.push(format!("{:.1} kB/s", progress.rate() / 1000.0)),
+        None => {}
     }
-    members.extend(pace.eta(progress).map(|eta| format!("{eta:.0} s left")));
+    members.extend(progress.eta().map(|eta| format!("{:.0} s left", eta.as_secs_f64())));
     let (phase, members) = (phase_name(progress.phase), members.join(" "));
     let room = columns.saturating_sub(1);
     let bar = room.saturating_sub(phase.len() + members.len() + " [] ".len()).min(LONGEST_BAR);
@@ -297,39 +261,24 @@ mod tests {
             bytes_total: 242_742,
             address: 0xBFFF,
             elapsed: Duration::from_secs(seconds),
+            moving: Duration::from_secs(seconds),
+            moved: bytes,
             held: None,
         }
     }
 
     #[test]
     fn the_bar_takes_the_room_that_what_is_said_leaves() {
-        let mut pace = Pace::default();
-        pace.note(&progress(10, 2, 100));
-        let now = progress(20, 1_500, 121_371);
-        let line = |columns| text(&now, pace, columns);
+        let now = progress(10, 1_500, 121_371);
+        let line = |columns| text(&now, columns);
         assert_eq!(line(80), "transfer [####     ]  50 % 1500/3074 rec 0x0bfff 122/243 kB 12.1 kB/s 10 s left");
         assert_eq!(line(60), "transfer  50 % 1500/3074 rec 0x0bfff 122/243 kB 12.1 kB/s 1");
         assert!(line(200).contains(&format!("[{}{}]", "#".repeat(15), " ".repeat(15))));
         for columns in 0..200 {
             let held = Progress { held: Some(Duration::from_secs(12)), ..now };
             for progress in [&now, &held, &progress(0, 0, 0)] {
-                assert!(text(progress, pace, columns).chars().count() < columns.max(1), "{columns}");
+                assert!(text(progress, columns).chars().count() < columns.max(1), "{columns}");
             }
         }
-    }
-
-    #[test]
-    fn the_rate_is_that_of_the_records_and_not_of_the_erasing_before_them() {
-        let mut pace = Pace::default();
-        let mut told = |seconds, records, bytes| {
-            let progress = progress(seconds, records, bytes);
-            pace.note(&progress);
-            (pace.rate(&progress), pace.eta(&progress).map(f64::round))
-        };
-        assert_eq!(told(0, 0, 0), (None, None));
-        assert_eq!(told(10, 1, 40), (None, None), "ten seconds of erasing behind the header");
-        assert_eq!(told(10, 2, 142), (None, None));
-        assert_eq!(told(11, 102, 10_142), (Some(10_000.0), Some(23.0)));
-        assert_eq!(told(12, 2, 142), (None, None), "everything is sent once more");
     }
 }

@@ -12,7 +12,7 @@ use super::image::{self as image_cli, DefectObject};
 use super::output::Output;
 use super::talk::{Ended, Talk, no_answer_hints};
 use super::{Global, ask, link, password};
-use crate::device::{LoaderKind, Product};
+use crate::device::{self, LoaderKind, Product};
 use crate::host::journal::{Journal, Note};
 use crate::image::{CheckedImage, DefectId, Report};
 use crate::secret::Secret;
@@ -48,11 +48,6 @@ pub struct Args {
     #[arg(long, value_name = "DEFECT", value_parser = image_cli::allowable)]
     allow: Vec<DefectId>,
 }
-
-/// Characters a second at 115,200 baud, 8N1.
-const CHARACTERS_PER_SECOND: f64 = 11_520.0;
-/// What erasing and writing a page takes, for the estimate only (public data of the 56F83xx parts).
-const SECONDS_PER_PAGE: f64 = 0.026;
 
 /// Uploads.
 ///
@@ -378,8 +373,7 @@ fn plan(
         };
         output.remark(&format!("unit   {port}: {unit}"));
     }
-    let pages = report.facts.data_bytes as f64 / 512.0;
-    let seconds = report.facts.characters as f64 / CHARACTERS_PER_SECOND + pages * SECONDS_PER_PAGE;
+    let seconds = device::transfer_time(report.facts.characters, report.facts.data_bytes).as_secs_f64();
     let enter = match unit {
         Some((facts, ..)) if facts.state == UnitState::Loader => "",
         Some(_) | None => "enter the loader, ",
@@ -422,7 +416,7 @@ fn conclude(
     output: &mut Output,
 ) -> Result<(), CliError> {
     let kind = exit_kind(report, lost.is_some());
-    let next = next_step(report);
+    let next = report.advice();
     if output.json {
         // What became of the unit decides, whoever still reads.
         let written = output.object(&LoadObject {
@@ -476,6 +470,9 @@ fn conclude(
     if report.verdict == Verdict::NoAnswer {
         error = no_answer_hints(error);
     }
+    if report.verdict == Verdict::Refused && report.product.is_none() {
+        error = error.hint("say it with --product, for example: --product AXTC4CO");
+    }
     Err(error.hint(next))
 }
 
@@ -496,41 +493,6 @@ fn exit_kind(report: &LoadReport, link_lost: bool) -> Option<Kind> {
         Verdict::WrongApplication => Kind::WrongApplication,
         Verdict::Interrupted => Kind::Interrupted,
     })
-}
-
-/// What the operator should do now.
-pub fn next_step(report: &LoadReport) -> &'static str {
-    match (report.verdict, report.unit) {
-        (Verdict::Done, _) => "nothing: the unit runs what was sent",
-        (Verdict::Refused, _) if report.product.is_none() => {
-            "look at the label of the unit and say its product: --product NAME"
-        }
-        (Verdict::Refused, _) if report.misfit == Some(DefectId::Downgrade) => {
-            "take newer software, unless the old one is wanted"
-        }
-        (Verdict::Refused, _) => "take the image that is made for this unit",
-        (Verdict::UnitRefused, UnitNow::Application) => {
-            "the unit runs as before: check the password (upper and lower case matter) and try again"
-        }
-        (Verdict::NoAnswer, _) => {
-            "nothing has been changed: look at power, cable and port, then run the same command again"
-        }
-        (_, UnitNow::Loader) if report.records == 0 && report.found_in_loader => {
-            "the unit waits in its loader, as it was found: run the same command again"
-        }
-        (_, UnitNow::Loader) if report.records == 0 => {
-            "the unit waits in its loader, its old software intact: upload, or switch it off and on"
-        }
-        (_, UnitNow::Loader) if report.phase == Phase::Finish && report.records == report.records_total => {
-            "the unit waits in its loader: upload an image that is made for it, 'axcon image info' says what this one is"
-        }
-        (_, UnitNow::Loader) => "the unit waits in its loader, without software: run the same command again",
-        (Verdict::WrongApplication, _) => "compare the version above with the file, and upload the right one",
-        (_, UnitNow::Application) => "the unit runs its software: nothing has been changed, try again",
-        (_, UnitNow::Unknown) => {
-            "switch the unit off and on, then run the same command again: it tells what the unit is"
-        }
-    }
 }
 
 fn verdict_name(verdict: Verdict) -> &'static str {

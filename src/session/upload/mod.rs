@@ -78,6 +78,8 @@ pub(super) struct Upload {
     hold_due: Option<Instant>,
     after: After,
     progress: Option<Progress>,
+    /// When the loader had taken the first data, and how many characters it had then.
+    first_data: Option<(Instant, usize)>,
 }
 
 enum Stage {
@@ -139,6 +141,7 @@ impl Upload {
             hold_due: None,
             after: After::default(),
             progress: None,
+            first_data: None,
         }
     }
 
@@ -392,6 +395,11 @@ impl Upload {
     fn report_progress_of(&mut self, phase: Phase, desk: &mut Desk<'_>) {
         let Some(transfer) = &self.transfer else { return };
         let (records, bytes, bytes_total) = transfer.taken();
+        // The header is the first record.
+        if records > 1 {
+            self.first_data.get_or_insert((desk.now, bytes));
+        }
+        let (first, before) = self.first_data.unwrap_or((desk.now, bytes));
         let progress = Progress {
             phase,
             records,
@@ -400,6 +408,8 @@ impl Upload {
             bytes_total,
             address: transfer.address().unwrap_or(0),
             elapsed: transfer.begun().map_or(Duration::ZERO, |begun| desk.now.since(begun)),
+            moving: desk.now.since(first),
+            moved: bytes - before,
             held: desk.transmitter.held_since().map(|since| desk.now.since(since)),
         };
         let moved = self.progress.is_none_or(|before| {

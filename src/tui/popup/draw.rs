@@ -6,6 +6,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Clear};
 
 use super::{Popup, Purpose, Question, consequence};
+use crate::session::Job;
 use crate::time::BITS_PER_CHARACTER;
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
@@ -22,7 +23,7 @@ pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Fr
     let inner = usize::from(columns).saturating_sub(4);
     let (title, mut rows, hints) = match popup {
         Popup::Asking(question) => ask(question, view, theme, inner),
-        Popup::Waiting(what) => ("One moment".to_owned(), paragraphs(&[what], inner), Vec::new()),
+        Popup::Waiting { what, hint } => ("One moment".to_owned(), paragraphs(&[what], inner), vec![*hint]),
         Popup::Failed { title, failure } => {
             let mut rows = paragraphs(&[&visible::sentence(&failure.text)], inner);
             for hint in &failure.hints {
@@ -51,12 +52,12 @@ pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Fr
     let y = match popup {
         // What is found has to stay in sight.
         Popup::Asking(Question::Find(_)) => area.bottom() - height,
-        Popup::Asking(_) | Popup::Waiting(_) | Popup::Failed { .. } => area.y + (area.height - height) / 2,
+        Popup::Asking(_) | Popup::Waiting { .. } | Popup::Failed { .. } => area.y + (area.height - height) / 2,
     };
     let window = Rect { x: area.x + (area.width - columns) / 2, y, width: columns, height };
     let style = match popup {
         Popup::Failed { .. } => theme.bad(),
-        Popup::Asking(_) | Popup::Waiting(_) => theme.heading(),
+        Popup::Asking(_) | Popup::Waiting { .. } => theme.heading(),
     };
     let block = Block::bordered()
         .border_type(BorderType::Rounded)
@@ -81,7 +82,8 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             "Connect to",
             {
                 let mut rows = paragraphs(
-                    &["A serial port (/dev/ttyUSB0, COM3), a pseudo-terminal, or an emulated unit (emu:axtc4co)."],
+                    &["A serial port (/dev/ttyUSB0, COM3) or its adapter's serial number, an address in the network \
+                       (tcp://host:port), or an emulated unit (emu:axtc4co)."],
                     columns,
                 );
                 rows.push(Line::default());
@@ -128,7 +130,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 let mut rows = paragraphs(&[&label], columns);
                 rows.push(Line::default());
                 rows.push(typed(theme, "", field.text(), columns));
-                rows.extend(complain(theme, *complaint));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("Enter", "set"), ("Esc", "back")],
@@ -167,7 +169,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                     rows.push(Line::default());
                     rows.extend(format::wrap(&text, columns).into_iter().map(|row| Line::styled(row, theme.warning())));
                 }
-                rows.extend(complain(theme, *complaint));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("F P", "choose"), ("Enter", "switch on"), ("Esc", "back")],
@@ -198,10 +200,25 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 );
                 rows.push(Line::default());
                 rows.push(typed(theme, "", field.text(), columns));
-                rows.extend(complain(theme, *complaint));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("Enter", "restore"), ("Esc", "back")],
+        ),
+        Question::Allow { typed: field, errors, complaint } => (
+            "Send in spite of an error?",
+            {
+                let names: Vec<&str> = errors.iter().map(|error| error.name()).collect();
+                let named = format!("Type the name of one: {}.", names.join(", "));
+                let consequence = "What is sent is not what was built, or not for this unit. It may not run, and the unit \
+                                   then waits in its loader, without scanning and CAN, for a file that is sound.";
+                let mut rows = paragraphs(&[consequence, &named], columns);
+                rows.push(Line::default());
+                rows.push(typed(theme, "", field.text(), columns));
+                rows.extend(complain(theme, *complaint, columns));
+                rows
+            },
+            vec![("Enter", "allow it and check again"), ("Esc", "back")],
         ),
         Question::Label { typed: field, image, complaint } => (
             "Which product is the unit?",
@@ -217,7 +234,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 );
                 rows.push(Line::default());
                 rows.push(typed(theme, "", field.text(), columns));
-                rows.extend(complain(theme, *complaint));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("Enter", "go on"), ("Esc", "back")],
@@ -257,24 +274,19 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             },
             vec![("Y", "send"), ("N", "do not send")],
         ),
-        Question::Disconnect => (
+        Question::Disconnect { then } => (
             "Close the link?",
-            paragraphs(&["A job runs.", job_consequence(view)], columns),
+            {
+                let [what, consequence] = in_the_middle(view);
+                let then = then.as_deref().map(|link| format!("Then {} is opened.", visible::text(link)));
+                let texts: Vec<&str> = [what, consequence].into_iter().chain(then.as_deref()).collect();
+                paragraphs(&texts, columns)
+            },
             vec![("Y", "close the link"), ("N", "stay connected")],
         ),
-        Question::Quit => (
-            "Leave axcon?",
-            paragraphs(&["A job runs.", job_consequence(view)], columns),
-            vec![("Y", "leave"), ("N", "stay")],
-        ),
-        Question::QuitViewing => (
-            "Leave axcon?",
-            paragraphs(
-                &["The unit's view sub-menu is open. If it stays open, temperature scanning and CAN stay halted."],
-                columns,
-            ),
-            vec![("Enter", "close it and leave"), ("Q", "leave it open"), ("Esc", "stay")],
-        ),
+        Question::Quit => {
+            ("Leave axcon?", paragraphs(&in_the_middle(view), columns), vec![("Y", "leave"), ("N", "stay")])
+        }
     };
     if rows.is_empty() {
         rows.push(Line::default());
@@ -295,11 +307,24 @@ fn too_fast(view: &View, source: Source, millis: &str) -> Option<String> {
     })
 }
 
-/// What the running job leaves behind when it is dropped.
-fn job_consequence(view: &View) -> &'static str {
+/// What is in the middle, and what becomes of it when the link is closed.
+fn in_the_middle(view: &View) -> [&'static str; 2] {
     match view.job {
-        Some(crate::session::Job::Load) => consequence(view.load.progress.map(|progress| progress.phase)),
-        _ => "The unit may be left waiting for an answer at a prompt.",
+        Some(Job::Load) => {
+            ["New software is being loaded.", consequence(view.load.progress.map(|progress| progress.phase))]
+        }
+        Some(Job::ReadDictionary) => [
+            "The object dictionary is being read: temperature scanning and CAN are halted.",
+            "axcon leaves the view first (X), so that they go on.",
+        ],
+        Some(Job::Diagnostics) => ["The unit prints its diagnostics.", "axcon stops them first (S)."],
+        Some(Job::StreamOn | Job::StreamOff | Job::RestoreDefaults) => {
+            ["The unit is at one of its prompts.", "axcon answers it first, so that the next key is none."]
+        }
+        None | Some(Job::Identify | Job::Overhear) => [
+            "The unit's view is open: temperature scanning and CAN are halted.",
+            "axcon closes it first (X), so that they go on.",
+        ],
     }
 }
 
@@ -326,6 +351,8 @@ fn typed(theme: Theme, label: &'static str, text: &str, columns: usize) -> Line<
     ])
 }
 
-fn complain(theme: Theme, complaint: Option<&'static str>) -> Vec<Line<'static>> {
-    complaint.map(|text| vec![Line::default(), Line::styled(text, theme.bad())]).unwrap_or_default()
+fn complain(theme: Theme, complaint: Option<&'static str>, columns: usize) -> Vec<Line<'static>> {
+    let Some(text) = complaint else { return Vec::new() };
+    let broken = format::wrap(text, columns).into_iter().map(|line| Line::styled(line, theme.bad()));
+    std::iter::once(Line::default()).chain(broken).collect()
 }

@@ -13,6 +13,7 @@ use super::input::{Failure, ImageFacts};
 use super::view::View;
 use super::widgets::field::{PasswordField, TextField};
 use super::widgets::format;
+use crate::image::DefectId;
 use crate::session::{Command, Phase};
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
@@ -24,8 +25,13 @@ pub use draw::draw;
 pub enum Popup {
     /// The user has to answer.
     Asking(Question),
-    /// The user has to wait; what for.
-    Waiting(String),
+    /// The user has to wait.
+    Waiting {
+        /// What for.
+        what: String,
+        /// The key that does not wait, and what it does.
+        hint: (&'static str, &'static str),
+    },
     /// Something has failed; what, and what to try.
     Failed {
         /// In a few words.
@@ -82,6 +88,15 @@ pub enum Question {
         /// What is wrong with it.
         complaint: Option<&'static str>,
     },
+    /// In spite of which error shall the image be sent?
+    Allow {
+        /// What has been typed.
+        typed: TextField,
+        /// Which errors there are.
+        errors: Vec<DefectId>,
+        /// What is wrong with it.
+        complaint: Option<&'static str>,
+    },
     /// What the unit's label says.
     Label {
         /// What has been typed.
@@ -102,12 +117,13 @@ pub enum Question {
     CancelLoad,
     /// Shall pasted text go to the unit?
     Paste(Vec<u8>),
-    /// Shall the link be closed though a job runs?
-    Disconnect,
-    /// Shall the program end though a job runs?
+    /// Shall the link be closed though something is in the middle?
+    Disconnect {
+        /// The link to open instead.
+        then: Option<String>,
+    },
+    /// Shall the program end though something is in the middle?
     Quit,
-    /// Shall the program end though the unit's view sub-menu is open?
-    QuitViewing,
 }
 
 /// What a file is for.
@@ -149,7 +165,7 @@ impl Popup {
         match self {
             Popup::Asking(question) => question.on(key),
             // The answer is on its way; only it ends the wait.
-            Popup::Waiting(_) => Answer::Stay,
+            Popup::Waiting { .. } => Answer::Stay,
             Popup::Failed { .. } => match key.code {
                 KeyCode::Enter | KeyCode::Esc | KeyCode::Char(_) => Answer::Close,
                 _ => Answer::Stay,
@@ -214,6 +230,11 @@ impl Question {
             is_suggested: true,
             complaint: None,
         }
+    }
+
+    /// Asks in spite of which of these errors an image shall be sent.
+    pub fn allow(errors: Vec<DefectId>) -> Question {
+        Question::Allow { typed: TextField::default(), errors, complaint: None }
     }
 
     /// Asks for what an upload still needs.
@@ -306,6 +327,16 @@ impl Question {
                 *complaint = Some("Only the word Yes, written like this, starts it.");
                 Answer::Stay
             }
+            Question::Allow { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
+            Question::Allow { typed, errors, complaint } => {
+                let named = errors.iter().find(|error| error.name() == typed.text().trim());
+                *complaint = Some(match named {
+                    Some(error) if error.can_be_allowed() => return Answer::Act(Action::Allow(*error)),
+                    Some(_) => "It leaves part of the program unknown: there is nothing to send.",
+                    None => "No such error stands in the findings.",
+                });
+                Answer::Stay
+            }
             Question::Label { typed, image, complaint } => {
                 let label = typed.text().trim().to_owned();
                 if label.is_empty() {
@@ -323,9 +354,8 @@ impl Question {
             }
             Question::CancelLoad => Answer::Act(Action::Command(Command::Cancel)),
             Question::Paste(bytes) => Answer::Act(Action::Command(Command::Keys(std::mem::take(bytes)))),
-            Question::Disconnect => Answer::Act(Action::Disconnect),
+            Question::Disconnect { then } => Answer::Act(Action::Disconnect { then: then.take() }),
             Question::Quit => Answer::Act(Action::Quit),
-            Question::QuitViewing => Answer::Act(Action::LeaveViewAndQuit),
         }
     }
 
@@ -340,6 +370,7 @@ impl Question {
             }
             Question::Defaults { typed: field, complaint }
             | Question::Label { typed: field, complaint, .. }
+            | Question::Allow { typed: field, complaint, .. }
             | Question::Temperature { typed: field, complaint, .. } => {
                 *complaint = None;
                 field.push(character);
@@ -355,14 +386,12 @@ impl Question {
                 _ => {}
             },
             Question::Password { field, .. } => field.push(character),
-            Question::QuitViewing if character.eq_ignore_ascii_case(&'q') => return Answer::Act(Action::Quit),
             Question::View if character.eq_ignore_ascii_case(&'t') => return Answer::Act(Action::ViewDictionary),
             Question::View
             | Question::CancelLoad
             | Question::Paste(_)
-            | Question::Disconnect
-            | Question::Quit
-            | Question::QuitViewing => match character.to_ascii_lowercase() {
+            | Question::Disconnect { .. }
+            | Question::Quit => match character.to_ascii_lowercase() {
                 'y' => return self.accept(),
                 'n' => return Answer::Close,
                 _ => {}
@@ -406,14 +435,14 @@ impl Question {
             | Question::Order(field)
             | Question::Temperature { typed: field, .. }
             | Question::Defaults { typed: field, .. }
+            | Question::Allow { typed: field, .. }
             | Question::Label { typed: field, .. } => Some(field),
             Question::Password { .. }
             | Question::View
             | Question::CancelLoad
             | Question::Paste(_)
-            | Question::Disconnect
-            | Question::Quit
-            | Question::QuitViewing => None,
+            | Question::Disconnect { .. }
+            | Question::Quit => None,
         }
     }
 }

@@ -4,7 +4,8 @@ use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use super::super::{FileEntry, FileKind, Input, LARGEST_TEXT, PortEntry, RecordingEntry};
+use super::super::screens::load;
+use super::super::{FIRST_BYTES, FileEntry, FileKind, Input, LARGEST_TEXT, PortEntry, RecordingEntry};
 use crate::host::save::{SaveError, save};
 use crate::host::{self, library, ports, recorder};
 
@@ -52,9 +53,14 @@ pub(super) fn folder(directory: &Path) -> Input {
                 // Behind a link, what it leads to.
                 let metadata = fs::metadata(entry.path()).ok()?;
                 let kind = if metadata.is_dir() { FileKind::Folder } else { FileKind::File };
+                let name = entry.file_name().to_string_lossy().into_owned();
+                // Only plain files: to open another may wait for ever.
+                let is_asked = metadata.is_file() && !load::is_image_name(&name);
+                let begins = if is_asked { first_bytes(&entry.path()).unwrap_or_default() } else { Vec::new() };
                 Some(FileEntry {
-                    name: entry.file_name().to_string_lossy().into_owned(),
+                    name,
                     kind,
+                    begins,
                     bytes: if kind == FileKind::File { metadata.len() } else { 0 },
                     modified: metadata.modified().ok().and_then(host::clock::local_date_and_time),
                 })
@@ -62,6 +68,12 @@ pub(super) fn folder(directory: &Path) -> Input {
             .collect()
     });
     Input::FilesListed { directory, entries }
+}
+
+fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(FIRST_BYTES as u64).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// The recordings.

@@ -11,13 +11,14 @@ mod player;
 use std::io;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
+use ratatui::crossterm::event::Event as TerminalEvent;
 
 use player::{Player, Step};
 
-use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Options, Playback};
+use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Noted, Options, Palette, Playback};
 use crate::host;
 use crate::host::Inbox;
 use crate::host::clock::Clock;
@@ -26,9 +27,10 @@ use crate::host::link::{self, Connection, LinkError, LinkSpec};
 use crate::host::ports;
 use crate::host::recorder::{Plan, Recorder};
 use crate::host::replay::{Recording, RecordingError};
-use crate::host::signal::Signals;
+use crate::host::signal::{self, Signals};
 use crate::host::socket::Dialled;
 use crate::host::terminal::{self, Screen};
+use crate::image::DefectId;
 use crate::time::{Duration, Instant};
 
 /// Least time between two pictures that no key asked for: thirty a second.
@@ -46,18 +48,22 @@ pub struct World {
     pub baud: u32,
     /// Where sessions are recorded.
     pub recording: Plan,
-    /// Whether to use colours.
-    pub colour: bool,
-    /// Opens a link by its name.
-    pub open: fn(&str, u32, Clock, SyncSender<host::Input>) -> Result<Connection, Failure>,
+    /// Which colours to begin with.
+    pub palette: Palette,
+    /// Says which link a name means.
+    pub resolve: fn(&str) -> Result<LinkSpec, Failure>,
+    /// Opens a link.
+    pub open: fn(&LinkSpec, u32, Clock, SyncSender<host::Input>) -> Result<Connection, Failure>,
     /// Says what a lost link means.
     pub explain: fn(LinkError) -> Failure,
     /// Says why a recording cannot be read.
     pub unreadable: fn(RecordingError) -> Failure,
-    /// Reads and checks an image file.
-    pub check: fn(PathBuf) -> ImageFacts,
+    /// Reads and checks an image file, and allows these errors.
+    pub check: fn(PathBuf, &[DefectId]) -> ImageFacts,
     /// Notes that an upload of this product begins on this link, or (`None`) that the unit on it runs.
     pub note: fn(&str, Option<(&str, &str)>),
+    /// What is noted of an upload on this link that has not ended well: the unit's product, and the image's file.
+    pub noted: fn(&str) -> Option<(String, String)>,
 }
 
 /// How the console ended.
@@ -77,13 +83,13 @@ pub fn run(world: World) -> io::Result<End> {
     let clock = Clock::start();
     let (sender, inputs) = host::channel();
     let mut screen = Screen::enter()?;
-    let _signals = Signals::start(sender.clone())?;
+    let _signals = Signals::of_screen(sender.clone())?;
     let keys = terminal::listen(sender.clone())?;
     let size = screen.terminal.size()?;
     let app = App::new(Options {
         link: world.link.clone(),
         directory: std::env::current_dir().unwrap_or_else(|_| PathBuf::from(".")),
-        colour: world.colour,
+        palette: world.palette,
         size: (size.width, size.height),
     });
     let (answer, answers) = channel();
@@ -113,6 +119,8 @@ pub fn run(world: World) -> io::Result<End> {
         player: None,
         skew: Duration::ZERO,
         recorder: Recorder::nothing(),
+        suspends: false,
+        over: None,
     };
     console.serve(&mut screen)
 }
@@ -145,6 +153,10 @@ struct Console {
     /// By how much the console's time is ahead of the clock: a recording's time passes in no time.
     skew: Duration,
     recorder: Recorder,
+    /// The program is to be stopped as soon as the effects before that are done.
+    suspends: bool,
+    /// How the console ends once the unit has been left, where that is not the user's wish.
+    over: Option<io::Result<End>>,
 }
 
 impl Console {
@@ -153,6 +165,8 @@ impl Console {
         self.player.as_ref().map_or_else(|| self.clock.now() + self.skew, Player::now)
     }
 
+    /// Serves until the user leaves, a signal comes, or the terminal fails. The app then has the unit left in order,
+    /// which takes a moment; nothing is drawn meanwhile, since the terminal may be gone.
     fn serve(&mut self, screen: &mut Screen) -> io::Result<End> {
         let mut next_frame = Instant::ZERO;
         let mut hurry = false;
@@ -166,21 +180,25 @@ impl Console {
             // What a key changes is seen at once: a frame early, which the next one pays for.
             let due = if hurry { Instant::ZERO + next_frame.since_start().saturating_sub(FRAME) } else { next_frame };
             if self.app.is_dirty() && now >= due {
-                screen.terminal.draw(|frame| self.app.draw(frame))?;
+                if self.over.is_none()
+                    && let Err(error) = self.draw(screen)
+                    && self.end(Err(error))
+                {
+                    return self.ended();
+                }
                 self.app.drawn();
-                screen.set_mouse(self.app.wants_mouse())?;
                 next_frame = next_frame.max(now) + FRAME;
                 hurry = false;
             }
             // A stopped terminal keeps the drawing waiting, Ctrl-Z everything: what the unit has answered meanwhile goes
             // before what has become due meanwhile.
             if self.take_arrived() {
-                return Ok(End::Quit);
+                return self.ended();
             }
             let now = self.clock.now();
             // A flood of inputs must not keep a timer from expiring.
             if self.timer_at().is_some_and(|due| due <= now) && self.handle(Input::Timeout) {
-                return Ok(End::Quit);
+                return self.ended();
             }
             if self.retry.is_some_and(|due| due <= now) {
                 self.look_for_link();
@@ -188,10 +206,14 @@ impl Console {
             self.play();
             if let Ok(event) = self.keys.try_recv() {
                 hurry = true;
-                if is_suspend(&event) && !self.app.passes_keys() {
-                    suspend(screen)?;
-                } else if self.handle(Input::Terminal(event)) {
-                    return Ok(End::Quit);
+                if self.handle(Input::Terminal(event)) {
+                    return self.ended();
+                }
+                if std::mem::take(&mut self.suspends)
+                    && let Err(error) = screen.suspend().and_then(|()| self.draw_anew(screen))
+                    && self.end(Err(error))
+                {
+                    return self.ended();
                 }
                 continue;
             }
@@ -206,10 +228,14 @@ impl Console {
                     let failure = (self.world.explain)(error);
                     self.lose_link(failure)
                 }
-                host::Input::Signal(_) => {
-                    self.handle(Input::Signal);
-                    return Ok(End::Signal);
+                // Who stopped us, and whatever was drawn meanwhile: it is our terminal again.
+                host::Input::Signal(number) if signal::continues(number) => {
+                    match screen.retake().and_then(|()| self.draw_anew(screen)) {
+                        Ok(()) => false,
+                        Err(error) => self.end(Err(error)),
+                    }
                 }
+                host::Input::Signal(_) => self.end(Ok(End::Signal)),
                 host::Input::Wake => {
                     let mut leaves = false;
                     while let Ok(answer) = self.answers.try_recv() {
@@ -223,9 +249,31 @@ impl Console {
                 host::Input::Bytes { .. } | host::Input::Typed(_) | host::Input::TypedEnd => false,
             };
             if leaves {
-                return Ok(End::Quit);
+                return self.ended();
             }
         }
+    }
+
+    fn draw(&mut self, screen: &mut Screen) -> io::Result<()> {
+        screen.terminal.draw(|frame| self.app.draw(frame))?;
+        screen.set_mouse(self.app.wants_mouse())
+    }
+
+    /// Everything is drawn with the next frame, in the size that the terminal has now.
+    fn draw_anew(&mut self, screen: &mut Screen) -> io::Result<()> {
+        let size = screen.terminal.size()?;
+        self.handle(Input::Terminal(TerminalEvent::Resize(size.width, size.height)));
+        Ok(())
+    }
+
+    /// The console ends like this as soon as the app has left the unit. Gives `true` when it has.
+    fn end(&mut self, end: io::Result<End>) -> bool {
+        self.over.get_or_insert(end);
+        self.handle(Input::Signal)
+    }
+
+    fn ended(&mut self) -> io::Result<End> {
+        self.over.take().unwrap_or(Ok(End::Quit))
     }
 
     /// Hands the app the bytes that have come. Gives `true` when it is to end.
@@ -250,7 +298,12 @@ impl Console {
     fn handle(&mut self, input: Input) -> bool {
         let effects = self.app.handle(self.now(), input);
         self.recorder.follow(self.app.record());
-        self.perform(effects)
+        let leaves = self.perform(effects);
+        // Asked behind what was performed: a recording begins there.
+        match self.recorder.take_warning() {
+            Some(warning) => self.handle(Input::Unrecorded(warning)) || leaves,
+            None => leaves,
+        }
     }
 
     fn perform(&mut self, effects: Vec<Effect>) -> bool {
@@ -259,12 +312,13 @@ impl Console {
             match effect {
                 Effect::OpenLink(name) => {
                     self.close_link();
-                    match name.parse::<LinkSpec>() {
+                    match (self.world.resolve)(&name) {
                         Ok(spec) if spec.is_network() => self.dial(name, spec),
-                        Ok(_) | Err(_) => {
-                            let opened = self.open(&name);
+                        Ok(spec) => {
+                            let opened = self.open(&name, spec);
                             leaves |= self.handle(opened);
                         }
+                        Err(failure) => leaves |= self.handle(Input::LinkFailed(failure)),
                     }
                 }
                 Effect::CloseLink => self.close_link(),
@@ -295,12 +349,18 @@ impl Console {
                 Effect::Mark(text) => self.recorder.mark(self.now(), &text),
                 Effect::Play(playback) => self.steer(playback),
                 Effect::Order(line) => self.order(line),
-                Effect::CheckImage(path) => {
+                Effect::Break => {
+                    let sent = self.link.as_ref().map(Connection::send_break);
+                    let sent = sent.unwrap_or(Ok(())).map_err(|error| error.to_string());
+                    leaves |= self.handle(Input::BreakSent(sent));
+                }
+                Effect::CheckImage { path, allow } => {
                     let check = self.world.check;
-                    self.ask(move || Input::ImageChecked(Box::new(check(path))));
+                    self.ask(move || Input::ImageChecked(Box::new(check(path, &allow))));
                 }
                 Effect::UploadBegins { link, product, image } => (self.world.note)(&link, Some((&product, &image))),
                 Effect::UploadEnds { link } => (self.world.note)(&link, None),
+                Effect::Suspend => self.suspends = true,
                 Effect::Quit => {
                     self.close_link();
                     leaves = true;
@@ -310,9 +370,8 @@ impl Console {
         leaves
     }
 
-    fn open(&mut self, name: &str) -> Input {
-        let spec = name.parse::<LinkSpec>();
-        if let Ok(LinkSpec::Replay(path)) = &spec {
+    fn open(&mut self, name: &str, spec: LinkSpec) -> Input {
+        if let LinkSpec::Replay(path) = &spec {
             return match Recording::open(path) {
                 Ok(recording) => {
                     let player = Player::begin(name, path.clone(), recording, self.now());
@@ -323,8 +382,8 @@ impl Console {
                 Err(error) => Input::LinkFailed((self.world.unreadable)(error)),
             };
         }
-        match (self.world.open)(name, self.world.baud, self.clock, self.sender.clone()) {
-            Ok(connection) => self.begin(name, connection, spec.ok()),
+        match (self.world.open)(&spec, self.world.baud, self.clock, self.sender.clone()) {
+            Ok(connection) => self.begin(name, connection, spec),
             Err(failure) => Input::LinkFailed(failure),
         }
     }
@@ -333,13 +392,12 @@ impl Console {
     fn dial(&mut self, name: String, spec: LinkSpec) {
         let (dial, clock, options) = (self.dial, self.clock, link::Options { baud: self.world.baud });
         let (dialling, sender) = (self.dialling.clone(), self.sender.clone());
-        let begun = thread::Builder::new().name("dial".into()).spawn(move || {
+        in_thread("dial", move || {
             let result = Connection::dial(&spec, options, clock);
             if dialling.send((dial, name, spec, result)).is_ok() {
-                let _ = sender.send(host::Input::Wake);
+                let _ = sender.try_send(host::Input::Wake);
             }
         });
-        debug_assert!(begun.is_ok());
     }
 
     /// Takes what came of dialling, unless the user has gone on to something else. Gives `true` when it is to end.
@@ -351,19 +409,18 @@ impl Console {
         let connection =
             result.and_then(|dialled| Connection::over(&spec, dialled, options, self.clock, self.sender.clone()));
         let input = match connection {
-            Ok(connection) => self.begin(&name, connection, Some(spec)),
+            Ok(connection) => self.begin(&name, connection, spec),
             Err(error) => Input::LinkFailed((self.world.explain)(error)),
         };
         self.handle(input)
     }
 
     /// Takes over an open link and starts its recording.
-    fn begin(&mut self, name: &str, connection: Connection, spec: Option<LinkSpec>) -> Input {
+    fn begin(&mut self, name: &str, connection: Connection, spec: LinkSpec) -> Input {
         self.recorder = Recorder::start(&self.world.recording, &connection, self.clock);
         let recording = self.recorder.path().map(|path| path.display().to_string());
-        let recording = recording.or_else(|| self.recorder.take_warning());
         let options = link::Options { baud: self.world.baud };
-        self.comeback = spec.and_then(|spec| Comeback::of(&spec, options));
+        self.comeback = Comeback::of(&spec, options);
         self.link = Some(connection);
         let start_of_day = host::clock::day_before(self.clock.time_of_day(), self.skew);
         Input::LinkOpened(LinkInfo {
@@ -371,6 +428,7 @@ impl Console {
             baud: self.world.baud,
             read_only: false,
             recording,
+            noted: (self.world.noted)(name).map(|(product, image)| Noted { product, image }),
             start_of_day,
             start_millis: self.clock.wall(Instant::ZERO).as_millisecond()
                 - i64::try_from(self.skew.as_millis()).unwrap_or_default(),
@@ -497,27 +555,29 @@ impl Console {
     /// Finds something out in a thread, which wakes the loop when it has.
     fn ask(&self, find_out: impl FnOnce() -> Input + Send + 'static) {
         let (answer, sender) = (self.answer.clone(), self.sender.clone());
-        let begun = thread::Builder::new().name("answer".into()).spawn(move || {
+        in_thread("answer", move || {
             if answer.send(find_out()).is_ok() {
-                let _ = sender.send(host::Input::Wake);
+                // A full channel wakes the loop by itself.
+                let _ = sender.try_send(host::Input::Wake);
             }
         });
-        // Without threads there is no program either: the key thread came first.
-        debug_assert!(begun.is_ok());
     }
 }
 
-/// Ctrl-Z, as every program of a shell understands it.
-fn is_suspend(event: &TerminalEvent) -> bool {
-    matches!(event, TerminalEvent::Key(key) if key.code == KeyCode::Char('z') && key.modifiers == KeyModifiers::CONTROL)
-}
-
-#[cfg(unix)]
-fn suspend(screen: &mut Screen) -> io::Result<()> {
-    screen.suspend()
-}
-
-#[cfg(not(unix))]
-fn suspend(_screen: &mut Screen) -> io::Result<()> {
-    Ok(())
+/// Does something in a thread of its own; where the system has none to give, it is done here, so that whoever waits for
+/// what comes of it does not wait for ever.
+fn in_thread(name: &str, work: impl FnOnce() + Send + 'static) {
+    let work = Arc::new(Mutex::new(Some(work)));
+    let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let shared = Arc::clone(&work);
+    let begun = thread::Builder::new().name(name.to_owned()).spawn(move || {
+        if let Some(work) = take(&shared) {
+            work();
+        }
+    });
+    if begun.is_err()
+        && let Some(work) = take(&work)
+    {
+        work();
+    }
 }

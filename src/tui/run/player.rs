@@ -97,6 +97,7 @@ impl Player {
             baud,
             read_only: true,
             recording: None,
+            noted: None,
             start_of_day: clock::day_before(clock::time_of_day(millis), before),
             start_millis: millis - i64::try_from(before.as_millis()).unwrap_or_default(),
         }

@@ -131,8 +131,10 @@ impl Connect {
             Cmd::Refresh => return Some(Action::ListPorts),
             Cmd::Disconnect => {
                 return match view.link.state {
-                    LinkState::Open { .. } if view.job.is_some() => Some(Action::Ask(Question::Disconnect)),
-                    LinkState::Open { .. } | LinkState::Lost(_) => Some(Action::Disconnect),
+                    LinkState::Open { .. } if view.is_in_the_middle() => {
+                        Some(Action::Ask(Question::Disconnect { then: None }))
+                    }
+                    LinkState::Open { .. } | LinkState::Lost(_) => Some(Action::Disconnect { then: None }),
                     LinkState::Closed | LinkState::Opening => None,
                 };
             }
@@ -144,17 +146,35 @@ impl Connect {
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let (list, detail) = lines::split(area, area.height.saturating_sub(DETAIL_ROWS));
-        let (rows, cursor_row) = self.rows(scene, list.width);
-        let first = lines::first_visible(cursor_row, rows.len(), usize::from(list.height));
+        let (rows, places) = self.rows(scene, list.width);
+        let first = self.first_row(&places, rows.len(), list);
         lines::draw(frame, list, rows.into_iter().skip(first));
         lines::draw(frame, detail, self.detail(scene, detail.width));
     }
 
-    /// All rows of the list, and which of them the cursor is on.
-    fn rows(&self, scene: Scene, columns: u16) -> (Vec<Line<'static>>, usize) {
+    /// The entry that is drawn in row `y` of the screen.
+    pub fn entry_at(&self, scene: Scene, area: Rect, y: u16) -> Option<usize> {
+        let (list, _) = lines::split(area, area.height.saturating_sub(DETAIL_ROWS));
+        let (rows, places) = self.rows(scene, list.width);
+        let row = usize::from(y.checked_sub(list.y)?) + self.first_row(&places, rows.len(), list);
+        (y < list.bottom()).then(|| places.iter().position(|&place| place == row))?
+    }
+
+    /// Puts the cursor on an entry. Says whether it was there already.
+    pub fn choose(&mut self, number: usize) -> bool {
+        std::mem::replace(&mut self.cursor, number) == number
+    }
+
+    fn first_row(&self, places: &[usize], rows: usize, list: Rect) -> usize {
+        let cursor_row = places.get(self.cursor).copied().unwrap_or_default();
+        lines::first_visible(cursor_row, rows, usize::from(list.height))
+    }
+
+    /// All rows of the list, and in which of them each entry stands.
+    fn rows(&self, scene: Scene, columns: u16) -> (Vec<Line<'static>>, Vec<usize>) {
         let theme = scene.theme;
         let mut rows = vec![lines::rule(theme, columns, "Serial ports", "")];
-        let mut cursor_row = 0;
+        let mut places = Vec::new();
         match &self.ports {
             Ports::Listing => rows.push(Line::styled("  Looking for ports ...", theme.quiet())),
             Ports::Failed(why) => rows.push(Line::from(vec![
@@ -184,12 +204,10 @@ impl Connect {
                 });
             }
             let is_chosen = number == self.cursor;
-            if is_chosen {
-                cursor_row = rows.len();
-            }
+            places.push(rows.len());
             rows.push(row(scene, entry, is_chosen, usize::from(columns)));
         }
-        (rows, cursor_row)
+        (rows, places)
     }
 
     fn detail(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {

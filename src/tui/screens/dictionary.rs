@@ -162,8 +162,8 @@ impl Dictionary {
         None
     }
 
-    /// The rows that are shown.
-    fn rows<'a>(&self, view: &'a View) -> Vec<Row<'a>> {
+    /// Everything there is to show: what was read, what the manual has besides, and what only the other dump has.
+    fn all_rows<'a>(&self, view: &'a View) -> Vec<Row<'a>> {
         let product = view.product();
         let known = |at: ObjectAddress| {
             let object = product?.dictionary.object(at.index)?;
@@ -192,6 +192,15 @@ impl Dictionary {
             }
         }
         rows.sort_by_key(|row| (row.at.index, row.at.sub));
+        rows
+    }
+
+    /// The rows that are shown.
+    fn rows<'a>(&self, view: &'a View) -> Vec<Row<'a>> {
+        self.chosen(self.all_rows(view))
+    }
+
+    fn chosen<'a>(&self, mut rows: Vec<Row<'a>>) -> Vec<Row<'a>> {
         rows.retain(|row| match self.only {
             Only::Everything => true,
             Only::Deviations => row.read.is_some_and(|read| read.deviates),
@@ -210,17 +219,12 @@ impl Dictionary {
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let (theme, view) = (scene.theme, scene.view);
-        let rows = self.rows(view);
-        let (upper, detail) = match area.width >= BESIDE_AT {
-            true => {
-                let width = area.width - DETAIL_COLUMNS;
-                let beside = Rect { x: area.x + width + 2, width: DETAIL_COLUMNS - 2, ..area };
-                (Rect { width, ..area }, beside)
-            }
-            false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
-        };
+        let all = self.all_rows(view);
+        let total = all.len();
+        let rows = self.chosen(all);
+        let (upper, detail) = parts(area);
         let (head, table) = lines::split(upper, 2);
-        let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len()))];
+        let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len(), total))];
         let columns = usize::from(upper.width);
         let name_columns = name_columns(columns);
         let factory = match &self.other {
@@ -261,7 +265,21 @@ impl Dictionary {
         lines::draw(frame, detail, rows[cursor].detail(scene, detail.width, detail.height > DETAIL_ROWS));
     }
 
-    fn remark(&self, scene: Scene, shown: usize) -> String {
+    /// The row of the table that is drawn in row `y` of the screen.
+    pub fn row_at(&self, view: &View, area: Rect, y: u16) -> Option<usize> {
+        let (_, table) = lines::split(parts(area).0, 2);
+        let rows = self.rows(view).len();
+        let first = lines::first_visible(self.cursor.min(rows.saturating_sub(1)), rows, usize::from(table.height));
+        let row = first + usize::from(y.checked_sub(table.y)?);
+        (y < table.bottom() && row < rows).then_some(row)
+    }
+
+    /// Puts the cursor on a row.
+    pub fn choose(&mut self, row: usize) {
+        self.cursor = row;
+    }
+
+    fn remark(&self, scene: Scene, shown: usize, total: usize) -> String {
         let view = scene.view;
         let mut parts = Vec::new();
         if view.job == Some(Job::ReadDictionary) {
@@ -271,8 +289,7 @@ impl Dictionary {
                 None => parts.push("the manual's; V reads the unit's".to_owned()),
                 Some(read) => {
                     let time = format::time_of_day(scene.start_of_day, read.at);
-                    let all = read.dump.entries.len();
-                    parts.push(format!("{shown} of {all}, {} not as factory, {time}", read.dump.deviations()));
+                    parts.push(format!("{shown} of {total}, {} not as factory, {time}", read.dump.deviations()));
                 }
             }
         }
@@ -285,6 +302,18 @@ impl Dictionary {
             parts.push(format!("with '{}'", visible::text(&self.words)));
         }
         parts.join(", ")
+    }
+}
+
+/// Where the table with its heading stands, and where the chosen entry is explained.
+fn parts(area: Rect) -> (Rect, Rect) {
+    match area.width >= BESIDE_AT {
+        true => {
+            let width = area.width - DETAIL_COLUMNS;
+            let beside = Rect { x: area.x + width + 2, width: DETAIL_COLUMNS - 2, ..area };
+            (Rect { width, ..area }, beside)
+        }
+        false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
     }
 }
 

@@ -24,7 +24,7 @@ impl Help {
     /// Moves by rows, positive to the end.
     pub fn scroll(&mut self, rows: isize) {
         // The picture stops at the end; this stops soon behind it.
-        let longest = page(Theme::new(false), 80, ScreenId::Terminal).len();
+        let longest = page(Theme::new(crate::tui::theme::Palette::Mono), 80, ScreenId::Terminal).len();
         self.scrolled = self.scrolled.saturating_add_signed(rows).min(longest);
     }
 

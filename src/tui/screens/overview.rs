@@ -41,6 +41,10 @@ const CHART_ROWS: u16 = 32;
 const LEAST_SPAN: [f64; 2] = [1.0, 10.0];
 /// Columns of the values before the trend begins.
 const TABLE_COLUMNS: usize = 67;
+/// From this width on the limits have columns of their own ...
+const LIMITS_AT: u16 = 110;
+/// ... of this width each.
+const LIMIT_COLUMNS: usize = 9;
 
 /// The page.
 #[derive(Debug, Default)]
@@ -78,7 +82,7 @@ impl Overview {
         let unit = unit(scene, area.width);
         let (upper, rest) = lines::split(area, unit.len() as u16);
         lines::draw(frame, upper, unit);
-        let values = self.values(scene, area.width);
+        let values = self.values(scene, area);
         let (middle, rest) = lines::split(rest, values.len() as u16);
         lines::draw(frame, middle, values);
         let chart_rows = match scene.view.monitor.stream.channels.get(self.cursor) {
@@ -94,7 +98,8 @@ impl Overview {
         lines::draw(frame, lower, faults(scene, lower));
     }
 
-    fn values(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
+    fn values(&self, scene: Scene, area: Rect) -> Vec<Line<'static>> {
+        let columns = area.width;
         let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
         let is_on = scene.view.facts.stream.is_some();
         let newest = stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
@@ -112,12 +117,24 @@ impl Overview {
         };
         let remark = format!("{what}, {} rows, newest {}", format::grouped(stream.rows), newest.unwrap_or_default());
         let mut shown = vec![lines::rule(theme, columns, "Values", &remark)];
-        let heads = format!("    {:<8}{:>13}   {:<15}{:>11}{:>11}  Trend", "Channel", "Value", "State", "Min", "Max");
+        // They are temperatures: beside counts they would say nothing.
+        let has_limits = source == Source::FieldValue && scene.view.dictionary.is_some();
+        let has_columns = has_limits && columns >= LIMITS_AT;
+        let limit_heads =
+            if has_columns { format!("{:>9}{:>9}{:>9}", "Low", "High", "Shutdown") } else { String::new() };
+        let heads = format!(
+            "    {:<8}{:>13}   {:<15}{:>11}{:>11}{limit_heads}  Trend",
+            "Channel", "Value", "State", "Min", "Max"
+        );
         shown.push(Line::styled(heads, theme.quiet()));
         let decimals = decimals(scene.view, source);
-        let room = usize::from(columns).saturating_sub(TABLE_COLUMNS + 2);
+        let taken = TABLE_COLUMNS + 2 + if has_columns { 3 * LIMIT_COLUMNS } else { 0 };
+        let room = usize::from(columns).saturating_sub(taken);
         for (number, channel) in stream.channels.iter().enumerate() {
-            shown.push(value_row(scene, channel, number == self.cursor, source, decimals, room));
+            shown.push(value_row(scene, channel, number == self.cursor, source, decimals, room, has_columns));
+        }
+        if area.height >= CHART_ROWS {
+            shown.extend(averages(scene));
         }
         if !is_on {
             shown.push(Line::styled(
@@ -130,10 +147,45 @@ impl Overview {
                 theme.warning(),
             ));
         } else {
-            shown.push(Line::default());
+            let chosen = stream.channels.get(self.cursor).map(|channel| channel.name.as_str());
+            shown.push(limits_line(scene, source, chosen.unwrap_or_default(), has_columns));
         }
         shown
     }
+}
+
+/// The limits of one channel in a line, or how to see them.
+fn limits_line(scene: Scene, source: Source, channel: &str, has_columns: bool) -> Line<'static> {
+    let (theme, view) = (scene.theme, scene.view);
+    let text = match (&view.dictionary, view.limits(channel)) {
+        _ if source != Source::FieldValue => return Line::default(),
+        (None, _) => "  Limits: not read yet, V reads them.".to_owned(),
+        (Some(read), _) if has_columns => {
+            format!("  Limits read {}; V reads them again.", format::time_of_day(scene.start_of_day, read.at))
+        }
+        (Some(_), None) => format!("  {channel} has no limits."),
+        (Some(read), Some(limits)) => {
+            let show = |limit: Option<f64>| limit.map_or_else(|| "-".to_owned(), |limit| format!("{limit:.1}"));
+            format!(
+                "  Limits of {channel}: low {}, high {}, shutdown {} °C, read {}.",
+                show(limits.low),
+                show(limits.high),
+                show(limits.shutdown),
+                format::time_of_day(scene.start_of_day, read.at)
+            )
+        }
+    };
+    Line::styled(text, theme.quiet())
+}
+
+/// The unit's averages, as they were when its dictionary was read.
+fn averages(scene: Scene) -> Option<Line<'static>> {
+    let read = scene.view.dictionary.as_ref()?;
+    let averages = scene.view.averages();
+    let said: Vec<String> = averages.into_iter().map(|(name, value)| format!("{name} {value:.1}")).collect();
+    let time = format::time_of_day(scene.start_of_day, read.at);
+    let text = format!("  Averages, read {time}: {} °C", said.join(", "));
+    (!said.is_empty()).then(|| Line::styled(text, scene.theme.quiet()))
 }
 
 /// Digits behind the point, as the product prints them.
@@ -263,6 +315,7 @@ fn value_row(
     source: Source,
     decimals: usize,
     room: usize,
+    has_limits: bool,
 ) -> Line<'static> {
     let theme = scene.theme;
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
@@ -274,7 +327,20 @@ fn value_row(
         Some(value) => format!("{}{unit}", number(Some(value))),
         None => "-   ".into(),
     };
-    let (state, style) = (channel.reading.words(), theme.state(channel.reading));
+    let limits = scene.view.limits(&channel.name).filter(|_| source == Source::FieldValue);
+    let beyond = limits.zip(channel.reading.value()).and_then(|(limits, value)| limits.word(value));
+    let (state, style) = match beyond {
+        Some(word) => (format!("{}, {word}", channel.reading.words()), theme.warning()),
+        None => (channel.reading.words().to_owned(), theme.state(channel.reading)),
+    };
+    let limit_columns = match has_limits {
+        true => {
+            let limits = limits.unwrap_or_default();
+            let show = |limit: Option<f64>| limit.map_or_else(|| "-".to_owned(), |limit| format!("{limit:.1}"));
+            [limits.low, limits.high, limits.shutdown].map(|limit| format!("{:>LIMIT_COLUMNS$}", show(limit))).concat()
+        }
+        false => String::new(),
+    };
     let span = LEAST_SPAN[usize::from(source == Source::ProcessValue)];
     let newest = channel.history.len().saturating_sub(room);
     let values: Vec<_> = channel.history.range(newest..).map(|&(_, reading)| reading.value()).collect();
@@ -286,7 +352,9 @@ fn value_row(
         Span::styled(format!("{value:>13}"), value_style),
         Span::raw("   "),
         Span::styled(format!("{state:<15}"), style),
-        Span::raw(format!("{:>11}{:>11}  ", number(channel.min), number(channel.max))),
+        Span::raw(format!("{:>11}{:>11}", number(channel.min), number(channel.max))),
+        Span::styled(limit_columns, theme.quiet()),
+        Span::raw("  "),
         Span::styled(sparkline(&values, room, span), theme.curve()),
     ])
 }

@@ -65,6 +65,8 @@ const PACES: [Pace; 6] =
 const LEAST_STEP: Duration = Duration::from_secs(10);
 /// Rows of what is being played.
 const PLAYER_ROWS: u16 = 4;
+/// Rows below the list: where the chosen one lies, and how it is passed on.
+const DETAIL_ROWS: u16 = 6;
 
 /// The page.
 #[derive(Debug, Default)]
@@ -142,6 +144,9 @@ impl Recordings {
             None => area,
         };
         let theme = scene.theme;
+        let detail = self.detail(scene, area.width);
+        let (rest, lower) = lines::split(rest, rest.height.saturating_sub(detail.len() as u16));
+        lines::draw(frame, lower, detail);
         let (heading, list) = lines::split(rest, 1);
         let entries = self.entries();
         let remark = if entries.is_empty() { String::new() } else { format!("{}, newest first", entries.len()) };
@@ -162,6 +167,39 @@ impl Recordings {
                 lines::draw(frame, list, rows.map(|(number, entry)| self.row(scene, entry, number, list.width)));
             }
         }
+    }
+
+    /// The entry that is drawn in row `y` of the screen.
+    pub fn entry_at(&self, scene: Scene, area: Rect, y: u16) -> Option<usize> {
+        let above = 1 + if scene.view.playing.is_some() { PLAYER_ROWS } else { 0 };
+        let below = self.detail(scene, area.width).len() as u16;
+        let room = area.height.saturating_sub(above + below);
+        let row = y.checked_sub(area.y + above).filter(|row| *row < room)?;
+        let first = lines::first_visible(self.cursor, self.entries().len(), usize::from(room));
+        Some(first + usize::from(row)).filter(|number| *number < self.entries().len())
+    }
+
+    /// Puts the cursor on an entry. Says whether it was there already.
+    pub fn choose(&mut self, number: usize) -> bool {
+        std::mem::replace(&mut self.cursor, number) == number
+    }
+
+    /// Where the chosen one lies, and what to do with it.
+    fn detail(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
+        let Some(entry) = self.entries().get(self.cursor) else { return Vec::new() };
+        let theme = scene.theme;
+        let path = visible::text(entry.link.strip_prefix("replay:").unwrap_or(&entry.link));
+        let room = usize::from(columns).saturating_sub(4);
+        let mut rows = vec![lines::rule(theme, columns, "To send it to somebody", "")];
+        // Two lines: whoever copies the path needs all of it.
+        rows.extend(
+            format::pieces(&path, room).into_iter().map(|piece| Line::styled(format!("  {piece}"), theme.strong())),
+        );
+        let text = "Attach this file: every byte, both directions, with times; of a password only its length. As one page \
+                    to read: axcon report --port replay:FILE --out report.html";
+        rows.extend(format::wrap(text, room).into_iter().map(|line| Line::raw(format!("  {line}"))));
+        rows.truncate(usize::from(DETAIL_ROWS));
+        rows
     }
 
     fn row(&self, scene: Scene, entry: &RecordingEntry, number: usize, columns: u16) -> Line<'static> {

@@ -198,7 +198,7 @@ impl Stream {
         for (number, channel) in values.channels.iter().enumerate() {
             rows.push(self.row(scene, channel, number, columns));
         }
-        rows.push(note(scene));
+        rows.push(note(scene, usize::from(columns)));
         rows
     }
 
@@ -242,21 +242,24 @@ fn state(theme: Theme, reading: Option<Reading>) -> (&'static str, Style) {
 }
 
 /// What has to be said below the table: where rows go, or that none come.
-fn note(scene: Scene) -> Line<'static> {
+fn note(scene: Scene, columns: usize) -> Line<'static> {
     let (theme, view) = (scene.theme, scene.view);
+    let exports = view.export.is_some();
+    // Where rows go says nothing of whether any come: that stands first, shorter where both have to.
+    let warning = match (view.facts.stream.is_none(), view.monitor.stream.late) {
+        (true, _) if exports => "  The stream is off. ",
+        (true, _) => "  The stream is off: these are its last values. T switches it on.",
+        (false, true) if exports => "  No new row: old values. ",
+        (false, true) => "  No new row: these values are old. M asks whether the unit still answers.",
+        (false, false) => "",
+    };
+    let mut line = Line::from(Span::styled(warning, theme.warning()));
     if let Some(export) = &view.export {
-        let path = visible::text(&export.path.to_string_lossy());
-        let text = format!("  {} rows written to {path}; E ends it.", format::grouped(export.rows));
-        return Line::styled(text, theme.good());
+        let (begin, end) = (format!("  {} rows written to ", format::grouped(export.rows)), "; E ends it.");
+        let room = columns.saturating_sub(format::width(warning) + format::width(&begin) + format::width(end));
+        let path = format::keep_end(&visible::text(&export.path.to_string_lossy()), room);
+        let style = if warning.is_empty() { theme.good() } else { theme.quiet() };
+        line.push_span(Span::styled(format!("{begin}{path}{end}"), style));
     }
-    if view.facts.stream.is_none() {
-        return Line::styled("  The stream is off: these are its last values. T switches it on.", theme.warning());
-    }
-    if view.monitor.stream.late {
-        return Line::styled(
-            "  No new row: these values are old. M asks whether the unit still answers.",
-            theme.warning(),
-        );
-    }
-    Line::default()
+    line
 }

@@ -60,6 +60,12 @@ pub const BINDINGS: &[Binding] = &[
         short: "next",
         long: "the next place further up that has them",
     },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('b'))],
+        cmd: Cmd::Break,
+        short: "",
+        long: "send a break: the line held low for a quarter of a second",
+    },
 ];
 
 /// Bytes in a row of the hex view.
@@ -193,6 +199,7 @@ impl Terminal {
                     Mode::Hex(_) => Mode::Text(None),
                 }
             }
+            Cmd::Break => return Some(Action::Break),
             Cmd::Times => self.with_times = !self.with_times,
             Cmd::Find => return Some(Action::Ask(Question::find(&self.words))),
             Cmd::FindNext => {
@@ -246,8 +253,10 @@ impl Terminal {
             }
             Mode::Hex(place) => {
                 let place = place.unwrap_or(HexPlace { received: record.received(), sent: record.sent(), rows: 0 });
-                let most = if up > 0 { hex(record, &place, usize::MAX).len().saturating_sub(1) } else { usize::MAX };
-                let rows = usize::try_from((place.rows as i64 + up).max(0)).unwrap_or(0).min(most);
+                let wanted = usize::try_from((place.rows as i64 + up).max(0)).unwrap_or(0);
+                // Up to the row that is wanted, and no further: there may be half a million of them.
+                let there = if up > 0 { hex(record, &place, wanted, 1).1 } else { usize::MAX };
+                let rows = wanted.min(there.saturating_sub(1));
                 Mode::Hex((rows > 0).then_some(HexPlace { rows, ..place }))
             }
         };
@@ -326,18 +335,17 @@ struct HexRow {
 fn hex_rows(scene: Scene, area: Rect, place: Option<HexPlace>, with_times: bool) -> Vec<Line<'static>> {
     let room = usize::from(area.height);
     let place = place.unwrap_or(HexPlace { received: scene.record.received(), sent: scene.record.sent(), rows: 0 });
-    let rows = hex(scene.record, &place, room.saturating_add(place.rows));
-    rows.iter()
-        .skip(place.rows)
-        .take(room)
-        .rev()
-        .map(|row| hex_line(scene.theme, row, with_times.then_some(scene.start_of_day)))
-        .collect()
+    let (rows, _) = hex(scene.record, &place, place.rows, room);
+    rows.iter().rev().map(|row| hex_line(scene.theme, row, with_times.then_some(scene.start_of_day))).collect()
 }
 
-/// Rows of the newest bytes before a place, newest row first, `most` at most.
-fn hex(record: &Record, place: &HexPlace, most: usize) -> Vec<HexRow> {
+/// Rows of the newest bytes before a place, newest row first: the first `skip` of them are only counted, `most` are
+/// built. Gives these, and how many rows were seen in all.
+fn hex(record: &Record, place: &HexPlace, skip: usize, most: usize) -> (Vec<HexRow>, usize) {
     let mut rows: Vec<HexRow> = Vec::new();
+    let mut seen = 0;
+    // The row that is being put together, whether it is built or only counted.
+    let mut last: Option<(Direction, u64, u64)> = None;
     for entry in record.entries().rev() {
         let limit = match entry.direction {
             Direction::FromUnit => place.received,
@@ -348,30 +356,29 @@ fn hex(record: &Record, place: &HexPlace, most: usize) -> Vec<HexRow> {
             let start = ((end - 1) / HEX_BYTES * HEX_BYTES).max(entry.start);
             let bytes = &entry.bytes[(start - entry.start) as usize..(end - entry.start) as usize];
             let row_start = start / HEX_BYTES * HEX_BYTES;
-            match rows.last_mut() {
-                // Bytes of one row that came in several pieces.
-                Some(row) if row.direction == entry.direction && row.start == row_start && row.first == end => {
-                    row.first = start;
-                    row.at = entry.at;
-                    row.bytes.splice(0..0, bytes.iter().copied());
+            // Bytes of one row may have come in several pieces.
+            let goes_on = last == Some((entry.direction, row_start, end));
+            last = Some((entry.direction, row_start, start));
+            if !goes_on {
+                if rows.len() >= most {
+                    return (rows, seen);
                 }
-                _ => {
-                    if rows.len() >= most {
-                        return rows;
-                    }
-                    rows.push(HexRow {
-                        direction: entry.direction,
-                        start: row_start,
-                        first: start,
-                        bytes: bytes.to_vec(),
-                        at: entry.at,
-                    });
+                seen += 1;
+                if seen > skip {
+                    let (direction, at) = (entry.direction, entry.at);
+                    rows.push(HexRow { direction, start: row_start, first: start, bytes: bytes.to_vec(), at });
                 }
+            } else if seen > skip
+                && let Some(row) = rows.last_mut()
+            {
+                row.first = start;
+                row.at = entry.at;
+                row.bytes.splice(0..0, bytes.iter().copied());
             }
             end = start;
         }
     }
-    rows
+    (rows, seen)
 }
 
 fn hex_line(theme: Theme, row: &HexRow, times: Option<crate::time::Duration>) -> Line<'static> {
@@ -463,11 +470,30 @@ mod tests {
         say(3, Direction::ToUnit, b"m");
         say(4, Direction::FromUnit, b"ij");
         let place = HexPlace { received: record.received(), sent: record.sent(), rows: 0 };
-        let rows: Vec<_> =
-            hex(&record, &place, 9).iter().map(|row| (row.start, String::from_utf8_lossy(&row.bytes).into())).collect();
+        let shown = |skip, most| -> Vec<(u64, String)> {
+            let (rows, _) = hex(&record, &place, skip, most);
+            rows.iter().map(|row| (row.start, String::from_utf8_lossy(&row.bytes).into())).collect()
+        };
+        let rows = shown(0, 9);
         let expected: [(u64, String); 4] =
             [(16, "ij".into()), (0, "m".into()), (16, "gh".into()), (0, "0123456789abcdef".into())];
         assert_eq!(rows, expected);
-        assert_eq!(hex(&record, &HexPlace { received: 10, sent: 0, rows: 0 }, 9).len(), 1);
+        for skip in 0..6 {
+            assert_eq!(shown(skip, 1), expected.iter().skip(skip).take(1).cloned().collect::<Vec<_>>(), "{skip}");
+        }
+        assert_eq!(hex(&record, &place, 9, 1).1, 4, "all of them are counted");
+        assert_eq!(hex(&record, &HexPlace { received: 10, sent: 0, rows: 0 }, 0, 9).0.len(), 1);
+    }
+
+    #[test]
+    fn a_step_far_up_in_a_full_record_builds_one_row_and_not_half_a_million() {
+        let mut record = Record::new();
+        (0..1500).for_each(|_| {
+            record.push(Instant::ZERO, Direction::FromUnit, Secrecy::Open, &[0x55; 4096]);
+        });
+        let place = HexPlace { received: record.received(), sent: 0, rows: 0 };
+        let (rows, seen) = hex(&record, &place, 300_000, 1);
+        assert_eq!((rows.len(), seen), (1, 300_001));
+        assert_eq!(rows[0].start, record.received() - 16 * 300_001);
     }
 }

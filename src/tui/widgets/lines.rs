@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn a_rule_is_exactly_as_wide_as_asked() {
-        let theme = Theme::new(false);
+        let theme = Theme::new(crate::tui::theme::Palette::Mono);
         for columns in 10..100 {
             for remark in ["", "newest 12:00:00"] {
                 assert_eq!(rule(theme, columns, "Values", remark).width(), usize::from(columns), "{columns} {remark}");

@@ -77,6 +77,11 @@ impl Screen {
         }
     }
 
+    /// Something else writes over what is on the screen.
+    pub fn spoil(&self) {
+        self.picture.lock().expect("no panic").process(b"\x1b[2J\x1b[Hsomething else");
+    }
+
     /// Gives the terminal another size; the program is told by a signal.
     pub fn resize(&self, rows: u16, columns: u16) {
         tcsetwinsize(&*self.master, size(rows, columns)).expect("sized");

@@ -1,0 +1,115 @@
+//! Files that rows and the dictionary go to, and dumps that are read.
+
+use std::path::{Path, PathBuf};
+
+use super::App;
+use crate::dump::{self, Dump};
+use crate::time::Instant;
+use crate::tui::input::Effect;
+use crate::tui::view::{Export, Tone};
+use crate::tui::widgets::format;
+use crate::wire::stream::Row;
+
+impl App {
+    pub(super) fn mark(&mut self, effects: &mut Vec<Effect>) {
+        self.view.mark(self.now);
+        let text = format!("mark {}", self.view.monitor.stream.marks.len());
+        self.scrollback.note(self.now, text.clone());
+        self.view.tell(Tone::Quiet, format!("{text} is set, in the chart and in the recording."));
+        effects.push(Effect::Mark(text));
+    }
+
+    pub(super) fn export_stream(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
+        let (stream, start) = (&self.view.monitor.stream, self.view.link.start_millis);
+        let channels: Vec<String> = stream.channels.iter().map(|channel| channel.name.clone()).collect();
+        if channels.is_empty() {
+            return self.view.tell(Tone::Bad, "There are no rows yet: T switches the stream on.");
+        }
+        let mut text = Row::csv_heading(&channels);
+        let mut rows = 0;
+        for (at, row) in stream.kept_rows() {
+            text.push_str(&row.csv(&format::utc(start, at)));
+            rows += 1;
+        }
+        effects.push(Effect::CreateFile { path: path.clone(), bytes: text.into_bytes() });
+        self.view.export = Some(Export { path, rows, channels });
+    }
+
+    /// A row for the file that rows are written to.
+    pub(super) fn export_row(&mut self, at: Instant, row: &Row, effects: &mut Vec<Effect>) {
+        let start = self.view.link.start_millis;
+        let Some(export) = &mut self.view.export else { return };
+        if export.channels.len() != row.readings.len() {
+            return self.end_export(Some("the stream has other channels now"));
+        }
+        export.rows += 1;
+        let bytes = row.csv(&format::utc(start, at)).into_bytes();
+        match effects.last_mut() {
+            // Rows that came together are written together.
+            Some(Effect::AppendFile { path, bytes: before }) if *path == export.path => before.extend(bytes),
+            _ => effects.push(Effect::AppendFile { path: export.path.clone(), bytes }),
+        }
+    }
+
+    pub(super) fn end_export(&mut self, why: Option<&str>) {
+        let Some(export) = self.view.export.take() else { return };
+        let path = export.path.display();
+        let text = match why {
+            None => format!("{} rows are in {path}.", format::grouped(export.rows)),
+            Some(why) => format!("{path} ends after {} rows: {why}.", format::grouped(export.rows)),
+        };
+        self.view.tell(if why.is_none() { Tone::Good } else { Tone::Bad }, text);
+    }
+
+    pub(super) fn export_dictionary(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
+        let Some(read) = &self.view.dictionary else {
+            return self.view.tell(Tone::Bad, "Nothing has been read yet: V reads the object dictionary.");
+        };
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
+        let text = match (ending.as_str(), self.view.product()) {
+            ("json", _) => read.dump.json(),
+            ("csv", _) => read.dump.csv(),
+            ("txt", _) => read.dump.table(),
+            ("dcf", Some(product)) => dump::configuration(&read.reading, product, &self.view.facts),
+            ("dcf", None) => {
+                return self.view.tell(Tone::Bad, "A DCF needs to know the product; .json keeps everything.");
+            }
+            _ => return self.view.tell(Tone::Bad, "Not written: the name has to end in .json, .csv, .dcf or .txt."),
+        };
+        effects.push(Effect::CreateFile { path, bytes: text.into_bytes() });
+    }
+
+    pub(super) fn file_written(&mut self, path: &Path, result: Result<(), String>) {
+        self.dirty = true;
+        let shown = path.display();
+        let is_export = self.view.export.as_ref().is_some_and(|export| export.path == path);
+        match result {
+            Ok(()) if is_export => {}
+            Ok(()) => self.view.tell(Tone::Good, format!("{shown} is written.")),
+            Err(why) => {
+                if is_export {
+                    self.view.export = None;
+                }
+                self.view.tell(Tone::Bad, format!("{shown} is not written: {why}."));
+            }
+        }
+    }
+
+    pub(super) fn file_read(&mut self, path: &Path, text: Result<String, String>) {
+        self.dirty = true;
+        let name = path.display().to_string();
+        let dump = text.and_then(|text| Dump::parse(&name, &text).map_err(|error| error.to_string()));
+        match dump {
+            Err(why) => self.view.tell(Tone::Bad, format!("Not compared: {why}.")),
+            Ok(_) if self.view.dictionary.is_none() => {
+                self.view.tell(Tone::Bad, "Nothing to compare it with yet: V reads the unit's object dictionary.");
+            }
+            Ok(dump) => {
+                let short = path.file_name().map_or(name.clone(), |name| name.to_string_lossy().into_owned());
+                self.dictionary.compare(short, dump);
+                self.view
+                    .tell(Tone::Quiet, format!("Compared with {name}: ≠ marks what differs, O chooses what is shown."));
+            }
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! What keys, pastes and the mouse do.
+
+use ratatui::crossterm::event::{
+    Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
+};
+use ratatui::layout::Rect;
+
+use super::App;
+use crate::session::{Command, Job, Session};
+use crate::tui::action::Action;
+use crate::tui::frame;
+use crate::tui::input::Effect;
+use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd};
+use crate::tui::popup::{Answer, Popup, Question};
+use crate::tui::screens::ScreenId;
+use crate::tui::screens::help::Help;
+use crate::tui::screens::terminal::Meaning;
+use crate::tui::theme::Theme;
+use crate::tui::view::{LinkState, Tone};
+use crate::tui::widgets::lines;
+
+impl App {
+    pub(super) fn terminal_event(&mut self, event: TerminalEvent, effects: &mut Vec<Effect>) {
+        match event {
+            // Windows reports the release of a key as well.
+            TerminalEvent::Key(key) if key.kind != KeyEventKind::Release => {
+                self.dirty = true;
+                self.key(key, effects);
+            }
+            TerminalEvent::Paste(text) => {
+                self.dirty = true;
+                self.paste(&text);
+            }
+            TerminalEvent::Resize(columns, rows) => {
+                self.dirty = true;
+                self.size = (columns, rows);
+            }
+            TerminalEvent::Mouse(mouse) => self.mouse(mouse, effects),
+            TerminalEvent::Key(_) | TerminalEvent::FocusGained | TerminalEvent::FocusLost => {}
+        }
+    }
+
+    pub(super) fn mouse(&mut self, mouse: MouseEvent, effects: &mut Vec<Effect>) {
+        let step = match mouse.kind {
+            MouseEventKind::ScrollUp => Some(KeyCode::Up),
+            MouseEventKind::ScrollDown => Some(KeyCode::Down),
+            _ => None,
+        };
+        if let Some(code) = step.filter(|_| self.popup.is_none()) {
+            self.dirty = true;
+            return self.key(KeyEvent::new(code, KeyModifiers::NONE), effects);
+        }
+        if mouse.kind != MouseEventKind::Down(MouseButton::Left) || self.popup.is_some() {
+            return;
+        }
+        let (columns, rows) = self.size;
+        let column = usize::from(mouse.column);
+        let front = self.help.is_none().then_some(self.front);
+        let cmd = match mouse.row {
+            1 => frame::tab_at(&self.view, front, usize::from(columns), column).map(Cmd::Go),
+            row if row + 2 == rows => frame::menu_at(column),
+            row => self.choose_at(columns, rows, row),
+        };
+        if let Some(cmd) = cmd {
+            self.dirty = true;
+            self.help = None;
+            self.on(cmd, effects);
+        }
+    }
+
+    /// A click into a list: what stands there is chosen, and what is chosen already is done.
+    pub(super) fn choose_at(&mut self, columns: u16, rows: u16, y: u16) -> Option<Cmd> {
+        if self.help.is_some() {
+            return None;
+        }
+        let body = frame::body(Rect::new(0, 0, columns, rows));
+        let (_, area) = lines::split(body, frame::lost(&self.view, self.theme, usize::from(columns)).len() as u16);
+        self.dirty = true;
+        let again = match self.front {
+            ScreenId::Connect => {
+                let entry = self.connect.entry_at(self.scene(), area, y)?;
+                self.connect.choose(entry)
+            }
+            ScreenId::Load => {
+                let entry = self.load.entry_at(&self.view, area, y)?;
+                self.load.choose(entry)
+            }
+            ScreenId::Recordings => {
+                let entry = self.recordings.entry_at(self.scene(), area, y)?;
+                self.recordings.choose(entry)
+            }
+            ScreenId::Dictionary => {
+                let row = self.dictionary.row_at(&self.view, area, y)?;
+                self.dictionary.choose(row);
+                false
+            }
+            ScreenId::Overview | ScreenId::Terminal | ScreenId::Stream | ScreenId::Diagnostics | ScreenId::Bench => {
+                false
+            }
+        };
+        again.then_some(Cmd::Accept)
+    }
+
+    pub(super) fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+        // No text and no answer: it means the same in front of everything but the bare terminal.
+        if !self.passes_keys() && keymap::find(&[EVERYWHERE], key) == Some(Cmd::Suspend) {
+            return self.on(Cmd::Suspend, effects);
+        }
+        if let Some(popup) = &mut self.popup {
+            let is_waiting = matches!(popup, Popup::Waiting { .. });
+            match popup.on(key) {
+                // A link that takes long to open must not hold the user.
+                Answer::Stay if is_waiting && keymap::find(&[EVERYWHERE], key) == Some(Cmd::Quit) => {
+                    effects.push(Effect::Quit);
+                }
+                Answer::Stay if is_waiting && key.code == KeyCode::Esc && self.leaving.is_none() => {
+                    self.popup = None;
+                    self.disconnect(effects);
+                }
+                Answer::Stay => {}
+                Answer::Close => self.popup = None,
+                Answer::Act(action) => {
+                    self.popup = None;
+                    self.perform(action, effects);
+                }
+                Answer::Meanwhile(action) => self.perform(action, effects),
+            }
+            return;
+        }
+        if let Some(help) = &mut self.help {
+            let page = isize::from(i16::try_from(self.size.1).unwrap_or(i16::MAX)) / 2;
+            match key.code {
+                KeyCode::Up => return help.scroll(-1),
+                KeyCode::Down => return help.scroll(1),
+                KeyCode::PageUp => return help.scroll(-page),
+                KeyCode::PageDown => return help.scroll(page),
+                _ => {}
+            }
+            self.help = None;
+            // Another screen's key goes there; every other key only closes the page.
+            match keymap::find(&[EVERYWHERE], key) {
+                Some(cmd @ (Cmd::Go(_) | Cmd::Next | Cmd::Previous)) => return self.on(cmd, effects),
+                _ => return,
+            }
+        }
+        if self.front == ScreenId::Terminal {
+            match self.terminal.meaning(key) {
+                Meaning::Keys(bytes) => return self.perform(Action::Command(Command::Keys(bytes)), effects),
+                Meaning::Nothing => return,
+                Meaning::Console => {}
+            }
+        }
+        if let Some(cmd) = keymap::find(&[self.front.bindings(), MENU, EVERYWHERE], key) {
+            self.on(cmd, effects);
+        }
+    }
+
+    pub(super) fn paste(&mut self, text: &str) {
+        if let Some(popup) = &mut self.popup {
+            return popup.paste(text);
+        }
+        if self.front != ScreenId::Terminal || self.help.is_some() {
+            return;
+        }
+        // Enter is CR on this line (manual, chapter 4); the unit knows ASCII only.
+        let joined = text.replace("\r\n", "\r").replace('\n', "\r");
+        let bytes: Vec<u8> = joined.bytes().filter(|byte| matches!(byte, b' '..=b'~' | b'\r' | b'\t')).collect();
+        if !bytes.is_empty() {
+            self.popup = Some(Popup::Asking(Question::Paste(bytes)));
+        }
+    }
+
+    pub(super) fn on(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
+        match cmd {
+            Cmd::Menu(menu) => self.menu(menu, effects),
+            Cmd::Go(screen) => self.perform(Action::Go(screen), effects),
+            Cmd::Next => self.perform(Action::Go(self.front.step(1)), effects),
+            Cmd::Previous => self.perform(Action::Go(self.front.step(ScreenId::ALL.len() - 1)), effects),
+            Cmd::Help => self.help = Some(Help::default()),
+            Cmd::Quit if self.view.is_in_the_middle() => self.ask(Question::Quit),
+            Cmd::Quit => effects.push(Effect::Quit),
+            // Time goes on while the program is stopped: every deadline of the job would be over.
+            Cmd::Suspend if self.view.is_in_the_middle() && self.view.can_send() => {
+                let what = self.view.job.map_or("the unit's view is open: close it with X first", |_| "a job runs");
+                self.view.tell(Tone::Bad, format!("Not stopped: {what}."));
+            }
+            Cmd::Suspend => effects.push(Effect::Suspend),
+            Cmd::Palette => {
+                self.theme = Theme::new(self.theme.palette().next());
+                self.view.tell(Tone::Quiet, format!("Colours: {}.", self.theme.palette().words()));
+            }
+            Cmd::Reconnect => {
+                if matches!(self.view.link.state, LinkState::Lost(_)) {
+                    self.perform(Action::Reconnect, effects);
+                }
+            }
+            Cmd::Up
+            | Cmd::Down
+            | Cmd::PageUp
+            | Cmd::PageDown
+            | Cmd::First
+            | Cmd::Last
+            | Cmd::Accept
+            | Cmd::Back
+            | Cmd::Refresh
+            | Cmd::Type
+            | Cmd::Disconnect
+            | Cmd::Hex
+            | Cmd::Times
+            | Cmd::Restart
+            | Cmd::Left
+            | Cmd::Right
+            | Cmd::Zoom
+            | Cmd::Pause
+            | Cmd::Mark
+            | Cmd::Export
+            | Cmd::Find
+            | Cmd::FindNext
+            | Cmd::Only
+            | Cmd::Compare
+            | Cmd::Pack
+            | Cmd::Allow
+            | Cmd::Break
+            | Cmd::Faster
+            | Cmd::Slower
+            | Cmd::OpenWire
+            | Cmd::ShortWire
+            | Cmd::Repair
+            | Cmd::Power
+            | Cmd::Prefix => self.screen(cmd, effects),
+        }
+    }
+
+    pub(super) fn screen(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
+        let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1));
+        let page = usize::from(area.height);
+        let record = self.session.as_ref().map_or(&self.no_record, Session::record);
+        let action = match self.front {
+            ScreenId::Connect => self.connect.on(cmd, &self.view),
+            ScreenId::Overview => self.overview.on(cmd, self.view.monitor.stream.channels.len()),
+            ScreenId::Terminal => self.terminal.on(cmd, &self.scrollback, record, page),
+            ScreenId::Load => self.load.on(cmd, &self.view, area),
+            ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
+            ScreenId::Stream => self.stream.on(cmd, &self.view),
+            ScreenId::Diagnostics => {
+                let found = &self.view.monitor.diagnostics;
+                self.diagnostics.on(cmd, found.lines.len().max(found.found.len()), page)
+            }
+            ScreenId::Recordings => self.recordings.on(cmd, &self.view),
+            ScreenId::Bench => self.bench.on(cmd, &self.view),
+        };
+        if let Some(action) = action {
+            self.perform(action, effects);
+        }
+    }
+
+    /// A key of the unit's menu.
+    pub(super) fn menu(&mut self, menu: MenuCmd, effects: &mut Vec<Effect>) {
+        if menu == MenuCmd::Load {
+            // Files can be looked at without a unit.
+            return self.perform(Action::Go(ScreenId::Load), effects);
+        }
+        if !self.can_send() {
+            return;
+        }
+        match menu {
+            MenuCmd::Menu => self.perform(Action::Command(Command::Identify), effects),
+            MenuCmd::View => self.ask(Question::View),
+            MenuCmd::Defaults => {
+                self.ask(Question::Defaults { typed: Default::default(), complaint: None });
+            }
+            MenuCmd::Stream if self.view.facts.stream.is_some() => {
+                self.perform(Action::Command(Command::StreamOff), effects);
+            }
+            MenuCmd::Stream => self.ask(Question::stream()),
+            MenuCmd::Diagnostics if self.view.job == Some(Job::Diagnostics) => {
+                self.perform(Action::Command(Command::Cancel), effects);
+            }
+            MenuCmd::Diagnostics => {
+                self.front = ScreenId::Diagnostics;
+                self.perform(Action::Command(Command::Diagnostics { pages: None }), effects);
+            }
+            MenuCmd::Load => {}
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! The link: how it opens and closes, is lost and comes back, and how the unit behind it is left.
+
+use super::App;
+use crate::session::{Command, Session};
+use crate::time::{Duration, Instant};
+use crate::tui::input::{Effect, Failure, LinkInfo};
+use crate::tui::popup::Popup;
+use crate::tui::screens::ScreenId;
+use crate::tui::view::{Link, LinkState, Tone};
+use crate::tui::visible;
+
+/// How long a unit has to answer what puts it in order before its link is closed: it prints a menu in a tenth of that,
+/// and whoever leaves, or shuts the computer down, does not wait longer for a unit that is silent.
+const WINDING_UP: Duration = Duration::from_secs(2);
+
+/// What comes once the unit has been left in order.
+#[derive(Debug)]
+pub(super) enum Next {
+    /// The program ends.
+    Quit,
+    /// The link is closed.
+    Disconnect,
+    /// Another link is opened.
+    Open(String),
+}
+
+impl App {
+    /// Whether something can be sent; if not, the user is told why.
+    pub(super) fn can_send(&mut self) -> bool {
+        let why = match &self.view.link.state {
+            LinkState::Open { read_only: false } => return true,
+            LinkState::Open { read_only: true } => "Not sent: this is a recording. Press 1 to choose a link.",
+            LinkState::Opening | LinkState::Closed => "Not sent: no unit is connected. Press 1 to choose a link.",
+            LinkState::Lost(_) => "Not sent: the link is lost. Press C to connect again.",
+        };
+        self.view.tell(Tone::Bad, why);
+        false
+    }
+
+    pub(super) fn open(&mut self, link: String, effects: &mut Vec<Effect>) {
+        if matches!(self.view.link.state, LinkState::Open { .. }) {
+            effects.push(Effect::CloseLink);
+        }
+        self.session = None;
+        let what = format!("Opening {}.", visible::text(&link));
+        self.popup = Some(Popup::Waiting { what, hint: ("Esc", "do not wait") });
+        self.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
+        effects.push(Effect::OpenLink(link));
+    }
+
+    /// Closes the link and goes on. Whatever is in the middle is ended first: a unit whose view stays open neither scans
+    /// nor talks on CAN, and one that waits at a prompt takes the next key for an answer.
+    pub(super) fn leave(&mut self, next: Next, effects: &mut Vec<Effect>) {
+        if self.leaving.is_some() {
+            return;
+        }
+        if !(self.view.is_in_the_middle() && self.view.can_send()) {
+            return self.left(next, effects);
+        }
+        if self.view.has_job_to_end() {
+            self.command(Command::Cancel);
+        }
+        if self.view.viewing && !self.view.has_job_to_end() {
+            self.command(Command::Keys(b"x".to_vec()));
+        }
+        self.dirty = true;
+        let what = "Leaving the unit in order, which takes 2 seconds at most.".into();
+        self.popup = Some(Popup::Waiting { what, hint: ("Q", "leave at once") });
+        self.leaving = Some((next, self.now + WINDING_UP));
+    }
+
+    /// Goes on with what was to come as soon as nothing is in the middle any more, or there was time enough for it.
+    pub(super) fn go_on_leaving(&mut self, effects: &mut Vec<Effect>) {
+        let is_over = self.leaving.as_ref().is_some_and(|(_, until)| *until <= self.now);
+        let is_settled = !self.view.has_job_to_end() && self.session.as_ref().is_none_or(|it| it.waiting() == 0);
+        if !(is_over || is_settled || !self.view.can_send()) {
+            return;
+        }
+        if let Some((next, _)) = self.leaving.take() {
+            self.popup = None;
+            self.left(next, effects);
+        }
+    }
+
+    pub(super) fn left(&mut self, next: Next, effects: &mut Vec<Effect>) {
+        match next {
+            Next::Quit => effects.push(Effect::Quit),
+            Next::Disconnect => self.disconnect(effects),
+            Next::Open(link) => self.open(link, effects),
+        }
+    }
+
+    pub(super) fn disconnect(&mut self, effects: &mut Vec<Effect>) {
+        effects.push(Effect::CloseLink);
+        self.scrollback.note(self.now, "link closed".into());
+        self.session = None;
+        self.begin_link(Link::default());
+        self.view.tell(Tone::Quiet, "The link is closed.");
+    }
+
+    /// Another link. Rows that go to a file go on if it is the same link again.
+    pub(super) fn begin_link(&mut self, link: Link) {
+        let is_same = self.view.link.name == link.name;
+        let export = self.view.export.take();
+        self.view.begin_link(link);
+        self.view.export = export;
+        if !is_same {
+            self.end_export(None);
+        }
+    }
+
+    pub(super) fn link_opened(&mut self, now: Instant, info: LinkInfo, effects: &mut Vec<Effect>) {
+        self.dirty = true;
+        if self.view.link.state != LinkState::Opening {
+            // Nobody waits for it any more.
+            effects.push(Effect::CloseLink);
+            return;
+        }
+        self.popup = None;
+        let read_only = info.read_only;
+        self.scrollback.begin(now, format!("connected to {}", visible::text(&info.link)));
+        self.begin_session(info);
+        // Who has chosen a recording wants to steer it.
+        self.front = if self.front == ScreenId::Recordings { self.front } else { ScreenId::Overview };
+        if !read_only {
+            self.command(Command::Identify);
+        }
+    }
+
+    /// A session on the link that has just been opened.
+    pub(super) fn begin_session(&mut self, info: LinkInfo) {
+        let session = if info.read_only { Session::of_recording } else { Session::new };
+        self.session = Some(session(info.baud));
+        self.start_of_day = info.start_of_day;
+        self.begin_link(Link {
+            name: Some(info.link),
+            baud: info.baud,
+            recording: info.recording,
+            noted: info.noted,
+            start_millis: info.start_millis,
+            state: LinkState::Open { read_only: info.read_only },
+            ..Link::default()
+        });
+        self.dictionary.begin_link();
+        self.stream.begin_link();
+        self.bench.begin_link();
+        if info.read_only {
+            // What goes by in a recording is understood as it goes by; nothing is sent for it.
+            self.command(Command::Overhear);
+            self.view.job = None;
+        }
+    }
+
+    /// The recording is played from its beginning again: nothing of it has happened yet.
+    pub(super) fn played_anew(&mut self, now: Instant, info: LinkInfo) {
+        self.dirty = true;
+        if matches!(self.view.link.state, LinkState::Open { read_only: true }) {
+            let playing = self.view.playing;
+            self.scrollback.begin(now, "from the beginning".into());
+            self.begin_session(info);
+            self.view.playing = playing;
+        }
+    }
+
+    pub(super) fn link_failed(&mut self, failure: Failure) {
+        self.dirty = true;
+        if self.view.link.state == LinkState::Opening {
+            self.session = None;
+            self.begin_link(Link::default());
+            self.popup = Some(Popup::Failed { title: "Not connected", failure });
+        }
+    }
+
+    pub(super) fn link_gone(&mut self, now: Instant, failure: Failure) {
+        self.dirty = true;
+        if matches!(self.view.link.state, LinkState::Open { .. }) {
+            self.scrollback.note(now, "link lost".into());
+            self.view.link.state = LinkState::Lost(failure);
+            if let Some(session) = &mut self.session {
+                session.link_lost(now);
+            }
+            self.popup = None;
+        }
+    }
+
+    /// The cable is plugged in again. What stood on the screen goes on; the unit is asked who it is, since it may have
+    /// started anew.
+    pub(super) fn link_back(&mut self, now: Instant, name: &str) {
+        self.dirty = true;
+        if matches!(self.view.link.state, LinkState::Lost(_)) {
+            self.scrollback.note(now, format!("link back as {}", visible::text(name)));
+            self.view.link.state = LinkState::Open { read_only: false };
+            self.view.tell(Tone::Good, "The link is back.");
+            if let Some(session) = &mut self.session {
+                session.link_back(now);
+            }
+            self.command(Command::Identify);
+        }
+    }
+
+    /// What happens from now on is not in the recording. That stays in sight: who has to prove something later must know.
+    pub(super) fn unrecorded(&mut self, now: Instant, why: String) {
+        self.dirty = true;
+        self.scrollback.note(now, format!("not recorded from here on: {}", visible::text(&why)));
+        self.view.tell(Tone::Bad, format!("Not recorded: {why}."));
+        (self.view.link.recording, self.view.link.unrecorded) = (None, Some(why));
+    }
+
+    pub(super) fn recording_over(&mut self, now: Instant, failure: Option<Failure>) {
+        self.dirty = true;
+        if let Some(session) = &mut self.session {
+            session.recording_over(now);
+        }
+        match failure {
+            None => self.view.tell(Tone::Quiet, "This is the end of the recording. 3 shows all of it."),
+            Some(failure) => self.view.tell(Tone::Bad, failure.text),
+        }
+    }
+
+    pub(super) fn break_sent(&mut self, now: Instant, result: Result<(), String>, effects: &mut Vec<Effect>) {
+        self.dirty = true;
+        match result {
+            Ok(()) => {
+                self.scrollback.note(now, "break sent".into());
+                effects.push(Effect::Mark("break sent".into()));
+            }
+            Err(why) => self.view.tell(Tone::Bad, format!("No break sent: {why}.")),
+        }
+    }
+}

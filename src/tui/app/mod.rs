@@ -1,0 +1,485 @@
+//! The console: keys, bytes and time in; a picture, effects and a deadline out.
+//!
+//! One way through: an input changes the session or a screen, the session's news are folded into the view, what it
+//! wants sent becomes effects, and the picture is drawn from the view when the loop around finds it worth drawing.
+
+mod files;
+mod keys;
+mod link;
+
+use std::path::PathBuf;
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+
+use link::Next;
+
+use super::action::Action;
+use super::frame;
+use super::input::{Effect, Input, Noted};
+use super::popup::{self, Popup, Question};
+use super::screens::bench::{self, Bench};
+use super::screens::connect::Connect;
+use super::screens::diagnostics::Diagnostics;
+use super::screens::dictionary::Dictionary;
+use super::screens::help::Help;
+use super::screens::load::Load;
+use super::screens::overview::Overview;
+use super::screens::recordings::Recordings;
+use super::screens::stream::Stream;
+use super::screens::terminal::Terminal;
+use super::screens::{Scene, ScreenId};
+use super::theme::{Palette, Theme};
+use super::view::{LinkState, Tone, View};
+use super::widgets::lines;
+use crate::endpoint::Endpoint;
+use crate::monitor::Scrollback;
+use crate::record::Record;
+use crate::session::{Command, Event, Facts, Job, LoadOrder, Outcome, Session, UnitNow};
+use crate::time::{Duration, Instant};
+
+/// How often the picture moves while an upload runs, so that its times go on when the unit is silent.
+const UPLOAD_TICK: Duration = Duration::from_millis(500);
+
+/// What the console is started with.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The link to open at once; without one the list of ports is shown.
+    pub link: Option<String>,
+    /// Where the file picker starts.
+    pub directory: PathBuf,
+    /// Which colours to begin with (`NO_COLOR`, `AXCON_THEME`).
+    pub palette: Palette,
+    /// Columns and rows of the terminal at the start.
+    pub size: (u16, u16),
+}
+
+/// The console.
+pub struct App {
+    options: Options,
+    theme: Theme,
+    size: (u16, u16),
+    /// Local time of day at [`Instant::ZERO`], as the link has it.
+    start_of_day: Duration,
+    now: Instant,
+    dirty: bool,
+    session: Option<Session>,
+    /// What is drawn from before there is a session.
+    no_record: Record,
+    no_facts: Facts,
+    view: View,
+    scrollback: Scrollback,
+    front: ScreenId,
+    popup: Option<Popup>,
+    /// The link is about to be closed: what comes then, and until when the unit has time.
+    leaving: Option<(Next, Instant)>,
+    help: Option<Help>,
+    connect: Connect,
+    overview: Overview,
+    terminal: Terminal,
+    load: Load,
+    dictionary: Dictionary,
+    stream: Stream,
+    diagnostics: Diagnostics,
+    recordings: Recordings,
+    bench: Bench,
+}
+
+impl App {
+    /// A console that has seen nothing yet. [`App::start`] comes next.
+    pub fn new(options: Options) -> Self {
+        App {
+            theme: Theme::new(options.palette),
+            size: options.size,
+            start_of_day: Duration::ZERO,
+            now: Instant::ZERO,
+            dirty: true,
+            session: None,
+            no_record: Record::new(),
+            no_facts: Facts::default(),
+            view: View::default(),
+            scrollback: Scrollback::default(),
+            front: ScreenId::Connect,
+            popup: None,
+            leaving: None,
+            help: None,
+            connect: Connect::default(),
+            overview: Overview::default(),
+            terminal: Terminal::default(),
+            load: Load::new(options.directory.clone()),
+            dictionary: Dictionary::default(),
+            stream: Stream::default(),
+            diagnostics: Diagnostics::default(),
+            recordings: Recordings::default(),
+            bench: Bench::default(),
+            options,
+        }
+    }
+
+    /// The first effects: the ports are listed, the given link is opened.
+    pub fn start(&mut self) -> Vec<Effect> {
+        let mut effects = vec![Effect::ListPorts, Effect::ListRecordings];
+        if let Some(link) = self.options.link.clone() {
+            self.perform(Action::Open(link), &mut effects);
+        }
+        effects
+    }
+
+    /// Takes one input; the effects are to be performed in their order.
+    pub fn handle(&mut self, now: Instant, input: Input) -> Vec<Effect> {
+        self.now = self.now.max(now);
+        let mut effects = Vec::new();
+        match input {
+            Input::Terminal(event) => self.terminal_event(event, &mut effects),
+            Input::Bytes(bytes) => {
+                if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
+                    session.handle_bytes(now, &bytes);
+                }
+            }
+            Input::Arrived(backlog) => {
+                if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
+                    session.handle_backlog(now, &backlog);
+                }
+            }
+            Input::Timeout => self.timeout(now),
+            Input::PortsListed(ports) => {
+                self.connect.listed(ports);
+                self.dirty = true;
+            }
+            Input::LinkOpened(info) => self.link_opened(now, info, &mut effects),
+            Input::LinkFailed(failure) => self.link_failed(failure),
+            Input::LinkGone(failure) => self.link_gone(now, failure),
+            Input::LinkBack(name) => self.link_back(now, &name),
+            Input::Sent(bytes) => {
+                if let Some(session) = &mut self.session {
+                    session.handle_sent(now, &bytes);
+                }
+            }
+            Input::Mark(text) => self.scrollback.note(now, super::visible::text(&text)),
+            Input::Unrecorded(why) => self.unrecorded(now, why),
+            Input::RecordingOver(failure) => self.recording_over(now, failure),
+            Input::FilesListed { directory, entries } => {
+                self.load.listed(directory, entries);
+                self.dirty = true;
+            }
+            Input::ImageChecked(facts) => {
+                self.load.checked(facts);
+                self.dirty = true;
+            }
+            Input::FileWritten { path, result } => self.file_written(&path, result),
+            Input::FileRead { path, text } => self.file_read(&path, text),
+            Input::RecordingsListed(found) => {
+                self.recordings.listed(found);
+                self.connect.recorded(self.recordings.entries());
+                self.dirty = true;
+            }
+            Input::Playing(playing) => {
+                self.dirty |= self.view.playing != Some(playing);
+                self.view.playing = Some(playing);
+            }
+            Input::PlayedAnew(info) => self.played_anew(now, info),
+            Input::Ordered { line, answer } => {
+                self.bench.answered(&line, answer);
+                self.dirty = true;
+            }
+            Input::BreakSent(result) => self.break_sent(now, result, &mut effects),
+            Input::Signal => self.leave(Next::Quit, &mut effects),
+        }
+        self.drain(&mut effects);
+        self.go_on_leaving(&mut effects);
+        effects
+    }
+
+    /// Whether keys go to the unit as they are, so that none may mean something outside.
+    pub fn passes_keys(&self) -> bool {
+        self.front == ScreenId::Terminal && self.popup.is_none() && self.help.is_none()
+    }
+
+    /// When [`Input::Timeout`] is wanted next. `None`: only an input from outside can bring anything new.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        let is_open = matches!(self.view.link.state, LinkState::Open { .. });
+        let session = self.session.as_ref().and_then(Session::poll_timeout);
+        let tick = (self.view.job == Some(Job::Load)).then(|| self.now + UPLOAD_TICK);
+        let late = self.view.poll_timeout().filter(|_| is_open);
+        let leaving = self.leaving.as_ref().map(|(_, until)| *until);
+        [session, tick, late, leaving].into_iter().flatten().min()
+    }
+
+    /// Whether the picture has changed since it was last drawn.
+    pub fn is_dirty(&self) -> bool {
+        self.dirty
+    }
+
+    /// Says that the picture has been drawn.
+    pub fn drawn(&mut self) {
+        self.dirty = false;
+    }
+
+    /// Folds one event of the session into what the screens show; `facts` are the session's at that moment.
+    pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
+        self.now = self.now.max(now);
+        self.view.fold(now, event, facts);
+        // A raw line alone changes the terminal, and whatever else shows it.
+        self.dirty = true;
+    }
+
+    /// Shows what went over the line.
+    pub fn follow(&mut self, record: &Record) {
+        self.dirty |= self.scrollback.follow(record);
+    }
+
+    /// Every byte of the connection, secrets already out of it: what a recording follows after each input.
+    pub fn record(&self) -> &Record {
+        self.session.as_ref().map_or(&self.no_record, Session::record)
+    }
+
+    /// Draws the picture.
+    pub fn draw(&self, frame: &mut Frame) {
+        if frame::too_small(frame) {
+            return;
+        }
+        let area = frame.area();
+        let columns = usize::from(area.width);
+        let row = |y: u16| Rect { y, height: 1, ..area };
+        let front = self.help.is_none().then_some(self.front);
+        let theme = self.theme;
+        lines::draw(frame, row(0), [frame::header(&self.view, theme, columns)]);
+        lines::draw(frame, row(1), [frame::tabs(&self.view, front, theme, columns)]);
+        let lost = frame::lost(&self.view, theme, columns);
+        let (banner, body) = lines::split(frame::body(area), lost.len() as u16);
+        lines::draw(frame, banner, lost);
+        self.draw_screen(body, frame);
+        lines::draw(frame, row(area.height - 3), [frame::notice(&self.view, theme, columns)]);
+        lines::draw(frame, row(area.height - 2), [frame::menu(theme)]);
+        let keys = match self.front {
+            _ if self.help.is_some() => frame::help_keys(theme),
+            ScreenId::Terminal => frame::terminal_keys(theme, self.front.bindings(), self.terminal.is_after_prefix()),
+            ScreenId::Load => frame::keys(theme, self.load.footer(&self.view)),
+            ScreenId::Connect
+            | ScreenId::Overview
+            | ScreenId::Dictionary
+            | ScreenId::Stream
+            | ScreenId::Diagnostics
+            | ScreenId::Recordings
+            | ScreenId::Bench => frame::keys(theme, self.front.bindings()),
+        };
+        lines::draw(frame, row(area.height - 1), [keys]);
+        if let Some(popup) = &self.popup {
+            popup::draw(popup, &self.view, theme, frame::body(area), frame);
+        }
+    }
+
+    fn draw_screen(&self, area: Rect, frame: &mut Frame) {
+        if let Some(help) = &self.help {
+            return help.draw(self.theme, self.front, area, frame);
+        }
+        let scene = self.scene();
+        match self.front {
+            ScreenId::Connect => self.connect.draw(scene, area, frame),
+            ScreenId::Overview => self.overview.draw(scene, area, frame),
+            ScreenId::Terminal => self.terminal.draw(scene, area, frame),
+            ScreenId::Load => self.load.draw(scene, area, frame),
+            ScreenId::Dictionary => self.dictionary.draw(scene, area, frame),
+            ScreenId::Stream => self.stream.draw(scene, area, frame),
+            ScreenId::Diagnostics => self.diagnostics.draw(scene, area, frame),
+            ScreenId::Recordings => self.recordings.draw(scene, area, frame),
+            ScreenId::Bench => self.bench.draw(scene, area, frame),
+        }
+    }
+
+    fn scene(&self) -> Scene<'_> {
+        Scene {
+            view: &self.view,
+            record: self.record(),
+            scrollback: &self.scrollback,
+            theme: self.theme,
+            now: self.now,
+            start_of_day: self.start_of_day,
+        }
+    }
+
+    /// Whether clicks and the wheel mean something here. On the terminal screen they are the terminal program's own, to
+    /// select and copy what the unit prints.
+    pub fn wants_mouse(&self) -> bool {
+        !self.passes_keys()
+    }
+
+    fn perform(&mut self, action: Action, effects: &mut Vec<Effect>) {
+        self.dirty = true;
+        match action {
+            Action::Go(screen) => {
+                self.front = screen;
+                match screen {
+                    ScreenId::Load => {
+                        if let Some(action) = self.load.entered() {
+                            self.perform(action, effects);
+                        }
+                    }
+                    ScreenId::Recordings => effects.push(Effect::ListRecordings),
+                    _ => {}
+                }
+            }
+            Action::Open(link) if self.view.is_in_the_middle() => self.ask(Question::Disconnect { then: Some(link) }),
+            Action::Open(link) => self.open(link, effects),
+            Action::Reconnect => {
+                if let Some(link) = self.view.link.name.clone() {
+                    self.open(link, effects);
+                }
+            }
+            Action::Disconnect { then } => self.leave(then.map_or(Next::Disconnect, Next::Open), effects),
+            Action::ListPorts => {
+                self.connect.listing();
+                effects.push(Effect::ListPorts);
+            }
+            Action::ListFiles(directory) => effects.push(Effect::ListFiles(directory)),
+            Action::CheckImage(path) => {
+                self.load.check(path.clone());
+                effects.push(Effect::CheckImage { path, allow: self.load.allowed().to_vec() });
+            }
+            Action::Allow(error) => {
+                if let Some(action) = self.load.allow(error) {
+                    self.perform(action, effects);
+                }
+            }
+            Action::Ask(question) => self.ask(question),
+            Action::Command(command) => {
+                let reads = matches!(command, Command::ReadDictionary);
+                if self.can_send() && self.command(command) && reads {
+                    self.view.entries_read = 0;
+                    self.front = ScreenId::Dictionary;
+                }
+            }
+            Action::ViewDictionary => {
+                if self.command(Command::Keys(b"v".to_vec())) {
+                    self.front = ScreenId::Terminal;
+                    self.terminal.follow();
+                    self.view
+                        .tell(Tone::Quiet, "V is sent. Enter shows the next object, X leaves and lets scanning go on.");
+                }
+            }
+            Action::StartLoad { password, product } => {
+                let Some(facts) = self.load.image() else { return };
+                let Some(image) = facts.checked.clone() else { return };
+                let file = facts.path.display().to_string();
+                // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
+                let said = self.view.facts.product.as_ref().map(|known| known.value.clone());
+                let product = product.or_else(|| self.view.noted().map(|noted| noted.product.clone()));
+                let known = said.or(product.clone());
+                let packed = self.load.is_packed();
+                let order = LoadOrder { product, packed, ..LoadOrder::new(image, password) };
+                if self.command(Command::Load(Box::new(order)))
+                    && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
+                {
+                    // Noted before the first byte leaves: what the session sends is drained behind this.
+                    self.view.link.noted = Some(Noted { product: product.clone(), image: file.clone() });
+                    effects.push(Effect::UploadBegins { link, product, image: file });
+                }
+            }
+            Action::DismissReport => self.view.load.report = None,
+            Action::RestartExtremes => self.view.restart_extremes(),
+            Action::Mark => self.mark(effects),
+            Action::Find(words) => match self.front {
+                ScreenId::Terminal => self.terminal.find(words, &self.scrollback),
+                _ => self.dictionary.find(&words),
+            },
+            Action::ExportStream(path) => self.export_stream(path, effects),
+            Action::EndExport => self.end_export(None),
+            Action::ExportDictionary(path) => self.export_dictionary(path, effects),
+            Action::Compare(path) => effects.push(Effect::ReadFile(path)),
+            Action::Break if self.can_send() => effects.push(Effect::Break),
+            Action::Break => {}
+            Action::ListRecordings => effects.push(Effect::ListRecordings),
+            Action::Play(playback) => effects.push(Effect::Play(playback)),
+            Action::Order(line) if bench::emulated(&self.view).is_some() => {
+                self.bench.ordered(self.now, line.clone());
+                effects.push(Effect::Order(line));
+            }
+            Action::Order(_) => {}
+            Action::Quit => self.leave(Next::Quit, effects),
+        }
+    }
+
+    /// Gives a command to the session. Says whether it was taken; if not, the user knows why.
+    fn command(&mut self, command: Command) -> bool {
+        let Some(session) = &mut self.session else { return false };
+        let job = match &command {
+            Command::Keys(_) | Command::Bytes(_) | Command::Cancel => None,
+            Command::Identify => Some(Job::Identify),
+            Command::StreamOn { .. } => Some(Job::StreamOn),
+            Command::StreamOff => Some(Job::StreamOff),
+            Command::RestoreDefaults => Some(Job::RestoreDefaults),
+            Command::ReadDictionary => Some(Job::ReadDictionary),
+            Command::Diagnostics { .. } => Some(Job::Diagnostics),
+            Command::Overhear => Some(Job::Overhear),
+            Command::Load(_) => Some(Job::Load),
+        };
+        let viewing = match &command {
+            Command::Keys(keys) if !session.password_open() => opens_view(keys),
+            _ => None,
+        };
+        match session.command(self.now, command) {
+            Ok(()) => {
+                if let Some(job) = job {
+                    self.view.job = Some(job);
+                    self.view.notice = None;
+                }
+                if job == Some(Job::Load) {
+                    self.view.load = Default::default();
+                    self.front = ScreenId::Load;
+                }
+                self.view.viewing = viewing.unwrap_or(self.view.viewing);
+                true
+            }
+            Err(refusal) => {
+                self.view.tell(Tone::Bad, format!("Not sent: {refusal}."));
+                false
+            }
+        }
+    }
+
+    fn ask(&mut self, question: Question) {
+        self.popup = Some(Popup::Asking(question));
+    }
+
+    fn timeout(&mut self, now: Instant) {
+        if let Some(session) = &mut self.session {
+            session.handle_timeout(now);
+        }
+        self.dirty |= self.view.timeout(now) || self.view.job == Some(Job::Load);
+    }
+
+    /// Everything the session has to say and to send.
+    fn drain(&mut self, effects: &mut Vec<Effect>) {
+        let is_open = matches!(self.view.link.state, LinkState::Open { .. });
+        while let Some(transmit) = self.session.as_mut().and_then(Session::poll_transmit) {
+            if is_open {
+                effects.push(Effect::Transmit(transmit));
+            }
+        }
+        while let Some(event) = self.session.as_mut().and_then(Session::poll_event) {
+            let facts = self.session.as_ref().map_or(&self.no_facts, Session::facts);
+            self.view.fold(self.now, &event, facts);
+            self.dirty = true;
+            if let Event::Row { at, row, .. } = &event {
+                self.export_row(*at, row, effects);
+            }
+            if let (Event::Finished(Outcome::Loaded(report)), Some(link)) = (&event, self.view.link.name.clone())
+                && report.unit == UnitNow::Application
+            {
+                self.view.link.noted = None;
+                effects.push(Effect::UploadEnds { link });
+            }
+        }
+        let record = self.session.as_ref().map_or(&self.no_record, Session::record);
+        self.dirty |= self.scrollback.follow(record);
+    }
+}
+
+/// Whether keys typed at the unit's menu leave its view open (true), closed, or (`None`) as it was.
+fn opens_view(keys: &[u8]) -> Option<bool> {
+    keys.iter().rev().find_map(|key| match key.to_ascii_lowercase() {
+        b'v' => Some(true),
+        b'x' => Some(false),
+        _ => None,
+    })
+}

@@ -1,0 +1,385 @@
+//! A console, a user, and a world that does what the test says; what it shows and holds.
+
+use std::path::PathBuf;
+
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{
+    Event as TerminalEvent, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
+};
+
+use crate::canopen::{ObjectAddress, Value};
+use crate::device::Product;
+use crate::device::dictionary::{Entry, Object};
+use crate::endpoint::Transmit;
+use crate::image::make;
+use crate::record::Span;
+use crate::session::{
+    DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, UnitState, Verdict,
+};
+use crate::time::{Duration, Instant};
+use crate::tui::{
+    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Noted, Options, Palette, PortEntry,
+    RecordingEntry,
+};
+use crate::version::Version;
+
+pub(super) const SMALL: (u16, u16) = (80, 24);
+pub(super) const LARGE: (u16, u16) = (200, 60);
+/// 12:00:00 is the start of time here.
+pub(super) const NOON: Duration = Duration::from_secs(12 * 3600);
+
+pub(super) const BANNER: &[u8] = b"\r\nAxiomatic Technologies Corporation\r\nAXTC4CO 4 Thermocouple Scanner\r\n\
+    Software Version V1.1.0, built 2026-01-31 12:00:00\r\n\r\n";
+pub(super) const MENU: &[u8] = b"\r\nMain Menu - AXTC4CO V1.1.0\r\n  V - View Object Dictionary\r\n\
+    \x20 D - Default Object Dictionary\r\n  T - Toggle RS-232 Stream On/Off\r\n  S - Show/Stop Diagnostics\r\n\
+    \x20 L - Load New Software\r\nCANopen: Node-ID 127 (0x7F), Baud Rate 125 kbit/s, State Pre-Operational\r\n";
+
+/// The console, a user and a world that does what the test says.
+pub(super) struct Stage {
+    pub(super) app: App,
+    pub(super) size: (u16, u16),
+    pub(super) now: Instant,
+    pub(super) effects: Vec<Effect>,
+}
+
+impl Stage {
+    pub(super) fn new(size: (u16, u16)) -> Self {
+        let options =
+            Options { link: None, directory: PathBuf::from("/home/service/images"), palette: Palette::Mono, size };
+        let mut app = App::new(options);
+        let effects = app.start();
+        Stage { app, size, now: Instant::ZERO, effects }
+    }
+
+    /// Connected to a port with a unit that has answered.
+    pub(super) fn connected(size: (u16, u16)) -> Self {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter);
+        stage.opened("/dev/ttyUSB0");
+        stage.bytes(BANNER).bytes(MENU);
+        stage.wait(3000);
+        stage
+    }
+
+    pub(super) fn with_ports(size: (u16, u16)) -> Self {
+        let mut stage = Stage::new(size);
+        let port = |link: &str, description: &str, busy_by: Option<&str>| PortEntry {
+            link: link.into(),
+            description: description.into(),
+            busy_by: busy_by.map(str::to_owned),
+        };
+        stage.input(Input::PortsListed(Ok(vec![
+            port("/dev/ttyUSB0", "USB, FTDI FT232R USB UART, 0403:6001, AX12345", None),
+            port("/dev/ttyUSB1", "USB, Prolific PL2303, 067b:2303", Some("picocom, process 4711")),
+            port("/dev/ttyS0", "serial port of this computer", None),
+        ])));
+        stage
+    }
+
+    /// Connected, with the stream on for a while and a loose wire.
+    pub(super) fn streaming(size: (u16, u16)) -> Self {
+        Stage::connected(size).with_rows()
+    }
+
+    pub(super) fn with_rows(self) -> Self {
+        let mut stage = self;
+        for second in 0..90u32 {
+            let swing = f64::from(second % 30) * 0.37;
+            let third = if (40..52).contains(&second) || second >= 80 {
+                "OpenCct ".into()
+            } else {
+                format!("{:8.3}", 410.0 + swing)
+            };
+            let row = format!("{:8.3};{:8.3};{:8.3};{third};Disabled\r\n", 23.5, 181.25 + swing, 96.0 - swing);
+            stage.wait(1000).bytes(row.as_bytes());
+        }
+        stage
+    }
+
+    pub(super) fn opened(&mut self, link: &str) -> &mut Self {
+        self.input(Input::LinkOpened(link_info(link)))
+    }
+
+    pub(super) fn lost(&mut self) -> &mut Self {
+        self.input(Input::LinkGone(Failure {
+            text: "cannot read from /dev/ttyUSB0: the port has gone".into(),
+            hints: vec!["Plug the adapter in again.".into()],
+        }))
+    }
+
+    /// On the dictionary screen, the unit's read: two channels set differently, one entry not shown.
+    pub(super) fn with_dictionary(size: (u16, u16)) -> Self {
+        let mut stage = Stage::connected(size);
+        stage.keys("v").press(KeyCode::Enter);
+        let reading = |(at, object, entry): (ObjectAddress, &Object, &Entry)| {
+            let value = match (at.index, at.sub) {
+                (0x6110, 2) => Some(Value::Unsigned16(2)),
+                (0x6112, 4) => Some(Value::Unsigned8(0)),
+                (0x4000, 3) => Some(Value::Integer16(1000)),
+                (0x2100, sub @ 1..) => Some(Value::Real32(137.5 + f32::from(sub))),
+                _ => entry.default.map(|default| default.on_node(127)),
+            };
+            let text = format!("{} = {}", object.name, value.map_or_else(|| "?".to_owned(), |value| value.to_string()));
+            ReadEntry { at, value, text, span: Span::default(), known: true }
+        };
+        let entries = axtc4co().dictionary.entries().filter(|(at, _, _)| *at != ObjectAddress::new(0x5010, 0));
+        let reading =
+            DictionaryReading { entries: entries.map(reading).collect(), complete: true, unrecognised_lines: 3 };
+        stage.fold(Event::Finished(Outcome::DictionaryRead(Box::new(reading))));
+        stage
+    }
+
+    /// On the screen of recordings, two there.
+    pub(super) fn with_recordings(mut self) -> Self {
+        let entry = |begun: &str, port: &str, part, length| RecordingEntry {
+            link: format!("replay:/home/user/{begun}.cast"),
+            begun: begun.into(),
+            port: port.into(),
+            part,
+            length,
+            bytes: 1_234_567,
+        };
+        self.keys("8").input(Input::RecordingsListed(Ok(vec![
+            entry("2026-01-31 11:00:00", "/dev/ttyUSB0", 1, Some(Duration::from_secs(300))),
+            entry("2026-01-30 09:15:00", "rfc2217://terminal-server-in-hall-4:4001", 2, None),
+        ])));
+        self
+    }
+
+    /// On the load screen, the folder read.
+    pub(super) fn picking(mut self) -> Self {
+        self.keys("l");
+        let file = |name: &str, bytes| FileEntry {
+            name: name.into(),
+            kind: FileKind::File,
+            bytes,
+            begins: Vec::new(),
+            modified: Some("2026-01-31 12:00".into()),
+        };
+        let folder = |name: &str| FileEntry {
+            name: name.into(),
+            kind: FileKind::Folder,
+            bytes: 0,
+            begins: Vec::new(),
+            modified: None,
+        };
+        let entries = vec![
+            file("AXTC4CO_V1.2.0.elf.S", 242_846),
+            folder("bad"),
+            file("AXTC4CO_V1.1.0.elf.S", 242_846),
+            file("readme.txt", 99),
+        ];
+        self.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(entries) });
+        self
+    }
+
+    /// On the load screen, a file checked.
+    pub(super) fn with_image(self, facts: ImageFacts) -> Self {
+        let mut stage = self.picking();
+        stage.keys("p").keys(&facts.path.to_string_lossy()).press(KeyCode::Enter);
+        stage.input(Input::ImageChecked(Box::new(facts)));
+        stage
+    }
+
+    pub(super) fn input(&mut self, input: Input) -> &mut Self {
+        let effects = self.app.handle(self.now, input);
+        self.effects.extend(effects);
+        self
+    }
+
+    pub(super) fn key(&mut self, code: KeyCode, modifiers: KeyModifiers) -> &mut Self {
+        self.input(Input::Terminal(TerminalEvent::Key(KeyEvent::new(code, modifiers))))
+    }
+
+    pub(super) fn press(&mut self, code: KeyCode) -> &mut Self {
+        self.key(code, KeyModifiers::NONE)
+    }
+
+    pub(super) fn keys(&mut self, text: &str) -> &mut Self {
+        text.chars().for_each(|character| {
+            self.press(KeyCode::Char(character));
+        });
+        self
+    }
+
+    /// Clicks on a text, where it stands first.
+    pub(super) fn click(&mut self, text: &str) -> &mut Self {
+        let picture = self.picture();
+        let (row, line) = picture.lines().enumerate().find(|(_, line)| line.contains(text)).expect(text);
+        let column = line.split(text).next().map_or(0, |before| before.chars().count()) as u16 + 1;
+        let kind = MouseEventKind::Down(MouseButton::Left);
+        let mouse = MouseEvent { kind, column, row: row as u16, modifiers: KeyModifiers::NONE };
+        self.input(Input::Terminal(TerminalEvent::Mouse(mouse)))
+    }
+
+    /// What a terminal sends for Ctrl-].
+    pub(super) fn prefix(&mut self) -> &mut Self {
+        self.key(KeyCode::Char('5'), KeyModifiers::CONTROL)
+    }
+
+    pub(super) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
+        self.input(Input::Bytes(bytes.to_vec()))
+    }
+
+    /// Lets time pass, waking the console when it wants to be.
+    pub(super) fn wait(&mut self, millis: u64) -> &mut Self {
+        let end = self.now + Duration::from_millis(millis);
+        while let Some(due) = self.app.poll_timeout().filter(|&due| due <= end) {
+            self.now = self.now.max(due);
+            self.input(Input::Timeout);
+        }
+        self.now = end;
+        self
+    }
+
+    pub(super) fn fold(&mut self, event: Event) -> &mut Self {
+        self.fold_with(event, &Facts::default())
+    }
+
+    pub(super) fn fold_with(&mut self, event: Event, facts: &Facts) -> &mut Self {
+        self.app.fold(self.now, &event, facts);
+        self
+    }
+
+    pub(super) fn finished(&mut self, outcome: Outcome) -> &mut Self {
+        self.fold_with(Event::Finished(outcome), &Facts::default())
+    }
+
+    /// Connected to a port with a unit that waits in its loader; on that port an upload was begun once.
+    pub(super) fn in_loader(size: (u16, u16), noted: Option<Noted>) -> Self {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { noted, ..link_info("/dev/ttyUSB0") }));
+        stage.fold_with(Event::FactsChanged, &Facts { state: UnitState::Loader, ..Facts::default() });
+        stage.finished(Outcome::Identified);
+        stage
+    }
+
+    /// The upload has been started with the password.
+    pub(super) fn loading(size: (u16, u16)) -> Self {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.press(KeyCode::Enter).keys("AXIO-2010").press(KeyCode::Enter);
+        stage
+    }
+
+    /// What has left for the unit since the last question.
+    pub(super) fn sent(&mut self) -> Vec<u8> {
+        let sent = self.effects.iter().filter_map(|effect| match effect {
+            Effect::Transmit(Transmit { bytes, .. }) => Some(bytes.clone()),
+            _ => None,
+        });
+        let sent = sent.flatten().collect();
+        self.effects.clear();
+        sent
+    }
+
+    pub(super) fn asked(&mut self) -> Vec<Effect> {
+        std::mem::take(&mut self.effects)
+    }
+
+    pub(super) fn draw(&self) -> TestBackend {
+        let mut terminal = Terminal::new(TestBackend::new(self.size.0, self.size.1)).expect("a test backend");
+        terminal.draw(|frame| self.app.draw(frame)).expect("drawing in memory");
+        terminal.backend().clone()
+    }
+
+    pub(super) fn picture(&self) -> String {
+        let lines = self.draw().to_string();
+        // The backend quotes its lines; the quotes keep blanks at the end in sight and are of no use here.
+        lines.lines().map(|line| line.trim_matches('"').trim_end()).collect::<Vec<_>>().join("\n")
+    }
+
+    pub(super) fn shows(&self, text: &str) -> bool {
+        self.picture().contains(text)
+    }
+}
+
+pub(super) fn link_info(link: &str) -> LinkInfo {
+    LinkInfo {
+        link: link.into(),
+        baud: 115_200,
+        read_only: false,
+        noted: None,
+        recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
+        start_of_day: NOON,
+        start_millis: 1_769_860_800_000,
+    }
+}
+
+pub(super) fn noted(product: &str) -> Option<Noted> {
+    Some(Noted { product: product.into(), image: "/home/service/images/AXTC4CO_V1.2.0.elf.S".into() })
+}
+
+pub(super) fn axtc4co() -> &'static Product {
+    Product::named("AXTC4CO").expect("built in")
+}
+
+pub(super) fn good_image() -> ImageFacts {
+    let recipe =
+        make::Recipe { target: &axtc4co().target(), version: Version::new(1, 2, 0), words: 0xC000, flaw: None };
+    let file = make::make(&recipe).expect("an image of the usual size");
+    let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
+    let report = crate::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
+    ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report, &[])
+}
+
+/// What the checker says of a good file in which an editor has replaced digits and cut the end off.
+pub(super) fn bad_image() -> ImageFacts {
+    let recipe =
+        make::Recipe { target: &axtc4co().target(), version: Version::new(1, 2, 0), words: 0xC000, flaw: None };
+    let text = String::from_utf8(make::make(&recipe).expect("an image of the usual size")).expect("ASCII");
+    let spoil = |(number, line): (usize, &str)| match number % 7 {
+        3 if number < 200 => format!("{}ZZ{}\n", &line[..20], &line[22..]),
+        5 if number < 100 => format!("{}\n", &line[..line.len() - 6]),
+        _ => format!("{line}\n"),
+    };
+    let file: String = text.lines().take(2000).enumerate().map(spoil).collect();
+    let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
+    let report = crate::image::check(file.as_bytes(), None, &targets, None, &[]).expect("a slice");
+    ImageFacts::of_report("/home/service/images/bad.S".into(), &report, &[])
+}
+
+pub(super) fn progress() -> Progress {
+    Progress {
+        phase: Phase::Transfer,
+        records: 1448,
+        records_total: 3074,
+        bytes: 114_392,
+        bytes_total: 242_846,
+        address: 0x5a80,
+        elapsed: Duration::from_secs(10),
+        moving: Duration::from_millis(9_950),
+        moved: 114_280,
+        held: None,
+    }
+}
+
+pub(super) fn report(verdict: Verdict, unit: UnitNow) -> LoadReport {
+    LoadReport {
+        verdict,
+        phase: Phase::Transfer,
+        unit,
+        product: Some("AXTC4CO".into()),
+        version_before: Some(Version::new(1, 1, 0)),
+        version_after: None,
+        records: 1448,
+        records_total: 3074,
+        address: Some(0x5a80),
+        duration: Duration::from_secs(11),
+        what: "The loader reported error 0004 (wrong checksum) and restarted.".into(),
+        heard: "Error # 0004\u{1b}[2J Restarting.".into(),
+        found_in_loader: false,
+        misfit: None,
+        remark: None,
+    }
+}
+
+pub(super) fn typed(mut stage: Stage, keys: &str) -> Stage {
+    stage.keys(keys);
+    stage
+}
+
+pub(super) fn pressed(mut stage: Stage, code: KeyCode) -> Stage {
+    stage.press(code);
+    stage
+}

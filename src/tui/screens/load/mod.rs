@@ -1,0 +1,277 @@
+//! Load new software (AXTC4CO manual, section 4.1.5): choose a file, read its report and the plan, watch, read the
+//! verdict.
+//!
+//! An upload cannot be started while anything stands against it; what stands against it is on the screen.
+
+mod picker;
+mod progress;
+mod report;
+mod verdict;
+
+use std::path::{Path, PathBuf};
+
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::Rect;
+use ratatui::text::Line;
+
+pub use picker::is_image_name;
+
+use report::{findings, findings_room, objections, report};
+use verdict::verdict;
+
+use super::Scene;
+use crate::image::DefectId;
+use crate::session::Job;
+use crate::tui::action::Action;
+use crate::tui::input::{FileEntry, ImageFacts};
+use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::popup::Question;
+use crate::tui::view::View;
+use crate::tui::visible;
+use crate::tui::widgets::lines;
+
+/// Name on the tab.
+pub const TITLE: &str = "Load software";
+
+/// Keys of the screen.
+pub const BINDINGS: &[Binding] = &[
+    Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "entry or line above" },
+    Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "choose", long: "entry or line below" },
+    Binding { keys: &[Press::Plain(KeyCode::PageUp)], cmd: Cmd::PageUp, short: "", long: "a page up" },
+    Binding { keys: &[Press::Plain(KeyCode::PageDown)], cmd: Cmd::PageDown, short: "", long: "a page down" },
+    Binding { keys: &[Press::Plain(KeyCode::Home)], cmd: Cmd::First, short: "", long: "to the first" },
+    Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "", long: "to the last" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Enter)],
+        cmd: Cmd::Accept,
+        short: "go on",
+        long: "open the folder, check the file, start the upload, go back",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Esc), Press::Plain(KeyCode::Backspace)],
+        cmd: Cmd::Back,
+        short: "back",
+        long: "folder above, other file; while loading: cancel",
+    },
+    Binding { keys: &[Press::Plain(KeyCode::Char('p'))], cmd: Cmd::Type, short: "path", long: "type a path" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('k'))],
+        cmd: Cmd::Pack,
+        short: "",
+        long: "send long records: the same words in a sixth less time",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('o'))],
+        cmd: Cmd::Allow,
+        short: "",
+        long: "send in spite of an error, by its name",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('r'))],
+        cmd: Cmd::Refresh,
+        short: "read again",
+        long: "read the folder or the file again",
+    },
+];
+
+const ENTER: &[Press] = &[Press::Plain(KeyCode::Enter)];
+const ESC: &[Press] = &[Press::Plain(KeyCode::Esc)];
+const FINDINGS: Binding = footer(&[Press::Plain(KeyCode::Down)], Cmd::Down, "findings");
+const AGAIN: Binding = footer(&[Press::Plain(KeyCode::Char('r'))], Cmd::Refresh, "read again");
+const PACK: Binding = footer(&[Press::Plain(KeyCode::Char('k'))], Cmd::Pack, "pack");
+const OTHER: Binding = footer(ESC, Cmd::Back, "other file");
+
+/// What the footer shows at each stage; the keys themselves are those of [`BINDINGS`].
+const CHECKING_KEYS: &[Binding] = &[OTHER];
+const REPORT_KEYS: &[Binding] = &[FINDINGS, OTHER, AGAIN];
+const REFUSED_KEYS: &[Binding] =
+    &[FINDINGS, OTHER, AGAIN, footer(&[Press::Plain(KeyCode::Char('o'))], Cmd::Allow, "override")];
+const READY_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), PACK, OTHER, AGAIN];
+const READY_KEYS_WITH_FINDINGS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), PACK, FINDINGS, OTHER];
+const RUNNING_KEYS: &[Binding] = &[footer(ESC, Cmd::Back, "cancel")];
+const VERDICT_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "close the report")];
+
+const fn footer(keys: &'static [Press], cmd: Cmd, short: &'static str) -> Binding {
+    Binding { keys, cmd, short, long: "" }
+}
+
+/// Choosing a file and reading about it.
+#[derive(Debug)]
+pub struct Load {
+    directory: PathBuf,
+    listing: Listing,
+    cursor: usize,
+    stage: Stage,
+    /// Long records are sent instead of the file's own.
+    packed: bool,
+    /// Errors in spite of which the file may be sent.
+    allow: Vec<DefectId>,
+}
+
+/// What is in the folder.
+#[derive(Debug)]
+enum Listing {
+    /// Nobody has asked yet.
+    Unread,
+    Reading,
+    Read(Vec<FileEntry>),
+    Failed(String),
+}
+
+/// Where the choosing stands.
+#[derive(Debug)]
+enum Stage {
+    Picking,
+    Checking(PathBuf),
+    Report { facts: Box<ImageFacts>, scrolled: usize },
+}
+
+impl Load {
+    /// Starts in a folder.
+    pub fn new(directory: PathBuf) -> Self {
+        Load { directory, listing: Listing::Unread, cursor: 0, stage: Stage::Picking, packed: false, allow: Vec::new() }
+    }
+
+    /// The screen comes to the front: a folder that has never been read is read now.
+    pub fn entered(&mut self) -> Option<Action> {
+        matches!(self.listing, Listing::Unread).then(|| self.list(self.directory.clone()))
+    }
+
+    /// A file has been checked. An answer to an older question is not wanted any more.
+    pub fn checked(&mut self, facts: Box<ImageFacts>) {
+        if matches!(&self.stage, Stage::Checking(path) if *path == facts.path) {
+            self.stage = Stage::Report { facts, scrolled: 0 };
+        }
+    }
+
+    /// The image the report is about.
+    pub fn image(&self) -> Option<&ImageFacts> {
+        match &self.stage {
+            Stage::Report { facts, .. } => Some(facts),
+            Stage::Picking | Stage::Checking(_) => None,
+        }
+    }
+
+    /// Whether long records are to be sent.
+    pub fn is_packed(&self) -> bool {
+        self.packed
+    }
+
+    /// Errors in spite of which the file may be sent.
+    pub fn allowed(&self) -> &[DefectId] {
+        &self.allow
+    }
+
+    /// Allows one more error, and checks the file again.
+    pub fn allow(&mut self, error: DefectId) -> Option<Action> {
+        let path = self.image()?.path.clone();
+        let action = self.check(path);
+        self.allow.push(error);
+        Some(action)
+    }
+
+    /// Checks a file. What was allowed in another one is not allowed in it.
+    pub fn check(&mut self, path: PathBuf) -> Action {
+        if self.image().is_none_or(|facts| facts.path != path)
+            && !matches!(&self.stage, Stage::Checking(of) if *of == path)
+        {
+            self.allow.clear();
+        }
+        self.stage = Stage::Checking(path.clone());
+        Action::CheckImage(path)
+    }
+
+    /// What a command does here; `area` is that of the picture.
+    pub fn on(&mut self, cmd: Cmd, view: &View, area: Rect) -> Option<Action> {
+        let page = usize::from(area.height);
+        if view.job == Some(Job::Load) {
+            return (cmd == Cmd::Back).then_some(Action::Ask(Question::CancelLoad));
+        }
+        if view.load.report.is_some() {
+            return matches!(cmd, Cmd::Accept | Cmd::Back).then_some(Action::DismissReport);
+        }
+        match &mut self.stage {
+            Stage::Picking => self.pick(cmd, page),
+            Stage::Checking(_) => {
+                if cmd == Cmd::Back {
+                    self.stage = Stage::Picking;
+                }
+                None
+            }
+            Stage::Report { facts, scrolled } => {
+                let (all, room) = (findings(facts, area.width).len(), findings_room(facts, view, area));
+                let last = all.saturating_sub(room);
+                match cmd {
+                    Cmd::Up => *scrolled = scrolled.saturating_sub(1),
+                    Cmd::Down => *scrolled = (*scrolled + 1).min(last),
+                    Cmd::PageUp => *scrolled = scrolled.saturating_sub(room),
+                    Cmd::PageDown => *scrolled = (*scrolled + room).min(last),
+                    Cmd::First => *scrolled = 0,
+                    Cmd::Last => *scrolled = last,
+                    Cmd::Back => {
+                        self.stage = Stage::Picking;
+                        return Some(self.list(self.directory.clone()));
+                    }
+                    Cmd::Refresh => {
+                        let path = facts.path.clone();
+                        return Some(self.check(path));
+                    }
+                    Cmd::Type => return Some(Action::Ask(Question::image(&self.directory))),
+                    Cmd::Pack => self.packed = !self.packed,
+                    Cmd::Allow if !facts.errors.is_empty() => {
+                        return Some(Action::Ask(Question::allow(facts.errors.clone())));
+                    }
+                    Cmd::Accept if objections(facts, view).is_empty() => {
+                        return Some(Action::Ask(Question::start_load(view, facts)));
+                    }
+                    _ => {}
+                }
+                None
+            }
+        }
+    }
+
+    /// The keys that mean something now, for the footer.
+    pub fn footer(&self, view: &View) -> &'static [Binding] {
+        if view.job == Some(Job::Load) {
+            return RUNNING_KEYS;
+        }
+        if view.load.report.is_some() {
+            return VERDICT_KEYS;
+        }
+        match &self.stage {
+            Stage::Picking => BINDINGS,
+            Stage::Checking(_) => CHECKING_KEYS,
+            Stage::Report { facts, .. } if objections(facts, view).is_empty() => match facts.defects.is_empty() {
+                true => READY_KEYS,
+                false => READY_KEYS_WITH_FINDINGS,
+            },
+            Stage::Report { facts, .. } if !facts.errors.is_empty() => REFUSED_KEYS,
+            Stage::Report { .. } => REPORT_KEYS,
+        }
+    }
+
+    /// The picture.
+    pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let rows = if scene.view.job == Some(Job::Load) {
+            self.running(scene, area)
+        } else if let Some(report) = &scene.view.load.report {
+            verdict(scene, report, area)
+        } else {
+            match &self.stage {
+                Stage::Picking => self.picker(scene, area),
+                Stage::Checking(path) => vec![
+                    lines::rule(scene.theme, area.width, "Image", ""),
+                    Line::raw(format!("  Reading and checking {} ...", file_name(path))),
+                ],
+                Stage::Report { facts, scrolled } => report(scene, facts, self.packed, *scrolled, area),
+            }
+        };
+        lines::draw(frame, area, rows);
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    visible::text(&path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
+}

@@ -1,0 +1,206 @@
+//! What was found in a file, what stands against sending it, and what will happen.
+
+use std::path::Path;
+
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+
+use super::file_name;
+use crate::time::Duration;
+use crate::tui::input::ImageFacts;
+use crate::tui::screens::Scene;
+use crate::tui::theme::Theme;
+use crate::tui::view::View;
+use crate::tui::visible;
+use crate::tui::widgets::{format, lines};
+
+/// Lines of findings shown at once on a small screen before the plan takes its place.
+const LEAST_DEFECT_ROWS: usize = 3;
+/// Lines that say what the file is, with their heading.
+const REPORT_ROWS: usize = 4;
+/// Steps of the plan.
+const PLAN_STEPS: usize = 4;
+
+/// What stands against sending this image now, one sentence each.
+pub(super) fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
+    let mut against = Vec::new();
+    if !facts.ok || facts.checked.is_none() {
+        against.push("the file has errors and must not be sent.".to_owned());
+    }
+    if !view.can_send() {
+        against.push("no unit is connected. Press 1 to choose a link.".to_owned());
+    }
+    if let (Some(unit), Some(image)) = (&view.facts.product, &facts.product)
+        && !unit.value.eq_ignore_ascii_case(image)
+    {
+        let (image, unit) = (visible::text(image), visible::text(&unit.value));
+        against.push(format!("the file is for an {image}, the unit is an {unit}."));
+    }
+    if let (Some(noted), Some(image)) = (view.noted(), &facts.product)
+        && !noted.product.eq_ignore_ascii_case(image)
+    {
+        let (image, unit) = (visible::text(image), visible::text(&noted.product));
+        against.push(format!("the file is for an {image}, our notes say {unit}."));
+    }
+    if view.job.is_some() {
+        against.push("something else is being done with the unit. Wait for it to end.".to_owned());
+    }
+    against
+}
+
+/// Everything about the file, what stands against it, and what will happen.
+pub(super) fn report(
+    scene: Scene,
+    facts: &ImageFacts,
+    packed: bool,
+    scrolled: usize,
+    area: Rect,
+) -> Vec<Line<'static>> {
+    let theme = scene.theme;
+    let version = facts.version.map(|version| format!(" {version}")).unwrap_or_default();
+    let product = facts.product.as_deref().map_or("does not say what it is".into(), visible::text);
+    let mut rows = vec![
+        lines::rule(theme, area.width, "Image", &file_name(&facts.path)),
+        lines::labelled(theme, "Software", format!("{product}{version}")),
+        lines::labelled(
+            theme,
+            "To send",
+            format!("{} records, {} characters", format::grouped(facts.records), format::grouped(facts.characters)),
+        ),
+        lines::labelled(theme, "Check", check_word(theme, facts)),
+    ];
+    let plan = plan(scene, facts, packed, area.width);
+    if !facts.defects.is_empty() {
+        let all = findings(facts, area.width);
+        let room = findings_room(facts, scene.view, area);
+        let first = scrolled.min(all.len() - room);
+        let below = all.len() - first - room;
+        let range = if below > 0 { format!("↓ {} more lines", format::grouped(below)) } else { String::new() };
+        rows.push(lines::rule(theme, area.width, "Findings", &range));
+        rows.extend(all.into_iter().skip(first).take(room).map(Line::raw));
+    }
+    rows.extend(plan);
+    rows
+}
+
+/// Every finding, in as many lines as it needs.
+pub(super) fn findings(facts: &ImageFacts, columns: u16) -> Vec<String> {
+    let room = usize::from(columns).saturating_sub(6).max(1);
+    let lines = |defect: &String| {
+        let broken = format::wrap(&visible::text(defect), room);
+        broken
+            .into_iter()
+            .enumerate()
+            .map(|(number, line)| format!("{}{line}", if number == 0 { "  " } else { "    " }))
+    };
+    facts.defects.iter().flat_map(lines).collect()
+}
+
+/// How many lines of the findings have room beside the plan.
+pub(super) fn findings_room(facts: &ImageFacts, view: &View, area: Rect) -> usize {
+    let others = REPORT_ROWS + 1 + plan_rows(facts, view);
+    let room = usize::from(area.height).saturating_sub(others);
+    room.max(LEAST_DEFECT_ROWS).min(findings(facts, area.width).len())
+}
+
+/// Lines of the plan: what is going to happen, and what stands against it or how it is begun.
+fn plan_rows(facts: &ImageFacts, view: &View) -> usize {
+    let steps = if facts.ok { PLAN_STEPS + 2 } else { 0 };
+    1 + steps + objections(facts, view).len().max(1)
+}
+
+fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
+    let findings = match facts.defects.len() {
+        0 => String::new(),
+        1 => ", one finding".into(),
+        count => format!(", {} findings", format::grouped(count)),
+    };
+    match facts.ok {
+        true if !facts.allowed.is_empty() => {
+            let names: Vec<&str> = facts.allowed.iter().map(|id| id.name()).collect();
+            Span::styled(format!("passed in spite of {}{findings}", names.join(", ")), theme.warning())
+        }
+        true => Span::styled(format!("passed{findings}"), theme.good()),
+        false => Span::styled(format!("failed{findings}"), theme.bad()),
+    }
+}
+
+fn plan(scene: Scene, facts: &ImageFacts, packed: bool, columns: u16) -> Vec<Line<'static>> {
+    let (theme, view) = (scene.theme, scene.view);
+    let mut rows = vec![lines::rule(theme, columns, "Plan", "")];
+    let product =
+        facts.product.as_deref().map_or("the right product".into(), |name| format!("an {}", visible::text(name)));
+    let time = format::minutes(Duration::from_secs_f64(facts.time.as_secs_f64().ceil()));
+    let sent = format::grouped(facts.characters);
+    let expected = match (&facts.product, facts.version) {
+        (Some(product), Some(version)) => format!("name {} {version}", visible::text(product)),
+        _ => "name what the file holds".into(),
+    };
+    if facts.ok {
+        let steps: [String; PLAN_STEPS] = [
+            format!("Make sure that the unit is {product}."),
+            "Send L and the password; the unit resets into its loader.".into(),
+            match packed {
+                false => format!("Send {sent} characters: some {time} with what the loader needs."),
+                true => format!("Send fewer than {sent} characters, in long records: less than {time}."),
+            },
+            format!("Wait for the banner of the new software: it must {expected}."),
+        ];
+        let numbered = steps.into_iter().enumerate();
+        rows.extend(numbered.map(|(number, step)| Line::raw(format!("  {}. {step}", number + 1))));
+        rows.push(lines::labelled(theme, "Unit now", unit_version(view)));
+        rows.push(lines::labelled(
+            theme,
+            "Afterwards",
+            format!("{} ({})", expected_version(facts), change(view, facts)),
+        ));
+    }
+    let against = objections(facts, view);
+    if against.is_empty() {
+        rows.push(Line::from(vec![
+            Span::styled("  Enter", theme.key()),
+            Span::raw(" asks for the password and starts. Keep the unit powered meanwhile."),
+        ]));
+    } else {
+        rows.extend(
+            against
+                .into_iter()
+                .map(|objection| Line::from(vec![Span::styled("  Cannot start: ", theme.bad()), Span::raw(objection)])),
+        );
+    }
+    rows
+}
+
+fn unit_version(view: &View) -> String {
+    let product = view.facts.product.as_ref().map(|known| visible::text(&known.value));
+    let version = view.facts.version.as_ref().map(|known| known.value.to_string());
+    match (product, version) {
+        (Some(product), Some(version)) => format!("{product} {version}"),
+        (Some(product), None) => format!("{product}, version not known"),
+        (None, _) => match view.noted() {
+            Some(noted) => {
+                let image = file_name(Path::new(&noted.image));
+                format!("{}, which {image} was begun to be sent to", visible::text(&noted.product))
+            }
+            None => "not known; the unit is asked first".into(),
+        },
+    }
+}
+
+fn expected_version(facts: &ImageFacts) -> String {
+    let product = facts.product.as_deref().map_or("what the file holds".into(), visible::text);
+    facts.version.map_or_else(|| product.clone(), |version| format!("{product} {version}"))
+}
+
+fn change(view: &View, facts: &ImageFacts) -> &'static str {
+    let unit = view.facts.product.as_ref().map(|known| known.value.to_ascii_lowercase());
+    if unit.is_none() || unit != facts.product.as_ref().map(|product| product.to_ascii_lowercase()) {
+        return "cannot be compared";
+    }
+    match (view.facts.version.as_ref().map(|known| known.value), facts.version) {
+        (Some(now), Some(then)) if then > now => "newer",
+        (Some(now), Some(then)) if then < now => "older: a downgrade",
+        (Some(_), Some(_)) => "the same version again",
+        _ => "cannot be compared",
+    }
+}
