@@ -120,9 +120,11 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let written = begun.and_then(|()| stream.keep_writing(Duration::from_secs(args.reconnect), output));
     let Stream { mut talk, mut sink, setting, was_on, .. } = stream;
     // However it ended, and also if the first row never came: what has been changed is changed back.
-    let left = match setting {
-        Some(_) if !args.keep => leave_as_found(&mut talk, was_on, found, output),
-        Some(_) | None => Ok(()),
+    let is_lost = written.as_ref().is_err_and(|error| error.kind == Kind::PortGone);
+    let left = if setting.is_some() && !args.keep && !is_lost {
+        leave_as_found(&mut talk, was_on, found, output)
+    } else {
+        Ok(())
     };
     let flushed = sink.flush();
     talk.close(output);
@@ -160,7 +162,8 @@ const ROWS_AGAIN: Duration = Duration::from_secs(7);
 impl Stream {
     /// Switches the stream on. The row that proves it is the first one written.
     fn switch_on(&mut self, source: Source, period: Duration, output: &mut Output) -> Result<(), CliError> {
-        self.setting = Some((source, period));
+        // What is found on behind a cable that is back is our own.
+        let is_first = self.setting.replace((source, period)).is_none();
         let mut proof = None;
         let ended = self.talk.run(Command::StreamOn { source, period }, |session, event| {
             if let Event::Row { at, span, row } = event {
@@ -169,7 +172,9 @@ impl Stream {
             Ok(())
         })?;
         match ended {
-            Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => self.was_on |= was_on,
+            Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => {
+                self.was_on |= was_on && is_first;
+            }
             Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(outcome),
             Ended::Finished { interrupted: true, .. } => return Err(ask::interrupted()),
             Ended::Lost { error, .. } => return Err(error),

@@ -158,6 +158,11 @@ pub fn other_holder(path: &Path) -> Option<Holder> {
     processes::holders(&[path], |pid| !processes::is_ours(pid)).pop().flatten()
 }
 
+/// Another process that runs this program and hosts the pseudo-terminal of this path.
+pub fn other_host(path: &Path) -> Option<Holder> {
+    processes::other_host(path)
+}
+
 /// The process that says it has the port by a lock file (`/run/lock/LCK..ttyUSB0`), as terminal programs have done since
 /// UUCP. `None` for one whose process is gone, or this one.
 #[cfg(unix)]
@@ -244,6 +249,29 @@ mod processes {
     use rustix::path::Arg;
 
     use super::Holder;
+
+    /// The first process of our name, but not this one, that has the master of the pseudo-terminal. The name tells an
+    /// emulator from a terminal window that has got the number of one which is gone.
+    pub fn other_host(path: &Path) -> Option<Holder> {
+        let target = fs::canonicalize(path).ok()?.into_os_string().into_vec();
+        let own = name(std::process::id())?;
+        let hosts = |pid: u32| {
+            let files = fs::read_dir(format!("/proc/{pid}/fd")).ok()?;
+            let mut files = files.flatten().map(|file| file.file_name());
+            files.find_map(|fd| hosted(pid, &fd.to_string_lossy()).filter(|pts| *pts == target))
+        };
+        let pid = pids()?
+            .into_iter()
+            .find(|&pid| !is_ours(pid) && name(pid).as_deref() == Some(own.as_str()) && hosts(pid).is_some())?;
+        Some(Holder { name: own, pid })
+    }
+
+    fn pids() -> Option<Vec<u32>> {
+        let entries = fs::read_dir("/proc").ok()?;
+        let mut pids: Vec<u32> = entries.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).collect();
+        pids.sort_unstable();
+        Some(pids)
+    }
 
     /// What the system calls a process.
     pub fn name(pid: u32) -> Option<String> {
@@ -349,6 +377,10 @@ mod processes {
         vec![None; paths.len()]
     }
 
+    pub fn other_host(_path: &Path) -> Option<Holder> {
+        None
+    }
+
     #[cfg(unix)]
     pub fn name(_pid: u32) -> Option<String> {
         None
@@ -409,13 +441,18 @@ pub fn watch(changed: impl Fn() + Send + 'static) -> std::io::Result<()> {
         let mut events = Reader::new(&watch, &mut buffer);
         while let Ok(event) = events.next() {
             // Other devices come and go all day long.
-            let is_serial = event.file_name().is_some_and(|name| name.to_bytes().starts_with(b"tty"));
-            if !is_serial {
-                continue;
+            let mut is_serial = event.file_name().is_some_and(|name| name.to_bytes().starts_with(b"tty"));
+            // An adapter brings several, each with several events: one call for all that were read together.
+            while !events.is_buffer_empty() {
+                let Ok(event) = events.next() else { return };
+                is_serial |= event.file_name().is_some_and(|name| name.to_bytes().starts_with(b"tty"));
             }
-            // The rights are set, and the adapter's other ports come, a moment later.
-            std::thread::sleep(SETTLED);
-            changed();
+            if is_serial {
+                // The rights are set, and the adapter's other ports come, a moment later: they wait in the queue
+                // meanwhile and are read together.
+                std::thread::sleep(SETTLED);
+                changed();
+            }
         }
     })?;
     Ok(())
@@ -470,7 +507,7 @@ mod tests {
             let neighbour = adapter("/dev/ttyUSB1", number, "1-2:1.0");
             let others = [neighbour.clone()];
             let found = |ports: &[Port]| again(ports, &was, &others);
-            assert_eq!(found(&[neighbour.clone()]), None, "{number:?}: the neighbour was there all the time");
+            assert_eq!(found(&others), None, "{number:?}: the neighbour was there all the time");
             let somewhere = adapter("/dev/ttyUSB2", number, "1-3:1.0");
             assert_eq!(found(&[neighbour.clone(), somewhere]), None, "{number:?}: a third one");
             let renamed = adapter("/dev/ttyUSB2", number, "1-1:1.0");

@@ -308,6 +308,10 @@ impl PortLink {
                     let what = format!("a link to '{}', not to a pseudo-terminal", former.display());
                     return Err(PortLinkError::Taken { link: link.to_owned(), what });
                 }
+                if let Some(host) = super::ports::other_host(link) {
+                    let what = format!("the port of a unit that {host} emulates");
+                    return Err(PortLinkError::Taken { link: link.to_owned(), what });
+                }
             }
             Ok(metadata) => {
                 let what = if metadata.is_dir() { "a directory" } else { "a file" };

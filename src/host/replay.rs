@@ -83,6 +83,9 @@ impl Recording {
     // Not an iterator: an error ends it for good.
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> Result<Option<Piece>, RecordingError> {
+        if let Some(piece) = self.waiting.pop_front() {
+            return Ok(Some(piece));
+        }
         let mut buffer = vec![0; READ];
         loop {
             if let Some(piece) = self.waiting.pop_front() {

@@ -323,7 +323,8 @@ mod tests {
         use crate::host::pty::Pty;
 
         let pty = Pty::open(115_200).expect("a pseudo-terminal");
-        let port = fs::File::options().read(true).write(true).open(pty.path()).expect("opened");
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+        let port = rustix::fs::open(pty.path(), flags, Mode::empty()).expect("opened");
         let mut reader = Command::new("cat").stdin(port).stdout(Stdio::null()).spawn().expect("cat starts");
         let refused = open_exclusively(pty.path()).map(drop).expect_err("somebody else reads there");
         let Cause::Busy { holder: Some(Holder { name, pid }) } = refused else { panic!("{refused}") };

@@ -1,6 +1,6 @@
 //! Hours of a channel's values in bounded memory.
 //!
-//! The newest samples are kept as they came ([`super::view::KEPT_SAMPLES`]); behind them stands this: the extremes and
+//! The newest samples are kept as they came ([`super::stream::KEPT_SAMPLES`]); behind them stands this: the extremes and
 //! the mean of equal stretches of time. When there is no room for another stretch, each two become one, so that the
 //! whole time since the beginning is always there, at no less than half of [`MOST_STRETCHES`] points.
 

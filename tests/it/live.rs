@@ -322,14 +322,10 @@ fn a_question_is_left_by_a_signal_and_by_ctrl_c_and_nothing_is_sent() {
     let world = World::new();
     let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "300", "--out", "new.S"];
     assert_eq!(world.run(&args, b"").code, Some(0));
-    let leave: [(&str, fn(&Screen)); 4] = [
-        ("Type yes", |screen| screen.signal(rustix::process::Signal::TERM)),
-        ("Type yes", |screen| screen.keys("\x03")),
-        ("Password:", |screen| screen.signal(rustix::process::Signal::TERM)),
-        ("Password:", |screen| screen.keys("\x03")),
-    ];
     std::thread::scope(|scope| {
-        for (question, leave) in leave {
+        for (question, by_signal) in
+            [("Type yes", true), ("Type yes", false), ("Password:", true), ("Password:", false)]
+        {
             let world = &world;
             scope.spawn(move || {
                 let mut screen = Screen::start(world.command(&["load", "--port", "emu:axtc4co", "new.S"]), 24, 80);
@@ -338,7 +334,11 @@ fn a_question_is_left_by_a_signal_and_by_ctrl_c_and_nothing_is_sent() {
                     screen.keys("yes\r");
                     screen.wait(question);
                 }
-                leave(&screen);
+                if by_signal {
+                    screen.signal(rustix::process::Signal::TERM);
+                } else {
+                    screen.keys("\x03");
+                }
                 assert_eq!(screen.wait_end(), Some(130), "{question}: {}", screen.text());
                 assert!(screen.is_given_back(), "{question}");
                 screen.wait("interrupted");

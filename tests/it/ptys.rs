@@ -585,6 +585,25 @@ fn an_emulator_leaves_a_real_file_alone() {
 }
 
 #[test]
+fn an_emulator_leaves_the_link_of_a_running_one_alone_and_takes_that_of_a_killed_one() {
+    let world = World::new();
+    let args = ["emulate", "axtc4co", "--link", "unit"];
+    let first = world.start(&args);
+    first.wait_out("serial: ");
+    let port = fs::read_link(world.path("unit")).expect("a link");
+    let second = world.run(&args, b"");
+    assert_eq!(second.code, Some(1), "{}", second.err);
+    assert!(second.err.contains("'unit' exists and is the port of a unit that axcon (process "), "{}", second.err);
+    assert_eq!(fs::read_link(world.path("unit")).expect("still there"), port);
+    first.signal(Signal::KILL);
+    first.wait();
+    let third = world.start(&args);
+    third.wait_out("serial: ");
+    third.signal(Signal::TERM);
+    assert_eq!(third.wait().code, Some(0));
+}
+
+#[test]
 fn several_units_have_several_ports() {
     let world = World::new();
     let mut emulator = world.start(&["emulate", "axtc4co", "AXTC4CO", "--link", "unit", "--json"]);
