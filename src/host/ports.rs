@@ -353,7 +353,10 @@ mod processes {
         let mut buffer = [MaybeUninit::uninit(); 8192];
         let mut entries = RawDir::new(folder, &mut buffer);
         while let Some(Ok(entry)) = entries.next() {
-            act(entry.file_name());
+            let is_itself_or_parent = entry.file_name().to_bytes().starts_with(b".");
+            if !is_itself_or_parent {
+                act(entry.file_name());
+            }
         }
     }
 

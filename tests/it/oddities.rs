@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use axcon::endpoint::{Endpoint, Transmit};
-use axcon::session::{Command, Job, LoadReport, Outcome, UnitNow, UnitState, Verdict};
+use axcon::session::{Command, Job, LoadOrder, LoadReport, Outcome, UnitNow, UnitState, Verdict};
 use axcon::time::{Duration, Instant};
 use axcon::wire::stream::Source;
 
@@ -246,4 +246,44 @@ fn an_echo_of_the_password_is_quoted_in_no_form() {
     assert!(!told.contains("axio") && !told.contains("2010"), "{told}");
     let kept: String = bench.session.record().entries().map(|entry| entry.bytes.escape_ascii().to_string()).collect();
     assert!(!kept.to_lowercase().contains("axio"), "{kept}");
+}
+
+#[test]
+fn an_answer_of_a_waiting_loader_that_comes_late_is_not_the_first_records() {
+    let (mut line, mut asked, mut data) = (String::new(), 0, 0);
+    let complaint = "Error # 0002\r\nRestarting.\r\nWaiting for application S-Record.\r\n";
+    let unit = Odd::new(move |key| match key {
+        b'm' => said(complaint),
+        b'\r' => {
+            let record = std::mem::take(&mut line);
+            asked += u32::from(record.is_empty());
+            match record.get(..2) {
+                // The first Enter that stands alone: its answer comes when the header has left.
+                None if asked == 1 => vec![(450, complaint.into())],
+                Some("S7") => vec![(40, "\r\nAXTC4CO V1.2.0\r\n".into()), (60, MENU.replace("1.1.0", "1.2.0"))],
+                Some("S0") => {
+                    data = 0;
+                    Vec::new()
+                }
+                Some("S3") => {
+                    data += 1;
+                    // Behind each record that crosses into another page of 256 words.
+                    if data % 16 == 1 && data > 1 { said("\u{13}.\u{11}") } else { Vec::new() }
+                }
+                _ => Vec::new(),
+            }
+        }
+        b'S' | b'0'..=b'9' | b'A'..=b'F' => {
+            line.push(key.into());
+            Vec::new()
+        }
+        _ => Vec::new(),
+    });
+    let mut bench = Visit::to(unit);
+    let order = LoadOrder { product: Some("AXTC4CO".into()), ..order(small_image("AXTC4CO", "1.2.0")) };
+    let Outcome::Loaded(report) = bench.ask(Command::Load(Box::new(order))) else { panic!("an upload") };
+    assert_eq!(report.verdict, Verdict::Done, "{report:?}");
+    assert!(report.found_in_loader && report.remark.is_none(), "{report:?}");
+    let headers = bench.wire.windows(2).filter(|start| start == b"S0").count();
+    assert_eq!(headers, 2, "it was sent anew");
 }

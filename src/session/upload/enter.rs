@@ -52,6 +52,7 @@ impl Upload {
             UnitState::Application | UnitState::Loader => {}
         }
         self.found_in_loader = facts.state == UnitState::Loader;
+        self.asked_in_loader = self.found_in_loader.then_some(desk.now);
         let unit = if self.found_in_loader { UnitNow::Loader } else { UnitNow::Application };
         let ordered = self.order.product.clone();
         if let (Some(said), Some(ordered)) = (&said, &ordered)

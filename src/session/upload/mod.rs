@@ -38,6 +38,8 @@ const END_UNHEARD: Duration = Duration::from_millis(1500);
 const FILLER: [u8; 516] = [b'\r'; 516];
 /// How often a hold is told of while it lasts.
 const HOLD_TOLD: Duration = Duration::from_secs(1);
+/// How late the answer to that may be on a busy computer.
+const LATE_ANSWER: Duration = Duration::from_secs(2);
 /// The loaders' number for a record that came while another was parked.
 const OVERRUN: u32 = 5;
 /// Their number for characters lost or damaged on the line, as those are that come while a page is written.
@@ -60,6 +62,8 @@ pub(super) struct Upload {
     keys_sent: u32,
     /// What speaks against the image for this unit.
     misfit: Option<DefectId>,
+    /// When a loader that was found waiting was asked something that may still be answered.
+    asked_in_loader: Option<Instant>,
     /// The unit was waiting in its loader when it was found.
     found_in_loader: bool,
     /// Lines of words nobody knows since the loader has acknowledged anything, and the records sent before the first.
@@ -104,9 +108,18 @@ enum Stage {
         what: String,
         unit: UnitNow,
         phase: Phase,
-        /// It was too fast for the loader, and goes on slower as soon as that waits for a file again.
-        slower: bool,
+        /// What happens as soon as the loader waits for a file again, if anything does.
+        then: Option<Again>,
     },
+}
+
+/// Why everything is sent once more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Again {
+    /// It was too fast for the loader.
+    Slower,
+    /// The loader has answered late what was asked before the first record: the error is not that record's.
+    AsBefore,
 }
 
 /// What is to be sent to a loader that is not heard.
@@ -131,6 +144,7 @@ impl Upload {
             keys_sent: 0,
             misfit: None,
             found_in_loader: false,
+            asked_in_loader: None,
             strange: 0,
             strange_from: 0,
             filled: false,
@@ -201,36 +215,47 @@ impl Upload {
                     // What was on its way may have been keys for a menu: leave whatever dialogue they opened.
                     desk.leave_dialogue();
                 }
-                self.fail(desk, text.span.end, what, unit, self.was_too_fast(message));
+                let then = self.deserves_another(message, desk);
+                self.fail(desk, text.span.end, what, unit, then);
             }
         }
     }
 
-    /// Whether the loader complains of something that a slower sender would not have done to it.
-    fn was_too_fast(&self, message: &Message) -> bool {
-        let Message::Loader(LoaderText::Error(LoaderError::Number(number))) = message else { return false };
-        self.transfer.as_ref().is_some_and(|transfer| {
+    /// Whether the loader complains of something that would not be so the next time, and why.
+    fn deserves_another(&mut self, message: &Message, desk: &Desk<'_>) -> Option<Again> {
+        let Message::Loader(LoaderText::Error(error)) = message else { return None };
+        let transfer = self.transfer.as_ref()?;
+        let is_too_fast = match error {
             // Characters that came while it was deaf are no overrun, and may have been damaged on the line as well.
-            transfer.may_go_slower() && (*number == OVERRUN || *number == DAMAGED && transfer.is_surprised())
-        })
+            LoaderError::Number(number) => *number == OVERRUN || *number == DAMAGED && transfer.is_surprised(),
+            LoaderError::Status(_) => false,
+        };
+        if is_too_fast && transfer.may_go_slower() {
+            return Some(Again::Slower);
+        }
+        let asked_at = self.asked_in_loader.take()?;
+        (desk.now < asked_at + LATE_ANSWER && transfer.has_hardly_begun()).then_some(Again::AsBefore)
     }
 
     /// Nothing is sent any more; what comes behind `mark` says what the unit is now.
-    fn fail(&mut self, desk: &Desk<'_>, mark: u64, what: String, unit: UnitNow, slower: bool) {
+    fn fail(&mut self, desk: &Desk<'_>, mark: u64, what: String, unit: UnitNow, then: Option<Again>) {
         self.mark = mark;
-        self.stage = Stage::Failing { what, unit, phase: self.phase(), slower };
+        self.stage = Stage::Failing { what, unit, phase: self.phase(), then };
         self.deadline = Some(desk.now + RESTART);
     }
 
     /// Something was heard behind a failure: the loader may wait for a file again.
     fn failing(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let Stage::Failing { what, slower, .. } = &self.stage else { return None };
+        let Stage::Failing { what, then, .. } = &self.stage else { return None };
         match message {
             Message::Loader(LoaderText::Waiting | LoaderText::AnyKey)
             | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
-                let (what, slower) = (what.clone(), *slower);
-                if let (true, Some(transfer)) = (slower, &mut self.transfer) {
-                    transfer.start_over_slowly();
+                let (what, then) = (what.clone(), *then);
+                if let (Some(then), Some(transfer)) = (then, &mut self.transfer) {
+                    match then {
+                        Again::Slower => transfer.start_over_slowly(),
+                        Again::AsBefore => transfer.begin_again(),
+                    }
                     self.report_progress(desk);
                     return self.entered(desk);
                 }
@@ -272,7 +297,7 @@ impl Upload {
                 let what = "cancelled behind the end of the file, before the unit came back";
                 self.end(desk, Verdict::Interrupted, UnitNow::Unknown, what)
             }
-            Stage::Failing { slower: true, .. } => {
+            Stage::Failing { then: Some(_), .. } => {
                 self.end(desk, Verdict::Interrupted, UnitNow::Loader, "cancelled in the middle of the file")
             }
             Stage::Failing { what, unit, .. } => {
@@ -378,7 +403,7 @@ impl Upload {
                 };
                 let fill_up = transfer.may_wait_in_a_record();
                 desk.transmitter.clear();
-                self.fail(desk, desk.received, what.to_owned(), unit, false);
+                self.fail(desk, desk.received, what.to_owned(), unit, None);
                 if fill_up && stall != Stall::Held {
                     self.fill_up(desk);
                 }
@@ -398,6 +423,8 @@ impl Upload {
         // The header is the first record.
         if records > 1 {
             self.first_data.get_or_insert((desk.now, bytes));
+        } else {
+            self.first_data = None; // It begins, perhaps anew.
         }
         let (first, before) = self.first_data.unwrap_or((desk.now, bytes));
         let progress = Progress {
@@ -409,7 +436,7 @@ impl Upload {
             address: transfer.address().unwrap_or(0),
             elapsed: transfer.begun().map_or(Duration::ZERO, |begun| desk.now.since(begun)),
             moving: desk.now.since(first),
-            moved: bytes - before,
+            moved: bytes.saturating_sub(before),
             held: desk.transmitter.held_since().map(|since| desk.now.since(since)),
         };
         let moved = self.progress.is_none_or(|before| {

@@ -285,6 +285,18 @@ impl Transfer {
             .then(|| format!("the loader keeps {words}, and not of {} as believed{twice}", self.believed))
     }
 
+    /// Whether nothing shows yet that the loader has taken any data.
+    pub(super) fn has_hardly_begun(&self) -> bool {
+        self.taken <= 1
+    }
+
+    /// From the header on, as if nothing had been sent.
+    pub(super) fn begin_again(&mut self) {
+        self.start_over();
+        (self.again, self.window) = (false, Some(WINDOW));
+        (self.header_passed, self.crossing, self.stopped_since) = (false, None, None);
+    }
+
     /// Everything once more from the header on, with no belief about pages.
     pub(super) fn start_over_slowly(&mut self) {
         self.start_over();

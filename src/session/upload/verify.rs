@@ -71,7 +71,8 @@ impl Upload {
         match message {
             Message::Loader(LoaderText::Error(error)) => {
                 let what = format!("the loader reports error {error} at the end of the file");
-                self.fail(desk, end, what, UnitNow::Loader, self.was_too_fast(message));
+                let then = self.deserves_another(message, desk);
+                self.fail(desk, end, what, UnitNow::Loader, then);
             }
             Message::Loader(LoaderText::Waiting | LoaderText::AnyKey)
             | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {

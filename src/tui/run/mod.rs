@@ -33,8 +33,8 @@ use crate::host::terminal::{self, Screen};
 use crate::image::DefectId;
 use crate::time::{Duration, Instant};
 
-/// Least time between two pictures that no key asked for: thirty a second.
-const FRAME: Duration = Duration::from_millis(33);
+/// Least time between two pictures that no key asked for: fewer than thirty a second.
+const FRAME: Duration = Duration::from_millis(34);
 /// Longest wait: bounds the arithmetic, nothing else.
 const LONGEST_WAIT: Duration = Duration::from_secs(3600);
 /// Pieces of a recording between two looks at the keyboard.
