@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Global;
 use super::error::{CliError, Kind};
-use super::output::{Closed, Output};
+use super::output::Output;
 use super::talk::{Ended, Talk};
 use crate::session::{Command, Event};
 use crate::wire::{diagnostics, visible};
@@ -52,15 +52,10 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     let calendar = talk.calendar();
-    let mut written = Ok(());
     let ended = talk.run(Command::Diagnostics { pages: args.count }, |_, event| {
         let Event::Page { at, lines } = event else { return Ok(()) };
-        // Whatever becomes of our output, the unit's pages have to be stopped: the job goes on to its end.
-        if written.is_err() {
-            return Ok(());
-        }
         let lines: Vec<String> = lines.iter().map(|line| visible::line(line.text.trim_end().as_bytes())).collect();
-        written = if json {
+        if json {
             let values = lines.iter().flat_map(|line| diagnostics::quantities(line)).map(|quantity| ValueObject {
                 label: quantity.label,
                 value: quantity.value,
@@ -70,14 +65,9 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
             output.object(&PageObject { schema: "axcon.diagnostics/1", time, values: values.collect(), lines })
         } else {
             output.data(format!("{}\n\n", lines.join("\n")).as_bytes())
-        };
-        Ok(())
+        }
     });
     talk.close(output);
-    match written {
-        Err(error) if !error.error.is::<Closed>() => return Err(error),
-        Ok(()) | Err(_) => {}
-    }
     match ended? {
         // Without a count, the interrupt is the way to end.
         Ended::Finished { interrupted: true, .. } if args.count.is_none() => Ok(()),

@@ -136,7 +136,8 @@ mod hosting {
     #[derive(Serialize)]
     struct Answered<'a> {
         schema: &'static str,
-        unit: usize,
+        /// `None` where the line names none.
+        unit: Option<usize>,
         verb: &'a str,
         ok: bool,
         said: Option<&'a str>,
@@ -338,12 +339,17 @@ mod hosting {
                     match Order::read(&line, &products) {
                         Ok(None) => {}
                         Ok(Some(Order::Quit)) => return Ok(()),
-                        Ok(Some(Order::Help)) => output.remark(&help()),
-                        Ok(Some(Order::HelpFaults)) => output.remark(fault::HELP),
+                        Ok(Some(Order::Help)) => tell_help(&help(), output)?,
+                        Ok(Some(Order::HelpFaults)) => tell_help(fault::HELP, output)?,
                         Ok(Some(Order::Tell(verbs))) => {
                             for (place, verb) in verbs {
                                 tell(&units[place], place, verb, line.trim(), news, output);
                             }
+                        }
+                        Err(complaint) if output.json => {
+                            let (schema, verb) = ("axcon.emulate-answer/1", line.trim());
+                            let said = Some(complaint.as_str());
+                            output.object(&Answered { schema, unit: None, verb, ok: false, said })?;
                         }
                         Err(complaint) => output.remark(&complaint),
                     }
@@ -364,6 +370,15 @@ mod hosting {
         }
     }
 
+    /// For a person, whom a stream of objects is not for.
+    fn tell_help(text: &str, output: &mut Output) -> Result<(), CliError> {
+        if output.json {
+            output.remark(text);
+            return Ok(());
+        }
+        output.data(format!("{}\n", text.trim_end()).as_bytes())
+    }
+
     fn tell(running: &Running, place: usize, verb: Verb, line: &str, news: &SyncSender<News>, output: &mut Output) {
         let (news, line) = (news.clone(), line.to_owned());
         let answered = move |answer| {
@@ -380,7 +395,7 @@ mod hosting {
         if output.json {
             let said = answer.as_ref().map_or_else(|refused| Some(refused.as_str()), Option::as_deref);
             let schema = "axcon.emulate-answer/1";
-            return output.object(&Answered { schema, unit: place + 1, verb, ok: answer.is_ok(), said });
+            return output.object(&Answered { schema, unit: Some(place + 1), verb, ok: answer.is_ok(), said });
         }
         let unit = prefix(place, units);
         match answer {
@@ -421,8 +436,10 @@ mod hosting {
             return Ok(());
         }
         let lines = move || {
-            for line in std::io::stdin().lock().lines() {
+            // What is no UTF-8 is a verb that nobody knows, and answered so.
+            for line in std::io::stdin().lock().split(b'\n') {
                 let Ok(line) = line else { return };
+                let line = String::from_utf8_lossy(&line).trim_end_matches('\r').to_owned();
                 if news.send(News::Line(line)).is_err() {
                     return;
                 }

@@ -41,6 +41,9 @@ struct Object<'a> {
     product: Option<&'a str>,
     version: Option<String>,
     serial_number: Option<u32>,
+    product_code: Option<u32>,
+    revision: Option<u32>,
+    compiled: Option<String>,
     node_id: Option<u8>,
     can_kbps: Option<u16>,
     nmt_state: Option<&'a str>,
@@ -53,6 +56,7 @@ struct Object<'a> {
 struct Sources {
     product: Option<&'static str>,
     version: Option<&'static str>,
+    serial_number: Option<&'static str>,
     node_id: Option<&'static str>,
     can_kbps: Option<&'static str>,
     nmt_state: Option<&'static str>,
@@ -100,6 +104,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 /// What only the object dictionary says.
 #[derive(Clone, Debug, Default)]
 struct Deep {
+    product_code: Option<u32>,
     serial_number: Option<u32>,
     revision: Option<u32>,
     /// Day, month and year, their decimal digits in hexadecimal ones (1020h).
@@ -118,7 +123,12 @@ impl Deep {
         };
         let entry = |index, sub| reading.entries.iter().find(|entry| entry.at == ObjectAddress::new(index, sub));
         let bits = |index, sub| entry(index, sub)?.value?.as_integer().and_then(|bits| u32::try_from(bits).ok());
-        Ok(Deep { serial_number: bits(0x1018, 4), revision: bits(0x1018, 3), compiled: bits(0x1020, 1) })
+        Ok(Deep {
+            product_code: bits(0x1018, 2),
+            serial_number: bits(0x1018, 4),
+            revision: bits(0x1018, 3),
+            compiled: bits(0x1020, 1),
+        })
     }
 
     fn compiled(&self) -> Option<String> {
@@ -130,6 +140,7 @@ impl Deep {
         let mut lines = String::new();
         for (name, value) in [
             ("serial", self.serial_number.map(|number| format!("{number} ({number:08X}h)"))),
+            ("code", self.product_code.map(|code| format!("{code:08X}h"))),
             ("revision", self.revision.map(|revision| format!("{revision:08X}h"))),
             ("compiled", self.compiled()),
         ] {
@@ -182,6 +193,9 @@ fn object<'a>(facts: &'a Facts, deep: &Deep) -> Object<'a> {
         product: facts.product.as_ref().map(|known| known.value.as_str()),
         version: facts.version.as_ref().map(|known| known.value.to_string()),
         serial_number: deep.serial_number,
+        product_code: deep.product_code,
+        revision: deep.revision,
+        compiled: deep.compiled(),
         node_id: value(&facts.node_id),
         can_kbps: value(&facts.can_kbps),
         nmt_state: facts.nmt_state.as_ref().map(|known| known.value.as_str()),
@@ -189,6 +203,7 @@ fn object<'a>(facts: &'a Facts, deep: &Deep) -> Object<'a> {
         sources: Sources {
             product: source(&facts.product),
             version: source(&facts.version),
+            serial_number: deep.serial_number.map(|_| "object dictionary"),
             node_id: source(&facts.node_id),
             can_kbps: source(&facts.can_kbps),
             nmt_state: source(&facts.nmt_state),

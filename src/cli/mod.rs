@@ -138,13 +138,26 @@ pub fn command() -> clap::Command {
 
 /// Runs the program and gives its exit code.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
-    let cli = match Cli::try_parse_from(args) {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let mut cli = match Cli::try_parse_from(&args) {
         Ok(cli) => cli,
+        // Who asked for JSON gets the complaint as JSON; help and version are no complaints.
+        Err(error) if error.use_stderr() && args.iter().any(|arg| arg == "--json") => {
+            let text = error.render().to_string();
+            let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+            let what = lines.next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+            let error = lines.fold(CliError::message(error::Kind::Usage, what), |error, line| error.hint(line));
+            return output::conclude(&mut Output::standard(true), Err(error));
+        }
         Err(error) => {
             let _ = error.print();
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
+    // An empty AXCON_PORT is none.
+    if std::env::var_os("AXCON_PORT").is_some_and(|port| port.is_empty()) {
+        cli.global.ports.retain(|port| !port.is_empty());
+    }
     let mut output = Output::standard(cli.global.json);
     let result = dispatch(cli, &mut output);
     output::conclude(&mut output, result)
@@ -155,6 +168,11 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
     if global.ports.len() > 1 && !matches!(cli.command, Some(Command::Load(_))) {
         let message = format!("several links were named ({}), and this works on one", global.ports.join(", "));
         return Err(CliError::message(error::Kind::Usage, message).hint("'axcon load' takes several"));
+    }
+    if let Some(twice) =
+        global.ports.iter().enumerate().find_map(|(at, port)| global.ports[..at].contains(port).then_some(port))
+    {
+        return Err(CliError::message(error::Kind::Usage, format!("'{twice}' is named twice")));
     }
     match cli.command {
         None => console::run(global),

@@ -133,13 +133,14 @@ impl Talk {
         let now = self.now();
         self.session.command(now, command).map_err(|error| CliError::new(Kind::Usage, error))?;
         let mut interrupted = false;
+        let mut failed = None;
         let mut deadline = Instant::NEVER;
         loop {
             let step = self.step(deadline, |session| {
-                finished(session, &mut news).map_or_else(|| ControlFlow::Continue(()), ControlFlow::Break)
+                finished(session, &mut news, &mut failed).map_or_else(|| ControlFlow::Continue(()), ControlFlow::Break)
             });
             match step {
-                Ok(outcome) => return Ok(Ended::Finished { outcome: outcome?, interrupted }),
+                Ok(outcome) => return failed.map_or(Ok(Ended::Finished { outcome, interrupted }), Err),
                 Err(PumpError::Interrupted(_)) if !interrupted => {
                     interrupted = true;
                     let now = self.now();
@@ -151,17 +152,18 @@ impl Talk {
                     let now = self.now();
                     self.session.link_lost(now);
                     let error = link::pump_error(error);
-                    return match finished(&mut self.session, &mut news) {
-                        Some(outcome) => Ok(Ended::Lost { outcome: outcome?, error }),
+                    return match finished(&mut self.session, &mut news, &mut failed) {
+                        Some(outcome) => Ok(Ended::Lost { outcome, error }),
                         None => Err(error),
                     };
                 }
                 // A job that listens ends with the recording.
                 Err(PumpError::Over) => {
                     self.session.recording_over(self.now());
-                    let ended = finished(&mut self.session, &mut news);
+                    let ended = finished(&mut self.session, &mut news, &mut failed);
                     let none = || CliError::message(Kind::Failed, "the recording has ended, and the job has not");
-                    return Ok(Ended::Finished { outcome: ended.ok_or_else(none)??, interrupted });
+                    let outcome = ended.ok_or_else(none)?;
+                    return failed.map_or(Ok(Ended::Finished { outcome, interrupted }), Err);
                 }
                 Err(error) => return Err(link::pump_error(error)),
             }
@@ -443,17 +445,23 @@ pub fn no_answer_hints(error: CliError) -> CliError {
         .hint("a unit that another program has stopped by Xoff was sent an Xon; 'axcon terminal' shows all that comes")
 }
 
-/// Hands the session's events to `news`, up to the one that ends the job.
+/// Hands the session's events to `news`, up to the one that ends the job. Whatever becomes of our own output, the unit is
+/// left in order: if `news` fails the job is cancelled, and comes to its end.
 fn finished(
     session: &mut Session,
     news: &mut impl FnMut(&Session, &Event) -> Result<(), CliError>,
-) -> Option<Result<Outcome, CliError>> {
+    failed: &mut Option<CliError>,
+) -> Option<Outcome> {
     while let Some(event) = session.poll_event() {
-        if let Err(error) = news(session, &event) {
-            return Some(Err(error));
+        if failed.is_none()
+            && let Err(error) = news(session, &event)
+        {
+            *failed = Some(error);
+            // Never refused: it needs no job. The session knows the time.
+            let _ = session.command(Instant::ZERO, Command::Cancel);
         }
         if let Event::Finished(outcome) = event {
-            return Some(Ok(outcome));
+            return Some(outcome);
         }
     }
     None

@@ -54,6 +54,14 @@ pub enum LinkSpecError {
         /// What there is, as links.
         known: Vec<String>,
     },
+    /// Something before `://` that is no kind of link.
+    #[error(
+        "there are no links of the kind '{kind}'; there are {TCP}HOST:PORT, {RFC2217}HOST:PORT, {EMULATED}PRODUCT and {REPLAY}FILE"
+    )]
+    UnknownKind {
+        /// What stood there.
+        kind: String,
+    },
     /// A network link without a proper address.
     #[error("{error}: such a link is {scheme}HOST:PORT")]
     Address {
@@ -79,6 +87,12 @@ impl std::str::FromStr for LinkSpec {
         }
         if text.is_empty() || starts_with(text, REPLAY) {
             return Err(LinkSpecError::Empty);
+        }
+        if let Some((kind, _)) = text.split_once("://")
+            && !kind.is_empty()
+            && kind.bytes().all(|byte| byte.is_ascii_alphanumeric())
+        {
+            return Err(LinkSpecError::UnknownKind { kind: kind.to_owned() });
         }
         if !starts_with(text, EMULATED) {
             return Ok(LinkSpec::Serial(PathBuf::from(text)));
@@ -459,6 +473,8 @@ mod tests {
     #[test]
     fn links_are_read_as_documented() {
         let read = |text: &str| text.parse::<LinkSpec>();
+        let unknown = read("telnet://host:23").expect_err("no such kind");
+        assert!(unknown.to_string().contains("'telnet'") && unknown.to_string().contains("rfc2217://"), "{unknown}");
         assert_eq!(read("/dev/ttyUSB0"), Ok(LinkSpec::Serial("/dev/ttyUSB0".into())));
         assert_eq!(read("COM3"), Ok(LinkSpec::Serial("COM3".into())));
         assert_eq!(read("EMU:AxTc4Co").map(|link| link.to_string()), Ok("emu:axtc4co".to_owned()));

@@ -64,7 +64,7 @@ struct Limits {
 
 /// What recordings may take together: months of ordinary work, and little on any disk of today. A part is small enough
 /// that dropping the oldest one drops little.
-const LIMITS: Limits = Limits { bytes: 200_000_000, files: 200, part_bytes: 20_000_000 };
+const LIMITS: Limits = Limits { bytes: 200_000_000, files: 20_000, part_bytes: 20_000_000 };
 
 /// Ending of a recording's name; nothing else in the directory is ever deleted.
 pub(super) const ENDING: &str = ".cast";

@@ -651,3 +651,53 @@ fn an_upload_that_nobody_answers_leaves_no_note_that_another_unit_would_be_judge
     let notes = fs::read_to_string(bench.world.path("state/axcon/uploads.json")).unwrap_or_default();
     assert!(!notes.contains("u1"), "{notes}");
 }
+
+#[test]
+fn pages_whose_reader_has_gone_are_stopped() {
+    let bench = Bench::new();
+    let mut command = bench.world.command(&["diagnostics", "--port", "u0", "--record", "pages.cast"]);
+    let mut child = command.args(FAST).stdout(std::process::Stdio::piped()).spawn().expect("it starts");
+    let mut first = [0; 16];
+    std::io::Read::read_exact(&mut child.stdout.take().expect("piped"), &mut first).expect("a page");
+    // The reader is gone with the end of that line.
+    let begun = Instant::now();
+    let status = loop {
+        match child.try_wait().expect("a child") {
+            Some(status) => break status,
+            None => assert!(begun.elapsed() < PATIENCE, "it goes on for ever"),
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    assert_eq!(status.code(), Some(0));
+    let asked = fs::read_to_string(bench.world.path("pages.cast")).expect("a recording");
+    assert!(asked.matches("\"i\",\"s\"").count() >= 2, "switched on and off: {asked}");
+}
+
+#[test]
+fn a_command_line_that_makes_no_sense_is_told_as_json_where_that_was_asked_for() {
+    let world = World::new();
+    for args in [
+        &["frobnicate", "--json"][..],
+        &["identify", "--bogus", "--json"],
+        &["image", "check", "x", "--product", "n", "--json"],
+    ] {
+        let ran = world.run(args, b"");
+        assert_eq!((ran.code, ran.out.as_str()), (Some(2), ""), "{args:?}");
+        let error = json(&ran.err);
+        assert_eq!((&error["schema"], &error["exit_code"]), (&"axcon.error/1".into(), &2.into()), "{}", ran.err);
+    }
+    let twice = world.run(&["load", "x.S", "--port", "a", "--port", "a", "--yes"], b"");
+    assert_eq!(twice.code, Some(2));
+    assert!(twice.err.contains("'a' is named twice"), "{}", twice.err);
+}
+
+#[test]
+fn what_is_no_text_on_standard_input_ends_no_emulator() {
+    let world = World::new();
+    let ran = world.run(&["emulate", "axtc4co", "--json"], b"status\n\xff\xfe\nfoo\nstatus\nquit\n");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let answers: Vec<Value> =
+        objects(&ran.out).into_iter().filter(|object| object["schema"] == "axcon.emulate-answer/1").collect();
+    let refused = answers.iter().filter(|answer| answer["ok"] == false && answer["unit"].is_null()).count();
+    assert_eq!(refused, 2, "{}", ran.out);
+}
