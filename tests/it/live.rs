@@ -320,7 +320,7 @@ fn recordings_are_listed_and_played_from_any_place() {
 #[test]
 fn a_question_is_left_by_a_signal_and_by_ctrl_c_and_nothing_is_sent() {
     let world = World::new();
-    let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "300", "--out", "new.S"];
+    let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "400", "--out", "new.S"];
     assert_eq!(world.run(&args, b"").code, Some(0));
     std::thread::scope(|scope| {
         for (question, by_signal) in

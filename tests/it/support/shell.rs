@@ -54,21 +54,6 @@ impl World {
         }
     }
 
-    /// Waits until the unit has said a text in a recording, in however many pieces.
-    pub fn wait_heard(&self, recording: &str, text: &str) {
-        let end = Instant::now() + PATIENCE;
-        let heard = || -> String {
-            let file = std::fs::read_to_string(self.path(recording)).unwrap_or_default();
-            let events =
-                file.lines().skip(1).filter_map(|line| serde_json::from_str::<(f64, String, String)>(line).ok());
-            events.filter(|(_, way, _)| way == "o").map(|(_, _, text)| text).collect()
-        };
-        while !heard().contains(text) {
-            assert!(Instant::now() < end, "the unit has not said {text:?} in {recording}:\n{}", heard());
-            thread::sleep(Duration::from_millis(5));
-        }
-    }
-
     /// The program with these arguments, in this world.
     pub fn command(&self, args: &[&str]) -> Command {
         self.command_of(Path::new(env!("CARGO_BIN_EXE_axcon")), args)
