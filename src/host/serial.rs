@@ -346,7 +346,10 @@ mod tests {
         // One that not even that ends is left to itself.
         let (never, ends) = mpsc::channel::<()>();
         let asked = Cell::new(false);
-        empty(move || _ = ends.recv(), || asked.set(true), Duration::from_millis(1));
+        let stuck = move || {
+            let _ = ends.recv();
+        };
+        empty(stuck, || asked.set(true), Duration::from_millis(1));
         assert!(asked.get());
         drop(never);
     }
