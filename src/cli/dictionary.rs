@@ -36,7 +36,7 @@ enum Deed {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
-    /// Compare two dumps (JSON), or a dump with factory:PRODUCT. Exit code 1 if they differ.
+    /// Compare the settings of two dumps (JSON), or of a dump with factory:PRODUCT. Exit code 1 if they differ.
     Diff {
         /// A dump, or factory:PRODUCT.
         #[arg(value_name = "A")]
@@ -44,6 +44,9 @@ enum Deed {
         /// A dump, or factory:PRODUCT.
         #[arg(value_name = "B")]
         right: String,
+        /// Compare what the units measure and what is their own as well.
+        #[arg(long)]
+        all: bool,
     },
 }
 
@@ -74,6 +77,7 @@ struct DifferenceObject<'a> {
     name: &'a str,
     left: Option<&'a str>,
     right: Option<&'a str>,
+    setting: bool,
 }
 
 #[derive(Serialize)]
@@ -99,7 +103,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
             let format = format.or(by_name).unwrap_or(if output.json { Format::Json } else { Format::Table });
             dump(format, out.as_deref(), global, output)
         }
-        Deed::Diff { left, right } => diff(&left, &right, output),
+        Deed::Diff { left, right, all } => diff(&left, &right, all, output),
     }
 }
 
@@ -154,8 +158,9 @@ fn configuration(reading: &DictionaryReading, product: Option<&Product>, facts: 
     Ok(dump::configuration(reading, product, facts))
 }
 
-fn diff(left: &str, right: &str, output: &mut Output) -> Result<(), CliError> {
-    let found = dump::differences(&source(left)?, &source(right)?);
+fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), CliError> {
+    let mut found = dump::differences(&source(left)?, &source(right)?);
+    found.retain(|difference| all || difference.setting);
     if output.json {
         let differences = found.iter().map(|difference| DifferenceObject {
             index: &difference.index,
@@ -163,11 +168,12 @@ fn diff(left: &str, right: &str, output: &mut Output) -> Result<(), CliError> {
             name: &difference.name,
             left: difference.left.as_deref(),
             right: difference.right.as_deref(),
+            setting: difference.setting,
         });
         let differences: Vec<_> = differences.collect();
         output.object(&DiffObject { schema: "axcon.dictionary-diff/1", equal: differences.is_empty(), differences })?;
     } else {
-        for Difference { index, subindex, name, left, right } in &found {
+        for Difference { index, subindex, name, left, right, setting: _ } in &found {
             let side = |value: &Option<String>| value.clone().unwrap_or_else(|| "not there".into());
             let line = format!("{index}:{subindex:02X}  {name:<58} {:>14}  {:>14}\n", side(left), side(right));
             output.data(line.as_bytes())?;

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::{Dump, DumpEntry, rounding};
+use crate::device::Product;
+use crate::device::dictionary::Access;
 
 /// One entry that is not the same on both sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +19,8 @@ pub struct Difference {
     pub left: Option<String>,
     /// Its value on the right; `None` if it is not there.
     pub right: Option<String>,
+    /// Somebody has set it. What a unit measures, and what is its own, differs without anybody's doing.
+    pub setting: bool,
 }
 
 /// Every entry that differs, by index and sub-index. Against the factory only what it sets can differ.
@@ -28,6 +32,12 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
     // The manual gives its numbers in as few digits as will do, and means them.
     let rounding =
         |dump: &Dump, entry: &DumpEntry, value| if dump.factory { 0.0 } else { rounding(&entry.text, value) };
+    let product = left.product.as_deref().or(right.product.as_deref()).and_then(Product::named);
+    let is_setting = |entry: Option<&DumpEntry>| {
+        let at = entry.and_then(DumpEntry::at);
+        let known = product.zip(at).and_then(|(product, at)| product.dictionary.object(at.index)?.entry(at.sub));
+        known.is_none_or(|entry| entry.access == Access::ReadWrite)
+    };
     let mut addresses: Vec<&(String, u8)> = of_left.keys().chain(of_right.keys()).collect();
     addresses.sort();
     addresses.dedup();
@@ -51,7 +61,8 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
         let shown = |entry: Option<&DumpEntry>| entry.map(DumpEntry::number);
         let name = left.or(right).map(|entry| entry.name.clone()).unwrap_or_default();
         let (index, subindex) = address.clone();
-        (!same).then(|| Difference { index, subindex, name, left: shown(left), right: shown(right) })
+        let setting = is_setting(left.or(right));
+        (!same).then(|| Difference { index, subindex, name, left: shown(left), right: shown(right), setting })
     };
     addresses.into_iter().filter_map(differs).collect()
 }

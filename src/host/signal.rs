@@ -87,11 +87,11 @@ impl Signals {
 
 /// Whether a signal continues a program that was stopped.
 pub fn continues(signal: i32) -> bool {
-    #[cfg(unix)]
-    return signal == SIGCONT;
-    #[cfg(not(unix))]
-    return {
-        let _ = signal;
-        false
-    };
+    cfg!(unix) && signal == CONTINUES
 }
+
+#[cfg(unix)]
+const CONTINUES: i32 = SIGCONT;
+/// There is none.
+#[cfg(not(unix))]
+const CONTINUES: i32 = 0;

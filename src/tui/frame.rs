@@ -220,7 +220,7 @@ pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> 
         line.push_span(Span::styled("Ctrl-]", theme.key()));
         line.push_span(Span::raw(" then "));
     }
-    for binding in bindings.iter().filter(|binding| is_letter(binding)) {
+    for binding in bindings.iter().filter(|binding| is_letter(binding) && !binding.short.is_empty()) {
         line.spans.extend(hint(theme, binding));
     }
     line.push_span(Span::styled("1-9", theme.key()));

@@ -546,7 +546,8 @@ fn every_screen_survives_every_size() {
 
 #[test]
 fn every_question_survives_every_size_it_is_drawn_at() {
-    let questions: [(&str, fn() -> Stage); 15] = [
+    type Maker = fn() -> Stage;
+    let questions: [(&str, Maker); 15] = [
         ("Switch the data stream on", || typed(Stage::connected(SMALL), "t")),
         ("Type Yes", || typed(Stage::connected(SMALL), "d")),
         ("View the object", || typed(Stage::connected(SMALL), "v")),

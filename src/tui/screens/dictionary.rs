@@ -182,7 +182,8 @@ impl Dictionary {
             None => manual(product).collect(),
         };
         if let (Some(other), Some(read)) = (&self.other, &view.dictionary) {
-            for difference in dump::differences(&other.dump, &read.dump) {
+            // What is measured is another value at every reading.
+            for difference in dump::differences(&other.dump, &read.dump).into_iter().filter(|found| found.setting) {
                 let index = u16::from_str_radix(&difference.index, 16).unwrap_or_default();
                 let at = ObjectAddress::new(index, difference.subindex);
                 match rows.iter_mut().find(|row| row.at == at) {
