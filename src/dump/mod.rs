@@ -296,8 +296,8 @@ fn value_text(read: &ReadEntry) -> &str {
         }
         (_, None) => false,
     };
-    let words = read.text.split(|c: char| !(c.is_ascii_alphanumeric() || "+-.".contains(c)));
-    words.filter(|word| is_it(word)).last().unwrap_or(&read.text)
+    let mut words = read.text.rsplit(|c: char| !(c.is_ascii_alphanumeric() || "+-.".contains(c)));
+    words.find(|word| is_it(word)).unwrap_or(&read.text)
 }
 
 /// Half a unit of a numeral's last digit.

@@ -6,7 +6,7 @@
 //! UART's buffer ahead ([`AHEAD`]); what still lies in the pseudo-terminal counts as not yet sent, and stays there
 //! while the unit holds a client that obeys XOFF. Bytes are counted against the clock in small slices, so a late
 //! wake-up costs no throughput and lets no more bytes slip past an XOFF. A thread that wakes up much later stops the
-//! unit's time for as long ([`UnitClock`]): what already lies in the pseudo-terminal must not look to the unit as if
+//! unit's time for as long (`UnitClock`): what already lies in the pseudo-terminal must not look to the unit as if
 //! the line had been silent meanwhile, which is when a loader begins to write and is deaf.
 
 use std::io::{self, PipeWriter, Read, Write};
@@ -286,7 +286,7 @@ impl UnitClock {
     fn now(&mut self, wanted: Option<Instant>) -> Instant {
         let now = self.clock.now() - self.overslept;
         let late = late_beyond(now, wanted);
-        self.overslept = self.overslept + late;
+        self.overslept += late;
         now - late
     }
 

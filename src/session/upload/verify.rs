@@ -84,23 +84,15 @@ impl Upload {
                     transfer.take_all_sent();
                 }
             }
-            _ if self.after.is_complete() => {
-                if self.after.note(message) && matches!(message, Message::Software(_)) {
-                    self.deadline = Some(desk.now + BANNER_QUIET);
-                }
-            }
             _ if self.after.note(message) => {
-                let (complete, asking) = (self.after.is_complete(), matches!(self.stage, Stage::AskVersion(_)));
-                let patience = if complete { BANNER_QUIET } else { ASK_VERSION };
-                let is_menu = matches!(message, Message::MenuKey(_));
-                let by_then = desk.now + patience;
-                // Rows may come faster than that: the unit is asked between them.
-                self.deadline = match self.deadline {
-                    Some(deadline) if !complete && !is_menu => Some(deadline.min(by_then)),
-                    _ if complete || is_menu => Some(by_then),
-                    deadline => deadline,
+                let asked = desk.now + ASK_VERSION;
+                self.deadline = match (message, self.after.is_complete()) {
+                    (Message::Software(_), true) => Some(desk.now + BANNER_QUIET),
+                    (Message::MenuKey(_), false) => Some(asked),
+                    // Rows may come faster than that: the unit is asked between them.
+                    (Message::Row(_) | Message::Network(_), false) => self.deadline.map(|deadline| deadline.min(asked)),
+                    _ => self.deadline,
                 };
-                debug_assert!(!asking || self.deadline.is_some());
             }
             _ => {}
         }
