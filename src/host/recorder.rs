@@ -10,7 +10,7 @@ use super::clock::Clock;
 use super::link::Connection;
 use crate::endpoint::Secrecy;
 use crate::record::{Cast, Direction, Header, Record, Tally};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// Where a session is recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,6 +72,11 @@ pub(super) const ENDING: &str = ".cast";
 impl Recorder {
     /// Starts recording a connection. Never fails: see [`take_warning`](Recorder::take_warning).
     pub fn start(plan: &Plan, connection: &Connection, clock: Clock) -> Self {
+        Recorder::start_ahead(plan, connection, clock, Duration::ZERO)
+    }
+
+    /// The same for a program whose time is so far ahead of the clock: what it records is dated by its own time.
+    pub fn start_ahead(plan: &Plan, connection: &Connection, clock: Clock, ahead: Duration) -> Self {
         let now = clock.now();
         let header = Header {
             unix_millis: clock.wall(now).as_millisecond(),
@@ -81,7 +86,7 @@ impl Recorder {
             adapter: connection.adapter().cloned(),
             part: 1,
         };
-        Recorder::begin(plan, header, now, &stem(clock, connection.port()))
+        Recorder::begin(plan, header, now + ahead, &stem(clock, connection.port()))
     }
 
     /// Records nothing.

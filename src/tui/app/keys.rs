@@ -6,11 +6,11 @@ use ratatui::crossterm::event::{
 use ratatui::layout::Rect;
 
 use super::App;
-use crate::session::{Command, Job, Session};
+use crate::session::{Command, Job, Session, UnitState};
 use crate::tui::action::Action;
 use crate::tui::frame;
 use crate::tui::input::Effect;
-use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd};
+use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd, Press};
 use crate::tui::popup::{Answer, Popup, Question};
 use crate::tui::screens::ScreenId;
 use crate::tui::screens::help::Help;
@@ -137,6 +137,11 @@ impl App {
                 _ => {}
             }
             self.help = None;
+            if self.front == ScreenId::Terminal && Press::Ctrl(']').is(key) {
+                // The next key is the console's, as it would be without the page.
+                self.terminal.meaning(key);
+                return;
+            }
             // Another screen's key goes there; every other key only closes the page.
             match keymap::find(&[EVERYWHERE], key) {
                 Some(cmd @ (Cmd::Go(_) | Cmd::Next | Cmd::Previous)) => return self.on(cmd, effects),
@@ -262,6 +267,20 @@ impl App {
         }
         if !self.can_send() {
             return;
+        }
+        // What cannot be done now is said before anything is asked.
+        let why_not = match (menu, self.view.job, self.view.facts.state) {
+            (MenuCmd::Diagnostics, Some(Job::Diagnostics), _) | (_, Some(Job::Identify), _) => None,
+            (_, Some(Job::Diagnostics), _) => Some("the unit prints its diagnostics: S stops them first"),
+            (_, Some(_), _) => Some("a job runs: wait for its end, or cancel it with Esc on its screen"),
+            (MenuCmd::Menu, ..) => None,
+            (_, None, UnitState::Loader) => {
+                Some("the unit is in its loader, which takes every key for an error: L sends software")
+            }
+            (_, None, _) => None,
+        };
+        if let Some(why_not) = why_not {
+            return self.view.tell(Tone::Bad, format!("Not sent: {why_not}."));
         }
         match menu {
             MenuCmd::Menu => self.perform(Action::Command(Command::Identify), effects),

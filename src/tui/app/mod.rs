@@ -219,6 +219,11 @@ impl App {
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         self.now = self.now.max(now);
         self.view.fold(now, event, facts);
+        let is_over = matches!(event, Event::Finished(Outcome::Loaded(_)));
+        if is_over && matches!(self.popup, Some(Popup::Asking(Question::CancelLoad))) {
+            // There is nothing left to cancel, and what would come of it is not true any more.
+            self.popup = None;
+        }
         // A raw line alone changes the terminal, and whatever else shows it.
         self.dirty = true;
     }

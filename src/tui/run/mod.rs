@@ -417,7 +417,7 @@ impl Console {
 
     /// Takes over an open link and starts its recording.
     fn begin(&mut self, name: &str, connection: Connection, spec: LinkSpec) -> Input {
-        self.recorder = Recorder::start(&self.world.recording, &connection, self.clock);
+        self.recorder = Recorder::start_ahead(&self.world.recording, &connection, self.clock, self.skew);
         let recording = self.recorder.path().map(|path| path.display().to_string());
         let options = link::Options { baud: self.world.baud };
         self.comeback = Comeback::of(&spec, options);
