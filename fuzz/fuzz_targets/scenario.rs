@@ -55,7 +55,7 @@ fuzz_target!(|text: &str| {
         match read(text) {
             Ok(None) => assert_eq!(read(text), Ok(None)),
             Ok(Some(scenario)) => {
-                assert_eq!(read(&format!("# a remark\n{text}")).as_ref(), Ok(&Some(scenario.clone())), "{text}");
+                assert_eq!(read(&format!("{text}\n# a remark")).as_ref(), Ok(&Some(scenario.clone())), "{text}");
                 play(scenario, product);
             }
             Err(complaints) => places(text, &complaints, |text| read(text).err().unwrap_or_default()),
