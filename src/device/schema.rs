@@ -504,10 +504,12 @@ fn count_entry(count: u8) -> Entry {
 
 /// `4010:n - 100`: the entry of 4010h with sub-index `sub`, less 100.
 fn dependent(text: &str, sub: u8) -> Option<Bound> {
-    let (address, offset) = match text.split_once(['+', '-']) {
-        Some((address, digits)) => {
-            let offset: i64 = digits.trim().parse().ok()?;
-            (address, if text.contains('-') { -offset } else { offset })
+    let (address, offset) = match text.find(['+', '-']) {
+        Some(at) => {
+            let digits = text[at + 1..].trim();
+            // One sign is enough: the parser would take another.
+            let offset: i64 = digits.parse().ok().filter(|_| !digits.starts_with(['+', '-']))?;
+            (&text[..at], if text[at..].starts_with('-') { -offset } else { offset })
         }
         None => (text, 0),
     };
@@ -519,7 +521,7 @@ fn dependent(text: &str, sub: u8) -> Option<Bound> {
 fn to_value(data_type: DataType, raw: &Toml) -> Option<Value> {
     match (data_type, raw) {
         (DataType::Boolean, Toml::Boolean(value)) => Some(Value::Boolean(*value)),
-        (DataType::Real32, Toml::Float(value)) if value.is_finite() => Some(Value::Real32(*value as f32)),
+        (DataType::Real32, Toml::Float(value)) if (*value as f32).is_finite() => Some(Value::Real32(*value as f32)),
         (DataType::Boolean, _) => None,
         (_, Toml::Integer(value)) => data_type.integer(*value),
         _ => None,
@@ -570,6 +572,8 @@ mod tests {
             ("values = [50, 60]", "values = [50, 61]", "object 5010h, default: 60 is not within the limits"),
             (threshold, "limits = [-2730, \"4011:n - 100\"]", "4000h, entry 1, limits: there is no entry 4011:01"),
             (threshold, "limits = [-2730, \"4010 less 100\"]", "limits: '4010 less 100' is no bound: write a number"),
+            (threshold, "limits = [-2730, \"4010:n --9223372036854775808\"]", "is no bound: write a number"),
+            (threshold, "limits = [-2730, \"4010:n + -100\"]", "limits: '4010:n + -100' is no bound"),
             (threshold, "limits = [-2730]", "limits: 1 values are not the lowest and the highest"),
             (threshold, "limits = [-100, -200]", "limits: -100 to -200 is no range"),
             ("\"$NODEID + 0x40000180\"", "\"$NODE + 1\"", "object 1800h, entry 1, default: '$NODE + 1' is no default"),

@@ -168,17 +168,25 @@ impl Dump {
         }
     }
 
-    /// Reads a dump back that [`Dump::json`] has written; `name` stands in errors.
+    /// Reads a dump back that [`Dump::json`] has written; `name` stands in errors. Texts in it are made harmless: nobody
+    /// knows who has had the file in hands.
     ///
     /// # Errors
     /// If it is none.
     pub fn parse(name: &str, text: &str) -> Result<Self, DumpError> {
-        let dump: Dump =
+        let mut dump: Dump =
             serde_json::from_str(text).map_err(|source| DumpError::Syntax { name: name.to_owned(), source })?;
         if dump.schema != SCHEMA {
             let found = visible::line(dump.schema.as_bytes());
             return Err(DumpError::Schema { name: name.to_owned(), found });
         }
+        let clean = |text: &mut String| *text = visible::line(text.as_bytes());
+        [&mut dump.product, &mut dump.version].into_iter().flatten().for_each(clean);
+        for entry in &mut dump.entries {
+            [&mut entry.index, &mut entry.name, &mut entry.text].into_iter().for_each(clean);
+            [&mut entry.unit, &mut entry.meaning].into_iter().flatten().for_each(clean);
+        }
+        dump.missing.iter_mut().for_each(|missing| clean(&mut missing.index));
         Ok(dump)
     }
 
@@ -324,4 +332,29 @@ pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Fac
         values,
     };
     eds::write_configuration(product, &configuration)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dump_that_somebody_has_edited_says_nothing_to_the_terminal() {
+        let product = Product::named("AXTC4CO").expect("built in");
+        let mut dump = Dump::factory(product);
+        assert_eq!(Dump::parse("d.json", &dump.json()).expect("a dump"), dump);
+        dump.version = Some("1\u{9b}J".into());
+        dump.entries[0].index = "61\r12".into();
+        dump.entries[0].name = "\u{1b}[2Jname".into();
+        dump.entries[0].text = "\n".into();
+        dump.entries[0].unit = Some("\t".into());
+        dump.entries[0].meaning = Some("\u{202e}on".into());
+        dump.missing.push(Missing { index: "\u{7}".into(), subindex: 0 });
+        let read = Dump::parse("d.json", &dump.json()).expect("a dump");
+        let entry = &read.entries[0];
+        assert_eq!((entry.index.as_str(), entry.name.as_str(), entry.text.as_str()), ("61^M12", "^[[2Jname", "^J"));
+        assert_eq!((entry.unit.as_deref(), entry.meaning.as_deref()), (Some("^I"), Some("‹202e›on")));
+        assert_eq!((read.version.as_deref(), read.missing[0].index.as_str()), (Some("1‹9b›J"), "^G"));
+        assert!(!read.table().chars().any(|c| c.is_control() && c != '\n'));
+    }
 }

@@ -228,12 +228,14 @@ impl FieldFormat {
         // A number fills its field, or is too wide for it and then has no blank in front.
         let number = field.trim_start();
         let fills = length == width || (length > width && number.len() == field.len());
-        let fraction = number.split_once('.').map_or(0, |(_, digits)| digits.len());
+        // No digits behind the point means no point either.
+        let fraction = number.split_once('.').map(|(_, digits)| digits.len());
         let plain = number.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-' || byte == b'.');
-        if !fills || !plain || fraction != self.decimals {
+        if !fills || !plain || fraction != Some(self.decimals).filter(|&decimals| decimals > 0) {
             return None;
         }
-        number.parse().ok().map(Reading::Value)
+        // Some hundred digits in a row are no measurement, and would become infinite.
+        number.parse().ok().filter(|value: &f64| value.is_finite()).map(Reading::Value)
     }
 }
 
@@ -334,6 +336,8 @@ mod tests {
             "     inf;  21.000;  21.000;  21.000;  21.000",
             "  2-.500;  21.000;  21.000;  21.000;  21.000",
             " 4768; 4768; 4768; 4768; 47.8",
+            " 4768; 4768; 4768; 4768; 476.",
+            &format!("{}.000;  21.000;  21.000;  21.000;  21.000", "9".repeat(400)),
             "CJ;TC1;TC2;TC3;TC4",
         ] {
             assert_eq!(layout.parse(text), None, "{text:?}");

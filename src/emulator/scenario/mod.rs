@@ -64,6 +64,8 @@ pub const LARGEST_FILE: u64 = 4 << 20;
 const LONGEST_S: f64 = 7.0 * 86_400.0;
 /// Time between two steps of a ramp: the fastest scan of any unit.
 const RAMP_STEP: Duration = Duration::from_millis(100);
+/// Shortest round of a scenario that repeats: in less no scan notices anything, and the unit would never be done with it.
+const SHORTEST_ROUND: Duration = RAMP_STEP;
 /// Deeds of one scenario at most, the steps of its ramps included.
 const MOST_DEEDS: usize = 1_000_000;
 
@@ -96,8 +98,7 @@ impl Scenario {
             for deed in &moment.deeds {
                 match act(deed.get_ref(), product) {
                     Ok(verb) => deeds.push((at, verb)),
-                    // Behind the opening quotation mark.
-                    Err(error) => complaints.add(deed.span().start + error.column, "at.do", error.message),
+                    Err(error) => complaints.add(place_of(text, deed, error.column), "at.do", error.message),
                 }
             }
         }
@@ -129,14 +130,27 @@ impl Scenario {
         let last = deeds.last().map_or(Duration::ZERO, |(at, _)| *at);
         let repeat = raw.repeat.as_ref().map(|repeat| {
             let after = seconds(repeat, "repeat", &mut complaints);
-            if after < last || after.is_zero() {
+            if after < last {
                 let message = format!("{} s is before the last deed, at {} s", repeat.get_ref(), last.as_secs_f64());
+                complaints.add(repeat.span().start, "repeat", message);
+            } else if after < SHORTEST_ROUND {
+                let message = format!("{} s is less than {} s", repeat.get_ref(), SHORTEST_ROUND.as_secs_f64());
                 complaints.add(repeat.span().start, "repeat", message);
             }
             after
         });
         complaints.or(Some(Scenario { deeds, repeat }))
     }
+}
+
+/// Where in the file a column of a deed is. Where the deed is not written as it reads (escapes, several lines), where it
+/// begins.
+fn place_of(text: &str, deed: &Spanned<String>, column: usize) -> usize {
+    let start = deed.span().start;
+    // Behind the opening quotation mark.
+    let written = text.get(start + 1..).is_some_and(|rest| rest.starts_with(deed.get_ref().as_str()));
+    let before: usize = deed.get_ref().chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
+    if written { start + 1 + before } else { start }
 }
 
 /// Steps of a ramp of this length.
@@ -579,6 +593,11 @@ mod tests {
                 "repeat = 1\n[[at]]\nseconds = 2\ndo = []\n[[at]]\nseconds = 3\ndo = ['freeze']",
                 "test.toml:1:10: repeat: 1 s is",
             ),
+            ("repeat = 0.000000001", "test.toml:1:10: repeat: 0.000000001 s is less than 0.1 s"),
+            // Blanks of two bytes; one written as an escape; a deed on a line of its own.
+            ("[[at]]\nseconds = 1\ndo = ['open\u{a0}\u{a0}3\u{a0}X']", "test.toml:3:16: at.do: 'X' is not known"),
+            ("[[at]]\nseconds = 1\ndo = [\"open\\u00203 X\"]", "test.toml:3:7: at.do: 'X' is not known"),
+            ("[[at]]\nseconds = 1\ndo = ['''\nopen 3 X''']", "test.toml:3:7: at.do: 'X' is not known"),
             ("[[at", "test.toml:1:5: "),
         ];
         for (text, expected) in table {
