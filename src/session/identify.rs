@@ -100,7 +100,9 @@ impl Work for Identify {
             }
             Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => {
-                if self.is_answered() || self.asked == QUESTIONS.len() {
+                // Not every menu names its unit; but a line may have been lost on its way, so that is asked once more.
+                let is_nameless = self.asked == 1 && !self.loader && desk.facts.product.is_none();
+                if self.is_answered() && !is_nameless || self.asked == QUESTIONS.len() {
                     return self.conclude(desk);
                 }
                 self.ask(desk);

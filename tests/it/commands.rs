@@ -315,7 +315,7 @@ fn no_port_is_3_and_a_port_that_talks_nonsense_is_4() {
     let ran =
         bench.world.run(&["load", "new.S", "--yes", "--password-file", "pw", "--port", "u1", "--baud", "9600"], b"");
     assert_eq!(ran.code, Some(4), "{}", ran.err);
-    assert!(ran.err.contains("nothing has been changed"), "{}", ran.err);
+    assert!(ran.err.contains("nothing was changed"), "{}", ran.err);
 }
 
 #[test]

@@ -174,6 +174,19 @@ fn a_reading_of_the_dictionary_that_is_cancelled_at_any_moment_leaves_the_view()
 }
 
 #[test]
+fn a_name_that_was_lost_on_the_line_is_asked_for_again() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    bench.reconnect();
+    // The banner and the menu's heading are lost, of the first answer only.
+    let first = bench.received_so_far();
+    bench.disturb_answers(move |number, byte| if number < first + 150 { Vec::new() } else { vec![byte] });
+    bench.ask(Command::Identify);
+    let facts = bench.session.facts();
+    assert_eq!(facts.product.as_ref().map(|known| known.value.as_str()), Some("AXTC4CO"), "{}", bench.transcript());
+}
+
+#[test]
 fn a_unit_whose_menu_does_not_name_it_is_known_by_its_product_code() {
     let mut bench = Bench::in_dialect(axrtd8co(), 42);
     bench.run_for(Duration::from_secs(7));
