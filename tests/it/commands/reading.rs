@@ -1,0 +1,285 @@
+//! Commands that read, and what all of them have in common: ports, JSON, readers that go.
+
+use super::*;
+
+#[test]
+fn no_port_is_3_and_a_port_that_talks_nonsense_is_4() {
+    let bench = Bench::new();
+    for args in [&["identify"][..], &["stream"], &["load", "new.S", "--yes", "--password-file", "pw"]] {
+        let mut args = args.to_vec();
+        args.extend(["--json", "--port", "nowhere"]);
+        let ran = bench.world.run(&args, b"");
+        assert_eq!(ran.code, Some(3), "{args:?}: {}", ran.err);
+        assert_eq!(error_object(&ran)["kind"], "port-missing", "{}", ran.err);
+    }
+    // The unit at a rate it does not have: garbage both ways.
+    let unit = bench.world.start(&["emulate", "axtc4co", "--link", "u1"]);
+    unit.wait_out("serial: ");
+    let ran = bench.world.run(&["identify", "--json", "--port", "u1", "--baud", "9600"], b"");
+    assert_eq!(ran.code, Some(4), "{} {}", ran.out, ran.err);
+    assert_eq!(error_object(&ran)["kind"], "no-answer");
+    let ran =
+        bench.world.run(&["load", "new.S", "--yes", "--password-file", "pw", "--port", "u1", "--baud", "9600"], b"");
+    assert_eq!(ran.code, Some(4), "{}", ran.err);
+    assert!(ran.err.contains("nothing was changed"), "{}", ran.err);
+}
+
+#[test]
+fn the_stream_is_written_as_csv_and_json_and_left_as_it_was() {
+    let bench = Bench::new();
+    let ran = bench.run(&["stream", "--period", "200", "--count", "3"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let lines: Vec<&str> = ran.out.lines().collect();
+    assert_eq!(lines.len(), 4);
+    assert_eq!(lines[0], "time,source,CJ,TC1,TC2,TC3,TC4");
+    assert!(lines[1].contains("Z,fv,"), "{}", lines[1]);
+
+    let ran = bench.run(&["stream", "--source", "pv", "--period", "200", "--count", "2", "--json", "--keep"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    for row in objects(&ran.out) {
+        assert_eq!((&row["schema"], &row["source"]), (&"axcon.stream/1".into(), &"pv".into()));
+        let channels: Vec<&str> =
+            row["values"].as_array().expect("values").iter().filter_map(|v| v["channel"].as_str()).collect();
+        assert_eq!(channels, ["CJ", "TC1", "TC2", "TC3", "TC4"]);
+        assert!(row["values"][0]["value"].is_i64() && row["values"][0]["state"] == "ok", "{row}");
+    }
+    // It has been kept: it is joined now, and off after that.
+    let ran = bench.run(&["stream", "--count", "2", "--format", "csv"]);
+    assert!(ran.out.contains("Z,pv,"), "{}", ran.out);
+    assert_eq!(bench.run(&["stream", "--off"]).code, Some(0));
+    let ran = bench.run(&["stream", "--period", "100", "--count", "1"]);
+    assert!(ran.out.contains("Z,fv,"), "the default after the stream was off: {}", ran.out);
+}
+
+#[test]
+fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1", "--line-rate", "off"]);
+    unit.wait_out("serial: ");
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    unit.input(b"write 4010:2 1300\nwrite 6126:1 18\nread 6126:1\n");
+    unit.wait_out("6126:01 = 18.0");
+    let dump = ["dictionary", "dump", "--yes", "--port", "u1"];
+    let ran = world.run(&[&dump[..], &["--json", "--out", "one.json", "--record", "one.cast"]].concat(), b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let one = json(&std::fs::read_to_string(world.path("one.json")).expect("written"));
+    assert_eq!((&one["schema"], &one["product"]), (&"axcon.dictionary/1".into(), &"AXTC4CO".into()));
+    assert_eq!((&one["complete"], &one["missing"]), (&true.into(), &serde_json::json!([])));
+    let entries = one["entries"].as_array().expect("a list");
+    assert_eq!(entries.len(), 227);
+    let deviating: Vec<String> = entries
+        .iter()
+        .filter(|entry| entry["deviates"] == true)
+        .map(|entry| format!("{}:{} {} {}", entry["index"], entry["subindex"], entry["value"], entry["default"]))
+        .collect();
+    assert_eq!(deviating, ["\"4010\":2 1300 1250", "\"6126\":1 18.0 16.0"]);
+    // The other forms from what the unit said then: reading it takes its time.
+    let again = ["dictionary", "dump", "--port", "replay:one.cast"];
+    let table = world.run(&again, b"");
+    assert!(table.out.contains("* 4010:02  High Temperature Warning Threshold, TC2"), "{}", table.out);
+    assert!(table.out.contains("227 entries, 2 differ from the factory's (*)"), "{}", table.out);
+    assert!(table.out.contains("0x10020194"), "{}", table.out);
+    let same = world.run(&["dictionary", "diff", "one.json", "one.json"], b"");
+    assert_eq!((same.code, same.out.as_str()), (Some(0), ""), "{}", same.err);
+    let factory = world.run(&["dictionary", "diff", "one.json", "factory:axtc4co"], b"");
+    assert_eq!((factory.code, factory.out.lines().count()), (Some(1), 2), "{}", factory.out);
+    let csv = world.run(&[&again[..], &["--format", "csv"]].concat(), b"");
+    assert_eq!(csv.out.lines().count(), 228, "{}", csv.out);
+    let bad = world.run(&["dictionary", "diff", "u1-nowhere.json", "factory:axtc4co"], b"");
+    assert_eq!(bad.code, Some(2));
+    assert!(bad.err.contains("cannot read the dump 'u1-nowhere.json'"), "{}", bad.err);
+    let unasked = world.run(&["dictionary", "dump", "--port", "u1"], b"");
+    assert_eq!(unasked.code, Some(2), "{}", unasked.err);
+}
+
+#[test]
+fn a_report_tells_all_of_a_unit_and_its_recording_tells_the_same() {
+    let mut bench = Bench::new();
+    let args = ["report", "--out", "unit.html", "--seconds", "2"];
+    let unasked = bench.run(&args);
+    assert_eq!(unasked.code, Some(2), "it halts the unit: {}", unasked.err);
+    assert!(!bench.world.path("unit.html").exists());
+    assert_eq!(bench.version(), "1.1.0", "it has started");
+    let unit = bench.unit.as_mut().expect("it runs");
+    unit.input(b"open 3\nwrite 6110:2 2\nread 6110:2\n");
+    unit.wait_out("6110:02 = 2 (type K)");
+    let ran = bench.run(&[&args[..], &["--yes", "--record", "said.cast"]].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let page = |name: &str| fs::read_to_string(bench.world.path(name)).expect("a page");
+    let live = page("unit.html");
+    for said in [
+        "<td>AXTC4CO</td>",
+        "<td class=\"bad\">open circuit</td>",
+        "TC3: open circuit",
+        "1 not as the factory made them",
+        "<td class=\"mark\">type K</td>",
+        "Supply Voltage",
+        "<polyline",
+        "Main Menu",
+    ] {
+        assert!(live.contains(said), "no {said} in\n{live}");
+    }
+    assert_eq!(bench.run(&["stream", "--off", "--json"]).code, Some(0));
+
+    let replay = ["report", "--out", "again.html", "--port", "replay:said.cast"];
+    let ran = bench.world.run(&replay, b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let again = page("again.html");
+    let section = |page: &str, name: &str| {
+        let text = page.split(&format!("<h2>{name}</h2>")).nth(1).and_then(|text| text.split("<h2>").next());
+        text.unwrap_or_else(|| panic!("no {name} in\n{page}")).to_owned()
+    };
+    for name in ["Object dictionary", "Diagnostics"] {
+        assert_eq!(section(&again, name), section(&live, name), "{name}");
+    }
+    let ran = bench.world.run(&["report", "--out", "nowhere/unit.html", "--port", "replay:said.cast"], b"");
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("cannot write 'nowhere/unit.html'"), "{}", ran.err);
+}
+
+#[test]
+fn an_interrupt_in_the_middle_of_a_dump_leaves_the_view() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1"]);
+    unit.wait_out("serial: ");
+    let dump = world.start(&["dictionary", "dump", "--yes", "--port", "u1", "--record", "dump.cast"]);
+    // The unit stands in its view once it is asked for the second entry.
+    world.wait_in("dump.cast", "\"i\",\"v\"");
+    world.wait_in("dump.cast", "\"i\",\"\\r");
+    dump.signal(rustix::process::Signal::INT);
+    let ran = dump.wait();
+    assert_eq!(ran.code, Some(130), "{}{}", ran.out, ran.err);
+    unit.input(b"read 6126:1\n");
+    unit.wait_out("6126:01 = 16.0");
+}
+
+#[test]
+fn diagnostics_and_defaults_are_commands_of_their_own() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axrtd8co", "--link", "u1"]);
+    unit.wait_out("serial: ");
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    unit.input(b"write 6126:1 18\nwrite 1010:1 0x65766173\nread 6126:1\n");
+    unit.wait_out("6126:01 = 18.0");
+    let ran = world.run(&["diagnostics", "--count", "1", "--json", "--port", "u1"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let page = json(&ran.out);
+    assert_eq!(page["schema"], "axcon.diagnostics/1");
+    let values = page["values"].as_array().expect("a list");
+    assert!(values.iter().any(|value| value["label"] == "Supply Voltage" && value["unit"] == "V"), "{page}");
+    let ran = world.run(&["defaults", "--port", "u1"], b"");
+    assert_eq!(ran.code, Some(2), "nobody said yes: {}", ran.err);
+    let ran = world.run(&["defaults", "--yes", "--json", "--port", "u1"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert_eq!(json(&ran.out)["product"], "AXRTD8CO");
+    unit.input(b"read 6126:1\n");
+    unit.wait_out("6126:01 = 16.0");
+}
+
+#[test]
+fn a_deep_look_says_the_serial_number_and_a_wait_hears_the_banner() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1", "--line-rate", "off", "--seed", "7"]);
+    unit.wait_out("serial: ");
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    unit.input(b"read 1018:4\n");
+    let said = unit.wait_out("1018:04 = ");
+    let serial: u32 = said.rsplit("= ").next().and_then(|text| text.trim().parse().ok()).expect("a number");
+    let unasked = world.run(&["identify", "--deep", "--port", "u1"], b"");
+    assert_eq!(unasked.code, Some(2), "{}", unasked.err);
+    let ran = world.run(&["identify", "--deep", "--yes", "--json", "--port", "u1"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let identity = json(&ran.out);
+    assert_eq!((&identity["serial_number"], &identity["product"]), (&serial.into(), &"AXTC4CO".into()));
+    let waiting = world.start(&["identify", "--wait", "--json", "--port", "u1"]);
+    waiting.wait_err("switch the unit's power off and on");
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    unit.input(b"power cycle 0.1\n");
+    let ran = waiting.wait();
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let identity = json(&ran.out);
+    assert_eq!((&identity["version"], &identity["sources"]["version"]), (&"1.1.0".into(), &"banner".into()));
+}
+
+#[test]
+fn a_stream_that_ends_before_its_first_row_is_off_all_the_same() {
+    let bench = Bench::new();
+    fs::write(bench.world.path("old.csv"), "yesterday\n").expect("written");
+    let run = |args: &[&str]| {
+        let mut all = vec!["stream", "--port", "u0"];
+        all.extend(args);
+        all.extend(FAST);
+        bench.world.start(&all)
+    };
+    // One for each: an interrupt while the first row is awaited, and a row that cannot be written.
+    let early = run(&["--period", "10000", "--out", "old.csv", "--yes", "--record", "early.cast"]);
+    bench.world.wait_in("early.cast", "10000");
+    early.signal(rustix::process::Signal::INT);
+    let ran = early.wait();
+    assert_eq!(ran.code, Some(130), "{}", ran.err);
+    let said = |recording: &str| bench.world.run(&["terminal", "--port", &format!("replay:{recording}")], b"").out;
+    assert!(said("early.cast").contains("RS-232 stream is now OFF"), "{}", said("early.cast"));
+    assert_eq!(fs::read_to_string(bench.world.path("old.csv")).expect("there"), "yesterday\n", "nothing came for it");
+
+    let full = run(&["--period", "200", "--out", "/dev/full", "--record", "full.cast"]).wait();
+    assert_eq!(full.code, Some(1), "{}", full.err);
+    assert!(full.err.contains("cannot write '/dev/full'"), "{}", full.err);
+    assert!(said("full.cast").contains("RS-232 stream is now OFF"), "{}", said("full.cast"));
+
+    // What is there is not replaced unasked, and nobody troubles the unit for it.
+    for command in [&["stream", "--out", "old.csv"][..], &["report", "--no-dictionary", "--out", "old.csv"]] {
+        let ran = bench.run(command);
+        assert_eq!(ran.code, Some(2), "{}", ran.err);
+        assert!(ran.err.contains("old.csv exists already"), "{}", ran.err);
+    }
+}
+
+#[test]
+fn pages_whose_reader_has_gone_are_stopped() {
+    let bench = Bench::new();
+    let mut command = bench.world.command(&["diagnostics", "--port", "u0", "--record", "pages.cast"]);
+    let mut child = command.args(FAST).stdout(std::process::Stdio::piped()).spawn().expect("it starts");
+    let mut first = [0; 16];
+    std::io::Read::read_exact(&mut child.stdout.take().expect("piped"), &mut first).expect("a page");
+    // The reader is gone with the end of that line.
+    let begun = Instant::now();
+    let status = loop {
+        match child.try_wait().expect("a child") {
+            Some(status) => break status,
+            None => assert!(begun.elapsed() < PATIENCE, "it goes on for ever"),
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    assert_eq!(status.code(), Some(0));
+    let asked = fs::read_to_string(bench.world.path("pages.cast")).expect("a recording");
+    assert!(asked.matches("\"i\",\"s\"").count() >= 2, "switched on and off: {asked}");
+}
+
+#[test]
+fn a_command_line_that_makes_no_sense_is_told_as_json_where_that_was_asked_for() {
+    let world = World::new();
+    for args in [
+        &["frobnicate", "--json"][..],
+        &["identify", "--bogus", "--json"],
+        &["image", "check", "x", "--product", "n", "--json"],
+    ] {
+        let ran = world.run(args, b"");
+        assert_eq!((ran.code, ran.out.as_str()), (Some(2), ""), "{args:?}");
+        let error = json(&ran.err);
+        assert_eq!((&error["schema"], &error["exit_code"]), (&"axcon.error/1".into(), &2.into()), "{}", ran.err);
+    }
+    let twice = world.run(&["load", "x.S", "--port", "a", "--port", "a", "--yes"], b"");
+    assert_eq!(twice.code, Some(2));
+    assert!(twice.err.contains("'a' is named twice"), "{}", twice.err);
+}
+
+#[test]
+fn what_is_no_text_on_standard_input_ends_no_emulator() {
+    let world = World::new();
+    let ran = world.run(&["emulate", "axtc4co", "--json"], b"status\n\xff\xfe\nfoo\nstatus\nquit\n");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let answers: Vec<Value> =
+        objects(&ran.out).into_iter().filter(|object| object["schema"] == "axcon.emulate-answer/1").collect();
+    let refused = answers.iter().filter(|answer| answer["ok"] == false && answer["unit"].is_null()).count();
+    assert_eq!(refused, 2, "{}", ran.out);
+}
