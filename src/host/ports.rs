@@ -260,10 +260,30 @@ mod processes {
             let mut files = files.flatten().map(|file| file.file_name());
             files.find_map(|fd| hosted(pid, &fd.to_string_lossy()).filter(|pts| *pts == target))
         };
-        let pid = pids()?
-            .into_iter()
-            .find(|&pid| !is_ours(pid) && name(pid).as_deref() == Some(own.as_str()) && hosts(pid).is_some())?;
+        let pid = pids()?.into_iter().find(|&pid| {
+            !is_ours(pid)
+                && name(pid).as_deref() == Some(own.as_str())
+                && hosts(pid).is_some()
+                && was_told_to_link(pid, path)
+        })?;
         Some(Holder { name: own, pid })
+    }
+
+    /// Whether a process was started with `--link` and this path, or what this path is numbered from. A link that a
+    /// killed emulator has left may lead to the pseudo-terminal of another, which has got its number and has nothing to
+    /// do with it.
+    fn was_told_to_link(pid: u32, path: &Path) -> bool {
+        let Ok(line) = fs::read(format!("/proc/{pid}/cmdline")) else { return false };
+        let Ok(folder) = fs::read_link(format!("/proc/{pid}/cwd")) else { return false };
+        let Ok(path) = std::path::absolute(path) else { return false };
+        let words: Vec<String> =
+            line.split(|&byte| byte == 0).map(|word| String::from_utf8_lossy(word).into()).collect();
+        let behind = words.windows(2).filter(|pair| pair[0] == "--link").map(|pair| pair[1].as_str());
+        let joined = words.iter().filter_map(|word| word.strip_prefix("--link="));
+        behind.chain(joined).any(|named| {
+            let named = folder.join(named);
+            path.to_string_lossy().starts_with(&*named.to_string_lossy())
+        })
     }
 
     fn pids() -> Option<Vec<u32>> {
