@@ -415,7 +415,8 @@ impl Session {
 
     /// What is printed soon is the menu that was asked for, and no banner.
     fn note_menu_key(&mut self, sent: &[u8]) {
-        self.menu_asked_at = sent.iter().any(|key| matches!(key, b'm' | b'M')).then_some(self.now);
+        // X leaves the view, behind which the menu stands.
+        self.menu_asked_at = sent.iter().any(|key| matches!(key.to_ascii_lowercase(), b'm' | b'x')).then_some(self.now);
     }
 
     fn take_in(&mut self, bytes: &[u8], secrecy: Secrecy) {
@@ -524,7 +525,9 @@ impl Session {
     fn learn(&mut self, span: Span, message: &Message) {
         let before = self.facts.clone();
         let asked = self.menu_asked_at.is_some_and(|at| self.now <= at + MENU_ANSWER);
-        let asked = asked || self.job() == Some(Job::Identify);
+        // What comes in a dialogue is no banner, but for those that end with a reset.
+        let talks = matches!(self.job(), Some(Job::Identify | Job::ReadDictionary | Job::StreamOn | Job::StreamOff));
+        let asked = asked || talks;
         let origin = if asked { Origin::Menu } else { Origin::Banner };
         let facts = &mut self.facts;
         match message {
