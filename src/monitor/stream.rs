@@ -14,6 +14,13 @@ pub const KEPT_FAULTS: usize = 200;
 /// Marks kept.
 pub const KEPT_MARKS: usize = 100;
 
+/// Times between rows that are remembered, to know the usual one.
+const KEPT_GAPS: usize = 9;
+/// A curve is interrupted where no row came for so many halves of a period ...
+const GAP_HALF_PERIODS: u32 = 5;
+/// ... but not before this time: rows of a fast stream come in bunches.
+const GAP_AT_LEAST: Duration = Duration::from_millis(200);
+
 /// A stream is late after this many of its periods without a row ...
 const LATE_PERIODS: u32 = 3;
 /// ... but not before this time: a busy unit may swallow a row or two.
@@ -30,8 +37,14 @@ pub struct Stream {
     pub rows: u64,
     /// When the newest row came.
     pub newest: Option<Instant>,
-    /// Time between rows, smoothed.
-    pub period: Option<Duration>,
+    /// The repetition time that was set, where it was set here.
+    set: Option<Duration>,
+    /// The newest times between rows, without those that stand for an interruption.
+    gaps: VecDeque<Duration>,
+    /// The last time between rows if it was unlike those before.
+    odd: Option<Duration>,
+    /// The next row does not go on from the newest one: the unit or the link was away in between.
+    interrupted: bool,
     /// No row for longer than the stream's period explains.
     pub late: bool,
     /// Moments the user has marked.
@@ -52,9 +65,20 @@ pub struct Channel {
     /// Sum of the values since minimum and maximum began, and how many they were.
     sum: (f64, u64),
     /// The newest samples, oldest first.
-    pub history: VecDeque<(Instant, Reading)>,
+    pub history: VecDeque<Sample>,
     /// All samples, in stretches.
     trend: Trend,
+}
+
+/// A reading and its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// When it came.
+    pub at: Instant,
+    /// What it was.
+    pub reading: Reading,
+    /// Nothing is known of the time before it: rows that should have come did not.
+    pub after_gap: bool,
 }
 
 /// A wiring fault.
@@ -78,30 +102,76 @@ impl Stream {
             self.source == Some(row.source) && self.channels.iter().map(|channel| &channel.name).eq(names.iter());
         if !same {
             let marks = std::mem::take(&mut self.marks);
-            *self = Stream { source: Some(row.source), marks, ..Stream::default() };
+            *self = Stream { source: Some(row.source), marks, set: self.set, ..Stream::default() };
             self.channels = names.into_iter().map(Channel::new).collect();
         }
+        let interrupted = std::mem::take(&mut self.interrupted);
+        let mut gap_since = None;
         if let Some(before) = self.newest {
             let gap = at.since(before);
-            // A new setting shows at once, jitter hardly.
-            self.period = Some(match self.period {
-                Some(period) if gap < period * 2 && gap * 2 > period => (period * 7 + gap) / 8,
-                _ => gap,
-            });
+            let longest = self.slowest().map(|period| (period * GAP_HALF_PERIODS / 2).max(GAP_AT_LEAST));
+            gap_since = (interrupted || longest.is_some_and(|longest| gap > longest)).then_some(before);
+            if !interrupted {
+                self.take_gap(gap);
+            }
         }
         self.newest = Some(at);
         self.rows += 1;
         self.late = false;
         for (channel, &reading) in self.channels.iter_mut().zip(&row.readings) {
-            channel.read(at, reading);
+            channel.read(at, reading, gap_since);
             note_fault(faults, &channel.name, Some(reading).filter(|reading| reading.is_fault()), at);
+        }
+    }
+
+    /// Time between rows: what was set, where that is known, else what is usual.
+    pub fn period(&self) -> Option<Duration> {
+        self.set.or_else(|| self.median())
+    }
+
+    /// A repetition time was set; `None` if nobody knows any more which.
+    pub fn set_period(&mut self, period: Option<Duration>) {
+        if self.set != period {
+            self.set = period;
+            (self.gaps, self.odd) = (VecDeque::new(), None);
+        }
+    }
+
+    /// The unit or its link is away for a moment: no curve is drawn across it.
+    pub fn interrupt(&mut self) {
+        self.interrupted = true;
+    }
+
+    /// The time after which the next row is expected at the latest: a line may be too slow for what was set.
+    fn slowest(&self) -> Option<Duration> {
+        self.set.max(self.median())
+    }
+
+    fn median(&self) -> Option<Duration> {
+        let mut gaps: Vec<Duration> = self.gaps.iter().copied().collect();
+        gaps.sort_unstable();
+        gaps.get(gaps.len() / 2).copied()
+    }
+
+    fn take_gap(&mut self, gap: Duration) {
+        let unlike = |one: Duration, other: Duration| one > other * 2 || other > one * 2;
+        if self.median().is_some_and(|usual| unlike(gap, usual)) {
+            // One of another length is an outage or a row that came late, a second like it is another setting.
+            let Some(before) = self.odd.replace(gap).filter(|before| !unlike(*before, gap)) else { return };
+            self.gaps.clear();
+            self.gaps.push_back(before);
+        }
+        self.odd = None;
+        self.gaps.push_back(gap);
+        if self.gaps.len() > KEPT_GAPS {
+            self.gaps.pop_front();
         }
     }
 
     /// When the newest row is too old.
     pub fn late_at(&self) -> Option<Instant> {
         let newest = self.newest.filter(|_| !self.late)?;
-        Some(newest + (self.period.unwrap_or_default() * LATE_PERIODS).max(LATE_AT_LEAST))
+        Some(newest + (self.slowest().unwrap_or_default() * LATE_PERIODS).max(LATE_AT_LEAST))
     }
 
     /// Marks a moment.
@@ -126,8 +196,8 @@ impl Stream {
         let count = self.channels.first().map_or(0, |channel| channel.history.len());
         (0..count).filter_map(|number| {
             let readings: Option<Vec<Reading>> =
-                self.channels.iter().map(|channel| channel.history.get(number).map(|sample| sample.1)).collect();
-            let at = self.channels.first()?.history.get(number)?.0;
+                self.channels.iter().map(|channel| channel.history.get(number).map(|sample| sample.reading)).collect();
+            let at = self.channels.first()?.history.get(number)?.at;
             Some((at, Row { source: self.source?, readings: readings? }))
         })
     }
@@ -146,7 +216,8 @@ impl Channel {
         }
     }
 
-    fn read(&mut self, at: Instant, reading: Reading) {
+    /// Takes in a reading; rows are missing since `gap_since`, if they are.
+    fn read(&mut self, at: Instant, reading: Reading, gap_since: Option<Instant>) {
         let value = reading.value();
         self.reading = reading;
         if let Some(value) = value {
@@ -154,8 +225,11 @@ impl Channel {
             self.max = Some(self.max.map_or(value, |max| max.max(value)));
             self.sum = (self.sum.0 + value, self.sum.1 + 1);
         }
+        if let Some(since) = gap_since {
+            self.trend.push(since, None);
+        }
         self.trend.push(at, value);
-        self.history.push_back((at, reading));
+        self.history.push_back(Sample { at, reading, after_gap: gap_since.is_some() });
         if self.history.len() > KEPT_SAMPLES {
             self.history.pop_front();
         }
@@ -166,12 +240,17 @@ impl Channel {
         (self.sum.1 > 0).then(|| self.sum.0 / self.sum.1 as f64)
     }
 
+    /// The newest values, oldest first, `None` where there was none and where rows are missing.
+    pub fn newest(&self, count: usize) -> impl Iterator<Item = (Instant, Option<f64>)> {
+        self.history.range(self.history.len().saturating_sub(count)..).flat_map(Sample::points)
+    }
+
     /// Samples between two moments, oldest first, `None` where there was no value: as they came if they are kept, else
     /// the extremes of stretches of time.
     pub fn samples(&self, from: Instant, to: Instant) -> Vec<(Instant, Option<f64>)> {
         let within = |at: Instant| from <= at && at <= to;
-        let kept_from = self.history.front().map_or(Instant::NEVER, |sample| sample.0);
-        let kept = self.history.iter().filter(|sample| within(sample.0)).map(|&(at, reading)| (at, reading.value()));
+        let kept_from = self.history.front().map_or(Instant::NEVER, |sample| sample.at);
+        let kept = self.history.iter().filter(|sample| within(sample.at)).flat_map(Sample::points);
         if kept_from <= from || self.history.len() < KEPT_SAMPLES {
             return kept.collect();
         }
@@ -188,13 +267,22 @@ impl Channel {
     /// When the first sample came.
     pub fn begun(&self) -> Option<Instant> {
         let first = self.trend.stretches().next().map(|(at, _)| at);
-        first.into_iter().chain(self.history.front().map(|sample| sample.0)).min()
+        first.into_iter().chain(self.history.front().map(|sample| sample.at)).min()
     }
 
     /// What the channel read at a moment: its newest sample not behind it.
     pub fn at(&self, moment: Instant) -> Option<(Instant, Reading)> {
-        let behind = self.history.partition_point(|sample| sample.0 <= moment);
-        behind.checked_sub(1).and_then(|place| self.history.get(place)).copied()
+        let behind = self.history.partition_point(|sample| sample.at <= moment);
+        let sample = behind.checked_sub(1).and_then(|place| self.history.get(place))?;
+        Some((sample.at, sample.reading))
+    }
+}
+
+impl Sample {
+    /// What it is in a curve: behind a gap, the gap first.
+    fn points(&self) -> impl Iterator<Item = (Instant, Option<f64>)> {
+        let gap = self.after_gap.then_some((self.at, None));
+        gap.into_iter().chain([(self.at, self.reading.value())])
     }
 }
 
@@ -251,6 +339,44 @@ mod tests {
         let at = Instant::from_millis;
         assert_eq!(seen, [(Reading::Short, at(3000), Some(at(4000))), (Reading::Open, at(1000), Some(at(3000)))]);
         assert_eq!((monitor.stream.channels[0].min, monitor.stream.channels[0].max), (Some(20.0), Some(21.0)));
+    }
+
+    #[test]
+    fn a_curve_has_a_gap_where_rows_did_not_come_and_where_the_unit_was_away() {
+        let mut monitor = Monitor::default();
+        for millis in [0, 1000, 2000, 3000, 5400, 7901, 8900, 9900] {
+            if millis == 9900 {
+                monitor.stream.interrupt();
+            }
+            row(&mut monitor, millis, with_first(Reading::Value(20.0)));
+        }
+        let gaps = |points: Vec<(Instant, Option<f64>)>| -> Vec<u64> {
+            let gaps = points.into_iter().filter(|(_, value)| value.is_none());
+            gaps.map(|(at, _)| at.since_start().as_millis() as u64).collect()
+        };
+        let channel = &monitor.stream.channels[0];
+        let all = channel.samples(Instant::ZERO, Instant::from_millis(9900));
+        assert_eq!(gaps(all), [7901, 9900], "2.4 periods are none, 2.501 are one");
+        assert_eq!(gaps(channel.newest(2).collect()), [9900]);
+    }
+
+    #[test]
+    fn the_period_is_what_was_set_or_what_is_usual() {
+        let mut monitor = Monitor::default();
+        let second = Some(Duration::from_secs(1));
+        for millis in [0, 1000, 2000, 3000, 33_000, 34_000] {
+            row(&mut monitor, millis, with_first(Reading::Value(20.0)));
+            assert_eq!(monitor.stream.period(), second.filter(|_| millis > 0), "{millis}: an outage is no period");
+        }
+        for millis in [34_200, 34_400] {
+            row(&mut monitor, millis, with_first(Reading::Value(20.0)));
+        }
+        assert_eq!(monitor.stream.period(), Some(Duration::from_millis(200)), "another setting shows with two rows");
+        monitor.stream.set_period(Some(Duration::from_millis(1)));
+        for millis in [34_403, 34_406, 34_409] {
+            row(&mut monitor, millis, with_first(Reading::Value(20.0)));
+        }
+        assert_eq!(monitor.stream.period(), Some(Duration::from_millis(1)), "as set, not as the line carries it");
     }
 
     #[test]

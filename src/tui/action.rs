@@ -39,8 +39,8 @@ pub enum Action {
     ViewDictionary,
     /// Start the upload of the image on the load screen.
     StartLoad {
-        /// The unit's password.
-        password: Secret,
+        /// The unit's password; a unit that waits in its loader asks for none.
+        password: Option<Secret>,
         /// What stands on the unit's label, where the unit cannot say it.
         product: Option<String>,
     },

@@ -17,8 +17,10 @@ use crate::session::{Job, UnitState};
 pub const LEAST: (u16, u16) = (80, 24);
 /// Rows above the screen.
 const ABOVE: u16 = 2;
-/// Rows below it.
+/// Rows below it, the latest word in one line.
 const BELOW: u16 = 3;
+/// Lines that the latest word may take.
+const MOST_NOTICE_ROWS: usize = 2;
 /// What stands before the recording's name.
 const RECORDING: &str = "rec ";
 /// What stands before the unit's menu.
@@ -28,9 +30,10 @@ const ACTIVITY_COLUMNS: usize = 24;
 /// With fewer columns than this the recording's name says nothing.
 const LEAST_RECORDING: usize = 20;
 
-/// Where the screen itself is drawn.
-pub fn body(area: Rect) -> Rect {
-    let height = area.height.saturating_sub(ABOVE + BELOW);
+/// Where the screen itself is drawn: a long word to the user takes a row of it.
+pub fn body(area: Rect, view: &View) -> Rect {
+    let notice = notice_rows(view, usize::from(area.width)).len().max(1) as u16;
+    let height = area.height.saturating_sub(ABOVE + BELOW - 1 + notice);
     Rect { y: area.y + ABOVE.min(area.height), height, ..area }
 }
 
@@ -173,27 +176,45 @@ pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     rows
 }
 
-/// The latest word, on the rule that closes the screen.
-pub fn notice(view: &View, theme: Theme, columns: usize) -> Line<'static> {
-    let (text, style) = match &view.notice {
-        None if activity(view).is_empty() => return Line::styled("─".repeat(columns), theme.quiet()),
-        None => (format!("{} ...", activity(view)), theme.warning()),
-        Some(notice) => {
-            let style = match notice.tone {
-                Tone::Quiet => theme.strong(),
-                Tone::Good => theme.good(),
-                Tone::Bad => theme.bad(),
-            };
-            (visible::text(&notice.text), style)
-        }
+/// The latest word, on the rule that closes the screen; one too long for it goes on in a second line.
+pub fn notice(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
+    let style = match view.notice.as_ref().map(|notice| notice.tone) {
+        None => theme.warning(),
+        Some(Tone::Quiet) => theme.strong(),
+        Some(Tone::Good) => theme.good(),
+        Some(Tone::Bad) => theme.bad(),
     };
-    let text = format!(" {} ", format::keep_start(&text, columns.saturating_sub(6)));
-    let rest = columns.saturating_sub(2 + format::width(&text));
-    Line::from(vec![
-        Span::styled("──", theme.quiet()),
-        Span::styled(text, style),
-        Span::styled("─".repeat(rest), theme.quiet()),
-    ])
+    let texts = notice_rows(view, columns);
+    if texts.is_empty() {
+        return vec![Line::styled("─".repeat(columns), theme.quiet())];
+    }
+    let line = |(number, text): (usize, String)| {
+        let text = format!(" {text} ");
+        let rest = columns.saturating_sub(2 + format::width(&text));
+        let (before, behind) = if number == 0 { ("──", "─") } else { ("  ", " ") };
+        Line::from(vec![
+            Span::styled(before, theme.quiet()),
+            Span::styled(text, style),
+            Span::styled(behind.repeat(rest), theme.quiet()),
+        ])
+    };
+    texts.into_iter().enumerate().map(line).collect()
+}
+
+/// The lines of the latest word, or else of what is being done.
+fn notice_rows(view: &View, columns: usize) -> Vec<String> {
+    let text = match &view.notice {
+        None if activity(view).is_empty() => return Vec::new(),
+        None => format!("{} ...", activity(view)),
+        Some(notice) => visible::text(&notice.text),
+    };
+    let room = columns.saturating_sub(6);
+    let mut rows = format::wrap(&text, room);
+    if rows.len() > MOST_NOTICE_ROWS {
+        let rest = rows.split_off(MOST_NOTICE_ROWS - 1).join(" ");
+        rows.push(format::keep_start(&rest, room));
+    }
+    rows
 }
 
 /// The unit's menu.

@@ -91,9 +91,12 @@ pub enum Input {
 /// What the console wants done.
 #[derive(Debug, PartialEq)]
 pub enum Effect {
+    /// Give up opening a link; one that is open stays. What comes of it must not be handed in.
+    DoNotOpen,
     /// Open a link (`/dev/ttyUSB0`, `emu:axtc4co`) and start its recording, or play a recording (`replay:FILE`): its
     /// bytes come as [`Input::Bytes`] and [`Input::Sent`] at the times they had. Answered by
-    /// [`Input::LinkOpened`] or [`Input::LinkFailed`].
+    /// [`Input::LinkOpened`] or [`Input::LinkFailed`]. A link that is open stays open until this one is, and is closed
+    /// before the answer says so.
     OpenLink(String),
     /// Close the open link. Not answered; what still comes from it must not be handed in.
     CloseLink,

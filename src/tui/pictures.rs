@@ -89,6 +89,17 @@ pictures! {
         stage.press(KeyCode::Down).press(KeyCode::Down).press(KeyCode::Down);
         stage
     };
+    overview_of_eight_channels: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("/dev/ttyUSB0");
+        for second in 0..40 {
+            let broken = |channel| channel == 2 && second > 9 || channel == 5 && (second / 4) % 3 == 1;
+            let value = |channel| if broken(channel) { "Open  ".into() } else { format!("{:6.1}", 20.0 + f64::from(channel)) };
+            let row = (0..8).map(value).collect::<Vec<_>>().join(";") + "\r\n";
+            stage.wait(if second == 30 { 20_000 } else { 1000 }).bytes(row.as_bytes());
+        }
+        stage
+    };
     overview_late: |size| {
         let mut stage = Stage::streaming(size);
         stage.wait(10_000);

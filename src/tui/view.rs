@@ -7,8 +7,8 @@ use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::monitor::Monitor;
-use crate::session::{DictionaryReading, Event, Facts, Job, LoadReport, Outcome, Progress, UnitState};
-use crate::time::Instant;
+use crate::session::{DictionaryReading, Event, Facts, Job, LoadReport, Origin, Outcome, Progress, UnitState};
+use crate::time::{Duration, Instant};
 
 /// Everything a screen may read.
 #[derive(Debug, Default)]
@@ -31,6 +31,8 @@ pub struct View {
     pub load: Load,
     /// How a recording is played, where the link is one.
     pub playing: Option<Playing>,
+    /// The repetition time that the stream was asked for and has not confirmed yet.
+    pub wanted_period: Option<Duration>,
     /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
     pub viewing: bool,
     /// The latest word to the user.
@@ -282,7 +284,23 @@ impl View {
             // Whatever sub-menu was open, a restart has closed it.
             self.viewing = false;
         }
+        let banner = |facts: &Facts| {
+            facts.version.as_ref().filter(|known| known.origin == Origin::Banner).map(|known| known.span)
+        };
+        let has_started = banner(facts).is_some() && banner(facts) != banner(&self.facts);
+        let was_loader = self.facts.state == UnitState::Loader && facts.state != UnitState::Loader;
+        if has_started || was_loader {
+            self.monitor.stream.interrupt();
+        }
+        let product_before = self.product();
         self.facts = facts.clone();
+        let product = self.product();
+        if product_before != product
+            && let Some(read) = &mut self.dictionary
+        {
+            // What was read gets its names, and something to be compared with.
+            read.dump = Dump::of(&read.reading, product, &self.facts);
+        }
     }
 
     fn finished(&mut self, now: Instant, outcome: &Outcome) {
@@ -291,14 +309,24 @@ impl View {
             Outcome::DictionaryRead(reading) => {
                 // Its view was left again.
                 self.viewing = false;
+                self.monitor.stream.interrupt();
                 self.dictionary_read(now, reading);
             }
             Outcome::Identified => self.identified(),
             Outcome::StreamRuns { was_on: true } => {
+                self.monitor.stream.set_period(self.wanted_period.take());
                 self.tell(Tone::Good, "The stream was on already and now sends what you asked for.");
             }
-            Outcome::StreamRuns { was_on: false } => self.tell(Tone::Good, done(Job::StreamOn)),
-            Outcome::Done(job) => self.tell(Tone::Good, done(*job)),
+            Outcome::StreamRuns { was_on: false } => {
+                self.monitor.stream.set_period(self.wanted_period.take());
+                self.tell(Tone::Good, done(Job::StreamOn));
+            }
+            Outcome::Done(job) => {
+                if matches!(job, Job::StreamOff | Job::RestoreDefaults) {
+                    self.monitor.stream.set_period(None);
+                }
+                self.tell(Tone::Good, done(*job));
+            }
             Outcome::NoAnswer { job, awaited, .. } => {
                 self.tell(Tone::Bad, format!("No answer: waited for {awaited}, {}.", doing(*job)));
             }
@@ -321,8 +349,11 @@ impl View {
         let dump = Dump::of(reading, self.product(), &self.facts);
         let (entries, deviations) = (dump.entries.len(), dump.deviations());
         if dump.complete {
-            let text = format!("The dictionary is read: {entries} entries, {deviations} not as the factory's.");
-            self.tell(Tone::Good, text);
+            let compared = match self.product() {
+                Some(_) => format!("{deviations} not as the factory's"),
+                None => "compared with nothing, as the product is not known".into(),
+            };
+            self.tell(Tone::Good, format!("The dictionary is read: {entries} entries, {compared}."));
         } else {
             let text = format!("Not all of the object dictionary was shown: {entries} entries were read.");
             self.tell(Tone::Bad, text);

@@ -55,8 +55,11 @@ impl App {
         let Some(export) = self.view.export.take() else { return };
         let path = export.path.display();
         let text = match why {
-            None => format!("{} rows are in {path}.", format::grouped(export.rows)),
-            Some(why) => format!("{path} ends after {} rows: {why}.", format::grouped(export.rows)),
+            None => {
+                let are = if export.rows == 1 { "is" } else { "are" };
+                format!("{} {are} in {path}.", format::counted(export.rows, "row"))
+            }
+            Some(why) => format!("{path} ends after {}: {why}.", format::counted(export.rows, "row")),
         };
         self.view.tell(if why.is_none() { Tone::Good } else { Tone::Bad }, text);
     }
@@ -98,7 +101,9 @@ impl App {
     pub(super) fn file_read(&mut self, path: &Path, text: Result<String, String>) {
         self.dirty = true;
         let name = path.display().to_string();
-        let dump = text.and_then(|text| Dump::parse(&name, &text).map_err(|error| error.to_string()));
+        let dump = text
+            .map_err(|why| format!("{name}: {why}"))
+            .and_then(|text| Dump::parse(&name, &text).map_err(|_| format!("{name} is no dump as JSON")));
         match dump {
             Err(why) => self.view.tell(Tone::Bad, format!("Not compared: {why}.")),
             Ok(_) if self.view.dictionary.is_none() => {

@@ -73,7 +73,7 @@ impl App {
         if self.help.is_some() {
             return None;
         }
-        let body = frame::body(Rect::new(0, 0, columns, rows));
+        let body = frame::body(Rect::new(0, 0, columns, rows), &self.view);
         let (_, area) = lines::split(body, frame::lost(&self.view, self.theme, usize::from(columns)).len() as u16);
         self.dirty = true;
         let again = match self.front {
@@ -115,7 +115,7 @@ impl App {
                 }
                 Answer::Stay if is_waiting && key.code == KeyCode::Esc && self.leaving.is_none() => {
                     self.popup = None;
-                    self.disconnect(effects);
+                    self.give_up_opening(effects);
                 }
                 Answer::Stay => {}
                 Answer::Close => self.popup = None,
@@ -237,12 +237,16 @@ impl App {
     }
 
     pub(super) fn screen(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
-        let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1));
+        let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1), &self.view);
         let page = usize::from(area.height);
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         let action = match self.front {
             ScreenId::Connect => self.connect.on(cmd, &self.view),
-            ScreenId::Overview => self.overview.on(cmd, self.view.monitor.stream.channels.len()),
+            ScreenId::Overview => {
+                let lost = frame::lost(&self.view, self.theme, usize::from(self.size.0)).len() as u16;
+                let faults = self.overview.faults_at(self.scene(), lines::split(area, lost).1);
+                self.overview.on(cmd, self.view.monitor.stream.channels.len(), faults)
+            }
             ScreenId::Terminal => self.terminal.on(cmd, &self.scrollback, record, page),
             ScreenId::Load => self.load.on(cmd, &self.view, area),
             ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),

@@ -37,15 +37,30 @@ impl App {
         false
     }
 
+    /// Opens a link. The open one stays until that has worked, so that a name typed wrong costs nothing; only the same
+    /// port cannot be opened twice.
     pub(super) fn open(&mut self, link: String, effects: &mut Vec<Effect>) {
-        if matches!(self.view.link.state, LinkState::Open { .. }) {
-            effects.push(Effect::CloseLink);
+        let is_open = matches!(self.view.link.state, LinkState::Open { .. });
+        if !is_open || self.view.link.name.as_ref() == Some(&link) {
+            if is_open {
+                effects.push(Effect::CloseLink);
+            }
+            self.session = None;
+            self.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
         }
-        self.session = None;
         let what = format!("Opening {}.", visible::text(&link));
         self.popup = Some(Popup::Waiting { what, hint: ("Esc", "do not wait") });
-        self.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
+        self.opening = Some(link.clone());
         effects.push(Effect::OpenLink(link));
+    }
+
+    /// Nobody waits any more for the link that is being opened; one that is open stays.
+    pub(super) fn give_up_opening(&mut self, effects: &mut Vec<Effect>) {
+        self.opening = None;
+        match self.view.link.state {
+            LinkState::Open { .. } | LinkState::Lost(_) => effects.push(Effect::DoNotOpen),
+            LinkState::Opening | LinkState::Closed => self.disconnect(effects),
+        }
     }
 
     /// Closes the link and goes on. Whatever is in the middle is ended first: a unit whose view stays open neither scans
@@ -111,7 +126,7 @@ impl App {
 
     pub(super) fn link_opened(&mut self, now: Instant, info: LinkInfo, effects: &mut Vec<Effect>) {
         self.dirty = true;
-        if self.view.link.state != LinkState::Opening {
+        if self.opening.take().is_none() {
             // Nobody waits for it any more.
             effects.push(Effect::CloseLink);
             return;
@@ -164,9 +179,11 @@ impl App {
 
     pub(super) fn link_failed(&mut self, failure: Failure) {
         self.dirty = true;
-        if self.view.link.state == LinkState::Opening {
-            self.session = None;
-            self.begin_link(Link::default());
+        if self.opening.take().is_some() {
+            if self.view.link.state == LinkState::Opening {
+                self.session = None;
+                self.begin_link(Link::default());
+            }
             self.popup = Some(Popup::Failed { title: "Not connected", failure });
         }
     }
@@ -179,7 +196,9 @@ impl App {
             if let Some(session) = &mut self.session {
                 session.link_lost(now);
             }
-            self.popup = None;
+            if self.opening.is_none() {
+                self.popup = None;
+            }
         }
     }
 
@@ -191,6 +210,7 @@ impl App {
             self.scrollback.note(now, format!("link back as {}", visible::text(name)));
             self.view.link.state = LinkState::Open { read_only: false };
             self.view.tell(Tone::Good, "The link is back.");
+            self.view.monitor.stream.interrupt();
             if let Some(session) = &mut self.session {
                 session.link_back(now);
             }

@@ -30,12 +30,12 @@ use super::screens::stream::Stream;
 use super::screens::terminal::Terminal;
 use super::screens::{Scene, ScreenId};
 use super::theme::{Palette, Theme};
-use super::view::{LinkState, Tone, View};
+use super::view::{LinkState, Tone, View, doing};
 use super::widgets::lines;
 use crate::endpoint::Endpoint;
 use crate::monitor::Scrollback;
 use crate::record::Record;
-use crate::session::{Command, Event, Facts, Job, LoadOrder, Outcome, Session, UnitNow};
+use crate::session::{Command, Event, Facts, Job, LoadOrder, Outcome, Refusal, Session, UnitNow};
 use crate::time::{Duration, Instant};
 
 /// How often the picture moves while an upload runs, so that its times go on when the unit is silent.
@@ -71,6 +71,8 @@ pub struct App {
     scrollback: Scrollback,
     front: ScreenId,
     popup: Option<Popup>,
+    /// The link that is being opened, while the one before may still be open.
+    opening: Option<String>,
     /// The link is about to be closed: what comes then, and until when the unit has time.
     leaving: Option<(Next, Instant)>,
     help: Option<Help>,
@@ -101,6 +103,7 @@ impl App {
             scrollback: Scrollback::default(),
             front: ScreenId::Connect,
             popup: None,
+            opening: None,
             leaving: None,
             help: None,
             connect: Connect::default(),
@@ -251,10 +254,12 @@ impl App {
         lines::draw(frame, row(0), [frame::header(&self.view, theme, columns)]);
         lines::draw(frame, row(1), [frame::tabs(&self.view, front, theme, columns)]);
         let lost = frame::lost(&self.view, theme, columns);
-        let (banner, body) = lines::split(frame::body(area), lost.len() as u16);
+        let (banner, body) = lines::split(frame::body(area, &self.view), lost.len() as u16);
         lines::draw(frame, banner, lost);
         self.draw_screen(body, frame);
-        lines::draw(frame, row(area.height - 3), [frame::notice(&self.view, theme, columns)]);
+        let notice = frame::notice(&self.view, theme, columns);
+        let height = notice.len() as u16;
+        lines::draw(frame, Rect { y: area.height - 2 - height, height, ..area }, notice);
         lines::draw(frame, row(area.height - 2), [frame::menu(theme)]);
         let keys = match self.front {
             _ if self.help.is_some() => frame::help_keys(theme),
@@ -270,7 +275,7 @@ impl App {
         };
         lines::draw(frame, row(area.height - 1), [keys]);
         if let Some(popup) = &self.popup {
-            popup::draw(popup, &self.view, theme, frame::body(area), frame);
+            popup::draw(popup, &self.view, theme, frame::body(area, &self.view), frame);
         }
     }
 
@@ -313,6 +318,10 @@ impl App {
         self.dirty = true;
         match action {
             Action::Go(screen) => {
+                if self.front != screen {
+                    // It was about what was done there, and stands before what is being done.
+                    self.view.notice = None;
+                }
                 self.front = screen;
                 match screen {
                     ScreenId::Load => {
@@ -324,7 +333,8 @@ impl App {
                     _ => {}
                 }
             }
-            Action::Open(link) if self.view.is_in_the_middle() => self.ask(Question::Disconnect { then: Some(link) }),
+            // A recording can be opened again as it was; whoever has a unit at the line is asked.
+            Action::Open(link) if self.view.can_send() => self.ask(Question::Disconnect { then: Some(link) }),
             Action::Open(link) => self.open(link, effects),
             Action::Reconnect => {
                 if let Some(link) = self.view.link.name.clone() {
@@ -418,6 +428,12 @@ impl App {
             Command::Overhear => Some(Job::Overhear),
             Command::Load(_) => Some(Job::Load),
         };
+        let period = match &command {
+            Command::StreamOn { period, .. } => Some(*period),
+            _ => None,
+        };
+        // What is typed at the unit's own prompts is not followed: it may set any other period.
+        let may_set = matches!(&command, Command::Keys(keys) if keys.iter().any(|key| b"TtDd".contains(key)));
         let viewing = match &command {
             Command::Keys(keys) if !session.password_open() => opens_view(keys),
             _ => None,
@@ -428,12 +444,23 @@ impl App {
                     self.view.job = Some(job);
                     self.view.notice = None;
                 }
+                self.view.wanted_period = period.or(self.view.wanted_period.filter(|_| job.is_none()));
+                if may_set {
+                    self.view.monitor.stream.set_period(None);
+                }
+                if viewing == Some(true) {
+                    self.view.monitor.stream.interrupt();
+                }
                 if job == Some(Job::Load) {
                     self.view.load = Default::default();
                     self.front = ScreenId::Load;
                 }
                 self.view.viewing = viewing.unwrap_or(self.view.viewing);
                 true
+            }
+            Err(Refusal::Busy(job)) => {
+                self.view.tell(Tone::Bad, format!("Not sent: axcon is still {}.", doing(job)));
+                false
             }
             Err(refusal) => {
                 self.view.tell(Tone::Bad, format!("Not sent: {refusal}."));

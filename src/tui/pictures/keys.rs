@@ -5,12 +5,16 @@ use ratatui::crossterm::event::{
 };
 
 use super::stage::*;
+use crate::canopen::{ObjectAddress, Value};
 use crate::endpoint::Transmit;
 use crate::image::DefectId;
+use crate::record::Span;
+use crate::session::{DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry};
 use crate::time::Duration;
 use crate::tui::{
-    App, Effect, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, Pace, Palette, Playback, Playing,
+    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, Pace, Palette, Playback, Playing,
 };
+use crate::wire::stream::Source;
 
 #[test]
 fn connecting_asks_the_unit_who_it_is() {
@@ -37,11 +41,147 @@ fn the_link_given_at_the_start_is_opened_at_once() {
 }
 
 #[test]
-fn opening_another_link_closes_the_first() {
+fn another_link_is_asked_about_and_opened_before_the_first_is_given_up() {
+    let opens = |link: &str| Effect::OpenLink(link.into());
     let mut stage = Stage::connected(SMALL);
+    stage.keys("1").press(KeyCode::Down).asked();
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("Close the link?") && stage.shows("if that fails, the link stays"), "{}", stage.picture());
+    stage.keys("n");
+    assert_eq!(stage.asked(), [], "not without a yes");
+    stage.press(KeyCode::Enter).keys("y");
+    assert_eq!(stage.asked(), [opens("/dev/ttyUSB1")]);
+    stage.input(Input::LinkFailed(Failure { text: "no such port".into(), hints: Vec::new() }));
+    assert!(stage.shows("Not connected") && stage.shows("No such port"), "{}", stage.picture());
+    stage.press(KeyCode::Enter).keys("2m");
+    assert!(stage.shows("AXTC4CO 1.1.0") && stage.shows("/dev/ttyUSB0 │ connected"), "{}", stage.picture());
+    assert!(stage.sent().ends_with(b"m"), "the first link goes on");
+    stage.wait(3000).keys("1").press(KeyCode::Enter).keys("y").asked();
+    stage.press(KeyCode::Esc);
+    assert_eq!(stage.asked(), [Effect::DoNotOpen]);
+    stage.press(KeyCode::Enter).keys("y").lost();
+    assert!(stage.shows("Opening /dev/ttyUSB1."), "the first may go meanwhile: {}", stage.picture());
+    stage.opened("/dev/ttyUSB1");
+    assert!(stage.shows("/dev/ttyUSB1 │ connected") && !stage.shows("AXTC4CO 1.1.0"), "{}", stage.picture());
+    // The same port cannot be opened twice; a recording is asked about as well.
+    stage.keys("1").press(KeyCode::Enter).keys("y");
+    assert!(stage.asked().ends_with(&[Effect::CloseLink, opens("/dev/ttyUSB1")]));
+    let mut stage = Stage::connected(SMALL).with_recordings();
     stage.asked();
-    stage.keys("1").press(KeyCode::Down).press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::CloseLink, Effect::OpenLink("/dev/ttyUSB1".into())]);
+    stage.press(KeyCode::Enter);
+    assert_eq!((stage.asked(), stage.shows("Close the link?")), (Vec::new(), true), "{}", stage.picture());
+}
+
+#[test]
+fn a_unit_in_its_loader_is_asked_for_no_password_and_an_empty_one_is_named() {
+    let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO")).with_image(good_image());
+    assert!(stage.shows("neither L nor a password") && stage.shows("Enter starts."), "{}", stage.picture());
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    assert!(stage.asked().iter().any(|effect| matches!(effect, Effect::UploadBegins { .. })), "{}", stage.picture());
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    stage.press(KeyCode::Enter).press(KeyCode::Enter);
+    assert!(stage.shows("The password is missing"), "{}", stage.picture());
+    stage.keys("A");
+    assert!(!stage.shows("The password is missing"), "{}", stage.picture());
+}
+
+#[test]
+fn a_long_word_takes_two_lines_and_the_next_screen_ends_it() {
+    let mut stage = Stage::connected(SMALL);
+    let reason = "the unit does not show its object dictionary in the operational state: stop it".to_owned();
+    stage.finished(Outcome::Refused { job: Job::ReadDictionary, reason, heard: None });
+    assert!(stage.shows("The unit refused") && stage.shows("state: stop it"), "{}", stage.picture());
+    stage.keys("2");
+    assert!(stage.shows("The unit refused"), "it is the same screen: {}", stage.picture());
+    stage.keys("5");
+    assert!(!stage.shows("The unit refused"), "{}", stage.picture());
+}
+
+#[test]
+fn faults_are_in_sight_with_their_times_and_the_list_of_them_is_scrolled() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0");
+    let row = |stage: &mut Stage, open: &[usize]| {
+        let values = (0..8).map(|n| if open.contains(&n) { "Open  ".to_owned() } else { format!("{:6.1}", 20.5) });
+        let row = values.collect::<Vec<_>>().join(";") + "\r\n";
+        stage.wait(1000).bytes(row.as_bytes());
+    };
+    for open in [&[] as &[usize], &[1], &[], &[2], &[], &[3], &[3], &[3, 6]] {
+        row(&mut stage, open);
+    }
+    let picture = stage.picture();
+    for line in ["RTD4 ", "RTD7 "] {
+        let rows: Vec<_> = picture.lines().filter(|row| row.contains(line)).collect();
+        assert_eq!(rows.len(), 2, "in the values and below them: {picture}");
+        assert!(rows.iter().all(|row| row.contains("open circuit") && row.contains("since 12:00:")), "{picture}");
+    }
+    assert!(stage.shows("2 now, 4 since connecting, ↓ 2 more, PgDn"), "{picture}");
+    stage.press(KeyCode::PageDown);
+    assert!(stage.shows("RTD2    open circuit   over, 12:00:0"), "{}", stage.picture());
+    assert!(stage.shows("↑ 2 more"), "{}", stage.picture());
+    stage.press(KeyCode::PageDown).press(KeyCode::PageUp);
+    assert!(stage.shows("↓ 2 more"), "what cannot be scrolled is not: {}", stage.picture());
+}
+
+#[test]
+fn what_cannot_be_done_is_said_in_words_and_with_the_files_name() {
+    let mut stage = Stage::with_dictionary(SMALL);
+    for text in [Err("no such file".to_owned()), Ok("nonsense".to_owned())] {
+        stage.input(Input::FileRead { path: "old.json".into(), text });
+        assert!(stage.shows("Not compared: old.json"), "{}", stage.picture());
+    }
+    stage.keys("3v").asked();
+    assert!(stage.shows("Not sent: axcon is still reading the object dictionary."), "{}", stage.picture());
+}
+
+#[test]
+fn a_curve_is_not_drawn_across_an_outage() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.wait(20_000).bytes(b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n");
+    let trend = stage.picture().lines().find(|line| line.contains("TC1 ")).map(str::to_owned);
+    let trend: String = trend.unwrap_or_default().chars().rev().take(2).collect();
+    assert!(trend.ends_with(' '), "a gap before the newest value: {}", stage.picture());
+}
+
+#[test]
+fn the_period_shown_is_the_one_that_was_set() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("t20").press(KeyCode::Enter);
+    let facts = Facts { stream: Some(Source::FieldValue), ..Facts::default() };
+    stage.fold_with(Event::FactsChanged, &facts);
+    stage.fold_with(Event::Finished(Outcome::StreamRuns { was_on: false }), &facts);
+    for _ in 0..20 {
+        stage.wait(19).bytes(b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n");
+    }
+    assert!(stage.shows("every 20 ms"), "{}", stage.picture());
+}
+
+#[test]
+fn errors_stand_first_in_what_the_diagnostics_say() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("s").wait(2000);
+    let page = b"Diagnostics\r\n Supply Voltage Source Current: 24.02 mA\r\n Cold Junction Temperature: 24.5 C\r\n\
+        \x20Active Errors: 3\r\n";
+    stage.bytes(page).wait(1500).bytes(page).wait(1500).keys("2");
+    assert!(stage.shows("Diagnosed   Active Errors 3, Supply"), "{}", stage.picture());
+}
+
+#[test]
+fn a_dictionary_of_no_known_product_is_compared_with_nothing_until_it_is_known() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0").keys("5");
+    let at = ObjectAddress::new(0x6110, 2);
+    let value = Some(Value::Unsigned16(2));
+    let entry = ReadEntry { at, value, text: "type = 2".into(), span: Span::default(), known: true };
+    let reading = DictionaryReading { entries: vec![entry], complete: true, unrecognised_lines: 0 };
+    stage.finished(Outcome::DictionaryRead(Box::new(reading)));
+    assert!(stage.shows("1 of 1, compared with nothing") && !stage.shows("not as"), "{}", stage.picture());
+    stage.keys("o");
+    assert!(stage.shows("Compared with nothing: the unit has not said"), "{}", stage.picture());
+    let product = Known { value: "AXTC4CO".to_owned(), origin: Origin::Menu, span: Span::default() };
+    stage.fold_with(Event::FactsChanged, &Facts { product: Some(product), ..Facts::default() });
+    assert!(stage.shows("1 not as factory") && stage.shows("Thermocouple Sensor"), "{}", stage.picture());
 }
 
 #[test]
@@ -138,8 +278,7 @@ fn rows_go_on_to_their_file_when_the_same_link_is_back_and_end_with_another() {
     assert!(appended(&mut stage));
     stage.lost().keys("c").opened("/dev/ttyUSB0");
     assert!(appended(&mut stage), "the same link");
-    stage.wait(10_000).keys("1").press(KeyCode::Down).press(KeyCode::Enter);
-    assert!(stage.shows("rows are in axtc4co-stream-"), "{}", stage.picture());
+    stage.wait(10_000).keys("1").press(KeyCode::Down).press(KeyCode::Enter).keys("y");
     stage.opened("/dev/ttyUSB1");
     assert!(!appended(&mut stage), "another unit's rows are not mixed in");
 }
@@ -241,10 +380,10 @@ fn another_link_is_opened_once_the_first_has_been_left_in_order() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("3v").prefix().keys("1").press(KeyCode::Down).press(KeyCode::Enter);
     stage.asked();
-    assert!(stage.shows("Then /dev/ttyUSB1 is opened."), "{}", stage.picture());
+    assert!(stage.shows("/dev/ttyUSB1 is opened first"), "{}", stage.picture());
     stage.keys("y");
     let opens = Effect::OpenLink("/dev/ttyUSB1".into());
-    assert_eq!(stage.asked(), [Effect::Transmit(Transmit::open(*b"x")), Effect::CloseLink, opens]);
+    assert_eq!(stage.asked(), [Effect::Transmit(Transmit::open(*b"x")), opens]);
 }
 
 #[test]
@@ -266,7 +405,7 @@ fn ctrl_z_stops_the_program_but_not_in_the_middle_of_a_job() {
 fn an_upload_is_noted_once_it_is_taken_and_before_its_first_byte() {
     let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO")).with_image(good_image());
     stage.press(KeyCode::Enter);
-    assert!(stage.shows("Password for loading software"), "the note spares the label: {}", stage.picture());
+    assert!(stage.shows("── Loading"), "the note spares the label: {}", stage.picture());
     let mut stage = Stage::connected(SMALL).with_image(good_image());
     stage.press(KeyCode::Enter).keys("AXIO-2010").asked();
     stage.press(KeyCode::Enter);

@@ -8,6 +8,7 @@ use ratatui::widgets::{Block, BorderType, Clear};
 use super::{Popup, Purpose, Question, consequence};
 use crate::session::Job;
 use crate::time::BITS_PER_CHARACTER;
+use crate::tui::screens::bench::emulated;
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
 use crate::tui::visible;
@@ -220,7 +221,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             },
             vec![("Enter", "allow it and check again"), ("Esc", "back")],
         ),
-        Question::Label { typed: field, image, complaint } => (
+        Question::Label { typed: field, image, complaint, .. } => (
             "Which product is the unit?",
             {
                 let image = image.as_deref().map_or("not said".to_owned(), visible::text);
@@ -239,7 +240,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             },
             vec![("Enter", "go on"), ("Esc", "back")],
         ),
-        Question::Password { field, .. } => (
+        Question::Password { field, complaint, .. } => (
             "Password for loading software",
             {
                 let is_emulated = view.link.name.as_deref().is_some_and(|name| name.starts_with("emu:"));
@@ -250,6 +251,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 let mut rows = paragraphs(&[origin, "It is neither shown nor recorded."], columns);
                 rows.push(Line::default());
                 rows.push(typed(theme, "", &field.dots(), columns));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![("Enter", "start the upload"), ("Esc", "back")],
@@ -277,9 +279,21 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
         Question::Disconnect { then } => (
             "Close the link?",
             {
-                let [what, consequence] = in_the_middle(view);
-                let then = then.as_deref().map(|link| format!("Then {} is opened.", visible::text(link)));
-                let texts: Vec<&str> = [what, consequence].into_iter().chain(then.as_deref()).collect();
+                let mut texts: Vec<String> = match view.is_in_the_middle() {
+                    true => in_the_middle(view).map(str::to_owned).to_vec(),
+                    false => {
+                        vec![format!("{} is connected.", visible::text(view.link.name.as_deref().unwrap_or("A unit")))]
+                    }
+                };
+                if emulated(view).is_some() {
+                    texts.push("The emulated unit is gone with its link, with all that was set and loaded.".into());
+                }
+                let is_same = *then == view.link.name;
+                texts.extend(then.as_deref().map(visible::text).map(|link| match is_same {
+                    true => format!("Then {link} is opened again."),
+                    false => format!("{link} is opened first: if that fails, the link stays."),
+                }));
+                let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
                 paragraphs(&texts, columns)
             },
             vec![("Y", "close the link"), ("N", "stay connected")],

@@ -14,7 +14,7 @@ use super::view::View;
 use super::widgets::field::{PasswordField, TextField};
 use super::widgets::format;
 use crate::image::DefectId;
-use crate::session::{Command, Phase};
+use crate::session::{Command, Phase, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
 
@@ -103,6 +103,8 @@ pub enum Question {
         typed: TextField,
         /// What the image is for.
         image: Option<String>,
+        /// It waits in its loader already, which asks for no password.
+        in_loader: bool,
         /// What is wrong with it.
         complaint: Option<&'static str>,
     },
@@ -112,6 +114,8 @@ pub enum Question {
         field: PasswordField,
         /// What the label says, if that had to be asked.
         product: Option<String>,
+        /// What is wrong with it.
+        complaint: Option<&'static str>,
     },
     /// Shall the upload be cancelled?
     CancelLoad,
@@ -237,12 +241,22 @@ impl Question {
         Question::Allow { typed: TextField::default(), errors, complaint: None }
     }
 
-    /// Asks for what an upload still needs.
-    pub fn start_load(view: &View, facts: &ImageFacts) -> Question {
+    /// Asks for what an upload still needs, or starts it where that is nothing.
+    pub fn start_load(view: &View, facts: &ImageFacts) -> Action {
+        let in_loader = view.facts.state == UnitState::Loader;
         if view.needs_label() {
-            return Question::Label { typed: TextField::default(), image: facts.product.clone(), complaint: None };
+            let image = facts.product.clone();
+            return Action::Ask(Question::Label { typed: TextField::default(), image, in_loader, complaint: None });
         }
-        Question::Password { field: PasswordField::new(), product: None }
+        Question::then_password(in_loader, None)
+    }
+
+    /// The password is asked for, but not for a loader, which wants none.
+    fn then_password(in_loader: bool, product: Option<String>) -> Action {
+        match in_loader {
+            true => Action::StartLoad { password: None, product },
+            false => Action::Ask(Question::Password { field: PasswordField::new(), product, complaint: None }),
+        }
     }
 
     fn on(&mut self, key: KeyEvent) -> Answer {
@@ -337,20 +351,24 @@ impl Question {
                 });
                 Answer::Stay
             }
-            Question::Label { typed, image, complaint } => {
+            Question::Label { typed, image, in_loader, complaint } => {
                 let label = typed.text().trim().to_owned();
                 if label.is_empty() {
+                    *complaint = Some("The part number is missing.");
                     return Answer::Stay;
                 }
                 if image.as_ref().is_some_and(|image| !image.eq_ignore_ascii_case(&label)) {
                     *complaint = Some("The file is for another product: it must not be sent to this unit.");
                     return Answer::Stay;
                 }
-                Answer::Act(Action::Ask(Question::Password { field: PasswordField::new(), product: Some(label) }))
+                Answer::Act(Question::then_password(*in_loader, Some(label)))
             }
-            Question::Password { field, .. } if field.is_empty() => Answer::Stay,
-            Question::Password { field, product } => {
-                Answer::Act(Action::StartLoad { password: field.secret(), product: product.take() })
+            Question::Password { field, complaint, .. } if field.is_empty() => {
+                *complaint = Some("The password is missing: without it the unit does not go into its loader.");
+                Answer::Stay
+            }
+            Question::Password { field, product, .. } => {
+                Answer::Act(Action::StartLoad { password: Some(field.secret()), product: product.take() })
             }
             Question::CancelLoad => Answer::Act(Action::Command(Command::Cancel)),
             Question::Paste(bytes) => Answer::Act(Action::Command(Command::Keys(std::mem::take(bytes)))),
@@ -385,7 +403,10 @@ impl Question {
                 }
                 _ => {}
             },
-            Question::Password { field, .. } => field.push(character),
+            Question::Password { field, complaint, .. } => {
+                *complaint = None;
+                field.push(character);
+            }
             Question::View if character.eq_ignore_ascii_case(&'t') => return Answer::Act(Action::ViewDictionary),
             Question::View
             | Question::CancelLoad

@@ -311,7 +311,11 @@ impl Console {
         for effect in effects {
             match effect {
                 Effect::OpenLink(name) => {
-                    self.close_link();
+                    self.dial += 1;
+                    if self.link.is_none() && self.player.is_none() {
+                        // The one that was lost is not looked for any more. An open one stays until this one is.
+                        self.close_link();
+                    }
                     match (self.world.resolve)(&name) {
                         Ok(spec) if spec.is_network() => self.dial(name, spec),
                         Ok(spec) => {
@@ -321,7 +325,11 @@ impl Console {
                         Err(failure) => leaves |= self.handle(Input::LinkFailed(failure)),
                     }
                 }
-                Effect::CloseLink => self.close_link(),
+                Effect::CloseLink => {
+                    self.dial += 1;
+                    self.close_link();
+                }
+                Effect::DoNotOpen => self.dial += 1,
                 Effect::Transmit(transmit) => {
                     if let Some(link) = &self.link
                         && let Err(error) = link.send(transmit.bytes)
@@ -374,6 +382,7 @@ impl Console {
         if let LinkSpec::Replay(path) = &spec {
             return match Recording::open(path) {
                 Ok(recording) => {
+                    self.close_link();
                     let player = Player::begin(name, path.clone(), recording, self.now());
                     let info = player.link_info(self.world.baud);
                     self.player = Some(player);
@@ -417,6 +426,8 @@ impl Console {
 
     /// Takes over an open link and starts its recording.
     fn begin(&mut self, name: &str, connection: Connection, spec: LinkSpec) -> Input {
+        // What the new link has said in the moment since it is open goes with what the old one has.
+        self.close_link();
         self.recorder = Recorder::start_ahead(&self.world.recording, &connection, self.clock, self.skew);
         let recording = self.recorder.path().map(|path| path.display().to_string());
         let options = link::Options { baud: self.world.baud };
@@ -539,7 +550,6 @@ impl Console {
 
     /// Closes the link; what it has put on the channel and nobody has taken is forgotten.
     fn close_link(&mut self) {
-        self.dial += 1;
         // The console's time goes on from where the recording's stands.
         let now = self.now();
         self.player = None;

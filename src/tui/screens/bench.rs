@@ -194,7 +194,7 @@ impl Bench {
             let rows = [
                 lines::rule(theme, area.width, "Bench", ""),
                 Line::raw("  Here the sensors, the cable and the power of an emulated unit are in your hands."),
-                Line::raw("  The link is none: press 1 and choose an emulated unit."),
+                Line::raw("  No emulated unit is connected: press 1 and choose one."),
             ];
             return lines::draw(frame, area, rows);
         };

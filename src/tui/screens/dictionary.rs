@@ -245,6 +245,10 @@ impl Dictionary {
         lines::draw(frame, head, heading.into_iter().chain([Line::styled(heads, theme.quiet())]));
         if rows.is_empty() {
             let text = match (view.product(), &view.dictionary) {
+                (None, Some(_)) if self.only == Only::Deviations => {
+                    "Compared with nothing: the unit has not said what it is, so its factory values are not known. Esc \
+                     shows everything again."
+                }
                 (_, Some(_)) if self.only == Only::Deviations && self.words.is_empty() => {
                     "Nothing differs from the factory's. Esc shows everything again."
                 }
@@ -290,7 +294,12 @@ impl Dictionary {
                 None => parts.push("the manual's; V reads the unit's".to_owned()),
                 Some(read) => {
                     let time = format::time_of_day(scene.start_of_day, read.at);
-                    parts.push(format!("{shown} of {total}, {} not as factory, {time}", read.dump.deviations()));
+                    let compared = match view.product() {
+                        Some(_) => format!("{} not as factory", read.dump.deviations()),
+                        // Nobody knows what the factory's values are: none of them differs, and none is the same.
+                        None => "compared with nothing".into(),
+                    };
+                    parts.push(format!("{shown} of {total}, {compared}, {time}"));
                 }
             }
         }
@@ -386,12 +395,13 @@ impl Row<'_> {
             Some(difference) => difference.left.clone().unwrap_or_else(|| "not there".into()),
             None => self.default(),
         };
+        let room = name_columns(columns).saturating_sub(1);
         let value_style = if deviates || self.difference.is_some() { theme.warning() } else { theme.strong() };
         let mut line = Line::from(vec![
             Span::raw(if is_chosen { "› " } else { "  " }),
             Span::styled(format!("{mark} "), theme.warning()),
             Span::raw(format::left(&self.at.to_string(), 9)),
-            Span::raw(format::left(&self.name(), name_columns(columns).saturating_sub(1))),
+            Span::raw(format::left(&format::keep_ends(&self.name(), room), room)),
             Span::raw(" "),
             Span::styled(format::left(&self.value(), 15), value_style),
             Span::raw(" "),

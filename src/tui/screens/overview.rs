@@ -25,6 +25,8 @@ pub const TITLE: &str = "Overview";
 pub const BINDINGS: &[Binding] = &[
     Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "channel above" },
     Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "channel", long: "channel below" },
+    Binding { keys: &[Press::Plain(KeyCode::PageUp)], cmd: Cmd::PageUp, short: "", long: "faults above" },
+    Binding { keys: &[Press::Plain(KeyCode::PageDown)], cmd: Cmd::PageDown, short: "faults", long: "faults below" },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
         cmd: Cmd::Restart,
@@ -40,7 +42,11 @@ const CHART_ROWS: u16 = 32;
 /// Smallest span of a trend, in °C and in counts: less than this is noise.
 const LEAST_SPAN: [f64; 2] = [1.0, 10.0];
 /// Columns of the values before the trend begins.
-const TABLE_COLUMNS: usize = 67;
+const TABLE_COLUMNS: usize = 64;
+/// Beside the time of a fault a trend of fewer columns says nothing.
+const LEAST_TREND: usize = 12;
+/// Rows of the faults that the rest of the page leaves room for, with their heading, where there are any.
+const FAULT_ROWS: usize = 3;
 /// From this width on the limits have columns of their own ...
 const LIMITS_AT: u16 = 110;
 /// ... of this width each.
@@ -50,27 +56,47 @@ const LIMIT_COLUMNS: usize = 9;
 #[derive(Debug, Default)]
 pub struct Overview {
     cursor: usize,
+    /// Faults above those that are shown.
+    scrolled: usize,
+}
+
+/// Where the parts of the page stand.
+struct Parts {
+    unit: Vec<Line<'static>>,
+    values: Vec<Line<'static>>,
+    chart_rows: u16,
+    faults: Rect,
 }
 
 impl Overview {
-    /// What a command does here.
-    pub fn on(&mut self, cmd: Cmd, channels: usize) -> Option<Action> {
+    /// What a command does here; `faults` is how many of them can stand above those that are shown, and how many are
+    /// shown at once.
+    pub fn on(&mut self, cmd: Cmd, channels: usize, (last, shown): (usize, usize)) -> Option<Action> {
+        self.scrolled = self.scrolled.min(last);
         self.cursor = self.cursor.min(channels.saturating_sub(1));
         match cmd {
             Cmd::Up => self.cursor = self.cursor.saturating_sub(1),
             Cmd::Down => self.cursor = (self.cursor + 1).min(channels.saturating_sub(1)),
+            Cmd::PageUp => self.scrolled = self.scrolled.saturating_sub(shown.max(1)),
+            Cmd::PageDown => self.scrolled = (self.scrolled + shown.max(1)).min(last),
             Cmd::Restart => return Some(Action::RestartExtremes),
             _ => {}
         }
         None
     }
 
+    /// How many faults can stand above those that are shown, and how many are shown at once.
+    pub fn faults_at(&self, scene: Scene, area: Rect) -> (usize, usize) {
+        let room = usize::from(self.parts(scene, page(area)).faults.height.saturating_sub(1));
+        (fault_rows(scene).len().saturating_sub(room), room)
+    }
+
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
-        if area.width < BESIDE_COLUMNS {
+        let left = page(area);
+        if left == area {
             return self.draw_page(scene, area, frame);
         }
-        let left = Rect { width: area.width * 3 / 5, ..area };
         let right = Rect { x: area.x + left.width + 2, width: area.width - left.width - 2, ..area };
         self.draw_page(scene, left, frame);
         let (heading, text) = lines::split(right, 1);
@@ -79,29 +105,37 @@ impl Overview {
     }
 
     fn draw_page(&self, scene: Scene, area: Rect, frame: &mut Frame) {
-        let unit = unit(scene, area.width);
-        let (upper, rest) = lines::split(area, unit.len() as u16);
-        lines::draw(frame, upper, unit);
-        let values = self.values(scene, area);
-        let (middle, rest) = lines::split(rest, values.len() as u16);
-        lines::draw(frame, middle, values);
-        let chart_rows = match scene.view.monitor.stream.channels.get(self.cursor) {
-            Some(channel) if area.height >= CHART_ROWS => {
-                let rows = rest.height * 3 / 5;
-                let (chart, _) = lines::split(rest, rows);
-                draw_chart(scene, channel, chart, frame);
-                rows
-            }
-            _ => 0,
-        };
-        let (_, lower) = lines::split(rest, chart_rows);
-        lines::draw(frame, lower, faults(scene, lower));
+        let parts = self.parts(scene, area);
+        let (upper, rest) = lines::split(area, parts.unit.len() as u16);
+        lines::draw(frame, upper, parts.unit);
+        let (middle, rest) = lines::split(rest, parts.values.len() as u16);
+        lines::draw(frame, middle, parts.values);
+        if let Some(channel) = scene.view.monitor.stream.channels.get(self.cursor).filter(|_| parts.chart_rows > 0) {
+            draw_chart(scene, channel, lines::split(rest, parts.chart_rows).0, frame);
+        }
+        lines::draw(frame, parts.faults, self.faults(scene, parts.faults));
+    }
+
+    fn parts(&self, scene: Scene, area: Rect) -> Parts {
+        let (mut unit, mut values) = (unit(scene, area.width), self.values(scene, area));
+        // Faults are what one looks for: the blank line and what stands below the values make room for them.
+        let least = if fault_rows(scene).is_empty() { 0 } else { FAULT_ROWS };
+        let too_many = |unit: &Vec<_>, values: &Vec<_>| unit.len() + values.len() + least > usize::from(area.height);
+        if too_many(&unit, &values) {
+            unit.pop();
+        }
+        if too_many(&unit, &values) && is_current(scene) {
+            values.pop();
+        }
+        let (_, rest) = lines::split(area, (unit.len() + values.len()) as u16);
+        let has_chart = area.height >= CHART_ROWS && !scene.view.monitor.stream.channels.is_empty();
+        let chart_rows = if has_chart { rest.height * 3 / 5 } else { 0 };
+        Parts { unit, values, chart_rows, faults: lines::split(rest, chart_rows).1 }
     }
 
     fn values(&self, scene: Scene, area: Rect) -> Vec<Line<'static>> {
         let columns = area.width;
         let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
-        let is_on = scene.view.facts.stream.is_some();
         let newest = stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
         let Some(source) = stream.source else {
             let mut shown = vec![lines::rule(theme, columns, "Values", "")];
@@ -115,7 +149,7 @@ impl Overview {
             Source::FieldValue => "field value (6100h) in °C",
             Source::ProcessValue => "process value (7130h) in counts",
         };
-        let remark = format!("{what}, {} rows, newest {}", format::grouped(stream.rows), newest.unwrap_or_default());
+        let remark = format!("{what}, {}, newest {}", format::counted(stream.rows, "row"), newest.unwrap_or_default());
         let mut shown = vec![lines::rule(theme, columns, "Values", &remark)];
         // They are temperatures: beside counts they would say nothing.
         let has_limits = source == Source::FieldValue && scene.view.dictionary.is_some();
@@ -123,7 +157,7 @@ impl Overview {
         let limit_heads =
             if has_columns { format!("{:>9}{:>9}{:>9}", "Low", "High", "Shutdown") } else { String::new() };
         let heads = format!(
-            "    {:<8}{:>13}   {:<15}{:>11}{:>11}{limit_heads}  Trend",
+            "    {:<8}{:>13}   {:<14}{:>10}{:>10}{limit_heads}  Trend",
             "Channel", "Value", "State", "Min", "Max"
         );
         shown.push(Line::styled(heads, theme.quiet()));
@@ -136,7 +170,7 @@ impl Overview {
         if area.height >= CHART_ROWS {
             shown.extend(averages(scene));
         }
-        if !is_on {
+        if scene.view.facts.stream.is_none() {
             shown.push(Line::styled(
                 "  The stream is off: these are its last values. T switches it on.",
                 theme.warning(),
@@ -152,6 +186,17 @@ impl Overview {
         }
         shown
     }
+}
+
+/// The part of the screen that the page takes: where there is room, the terminal stands beside it.
+fn page(area: Rect) -> Rect {
+    if area.width < BESIDE_COLUMNS { area } else { Rect { width: area.width * 3 / 5, ..area } }
+}
+
+/// Whether the values are those of now, so that nothing has to be said about them.
+fn is_current(scene: Scene) -> bool {
+    let stream = &scene.view.monitor.stream;
+    stream.source.is_some() && !stream.late && scene.view.facts.stream.is_some()
 }
 
 /// The limits of one channel in a line, or how to see them.
@@ -199,7 +244,7 @@ pub fn decimals(view: &View, source: Source) -> usize {
 fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     let (theme, facts) = (scene.theme, &scene.view.facts);
     let title = scene.view.product().map(|product| product.title.clone()).unwrap_or_default();
-    let stream = match (facts.stream, scene.view.monitor.stream.period) {
+    let stream = match (facts.stream, scene.view.monitor.stream.period()) {
         (None, _) => "off".to_owned(),
         (Some(source), period) => {
             let source = match source {
@@ -211,10 +256,14 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         }
     };
     let state = match facts.state {
+        UnitState::Silent if scene.view.link.name.is_none() => Span::styled("not connected", theme.quiet()),
+        UnitState::Silent if scene.record.entry_count() > 0 && scene.view.monitor.stream.rows > 0 => {
+            Span::styled("silent now", theme.warning())
+        }
         UnitState::Silent => Span::styled("silent: nothing heard yet", theme.warning()),
-        UnitState::Unknown => Span::styled("unknown: talks, says nothing known", theme.warning()),
+        UnitState::Unknown => Span::styled("talks, in words not known", theme.warning()),
         UnitState::Application => Span::styled("application runs", theme.good()),
-        UnitState::Loader => Span::styled("in its loader, waits for a file", theme.warning()),
+        UnitState::Loader => Span::styled("waits in its loader", theme.warning()),
     };
     let other_text = match facts.unrecognised_lines {
         0 => "none".to_owned(),
@@ -262,7 +311,9 @@ fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
         let unit = found.unit.as_deref().map(|unit| format!(" {}", visible::text(unit))).unwrap_or_default();
         Some(format!("{} {}{unit}", visible::text(&found.label), found.value?))
     });
-    let said: Vec<String> = said.collect();
+    let mut said: Vec<String> = said.collect();
+    // What does not fit is cut off, and that must not be the errors.
+    said.sort_by_key(|text| !text.to_lowercase().contains("error"));
     let room = usize::from(columns).saturating_sub(lines::LABEL_COLUMNS + 13);
     let text = format::keep_start(&said.join(", "), room);
     let time = format::time_of_day(scene.start_of_day, at);
@@ -342,8 +393,16 @@ fn value_row(
         false => String::new(),
     };
     let span = LEAST_SPAN[usize::from(source == Source::ProcessValue)];
-    let newest = channel.history.len().saturating_sub(room);
-    let values: Vec<_> = channel.history.range(newest..).map(|&(_, reading)| reading.value()).collect();
+    let lasting = scene.view.monitor.faults.iter().find(|fault| fault.until.is_none() && fault.channel == channel.name);
+    // Since when is wanted before what was before; the list below may have no room for it.
+    let since = lasting.map(|fault| format!("since {}", format::time_of_day(scene.start_of_day, fault.since)));
+    let taken = since.as_ref().map_or(0, |since| since.len() + 2);
+    let values: Vec<_> = channel.newest(room).map(|(_, value)| value).collect();
+    let trend = match room.saturating_sub(taken) {
+        room if taken == 0 || room >= LEAST_TREND => sparkline(&values, room, span),
+        _ => String::new(),
+    };
+    let since = since.map(|since| if trend.is_empty() { since } else { since + "  " }).unwrap_or_default();
     let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, channel.name);
     let is_old = scene.view.monitor.stream.late || scene.view.facts.stream.is_none();
     let value_style = if is_old { theme.quiet() } else { theme.strong() };
@@ -351,46 +410,55 @@ fn value_row(
         Span::styled(name, if is_chosen { theme.strong() } else { ratatui::style::Style::new() }),
         Span::styled(format!("{value:>13}"), value_style),
         Span::raw("   "),
-        Span::styled(format!("{state:<15}"), style),
-        Span::raw(format!("{:>11}{:>11}", number(channel.min), number(channel.max))),
+        Span::styled(format!("{state:<14}"), style),
+        Span::raw(format!("{:>10}{:>10}", number(channel.min), number(channel.max))),
         Span::styled(limit_columns, theme.quiet()),
         Span::raw("  "),
-        Span::styled(sparkline(&values, room, span), theme.curve()),
+        Span::styled(since, theme.bad()),
+        Span::styled(trend, theme.curve()),
     ])
 }
 
-fn faults(scene: Scene, area: Rect) -> Vec<Line<'static>> {
-    let theme = scene.theme;
-    let all = &scene.view.monitor.faults;
-    let lasting = all.iter().filter(|fault| fault.until.is_none()).count();
-    let remark = if all.is_empty() { String::new() } else { format!("{lasting} now, {} since connecting", all.len()) };
-    let mut shown = vec![lines::rule(theme, area.width, "Faults", &remark)];
-    let listed = listed(scene);
-    if all.is_empty() && listed.is_empty() {
-        let word = if scene.view.monitor.stream.rows > 0 {
-            "None seen."
-        } else {
-            "None known: open and short circuits show in the stream."
-        };
-        shown.push(Line::styled(format!("  {word}"), theme.quiet()));
-        return shown;
+impl Overview {
+    fn faults(&self, scene: Scene, area: Rect) -> Vec<Line<'static>> {
+        let theme = scene.theme;
+        let all = &scene.view.monitor.faults;
+        let rows = fault_rows(scene);
+        let room = usize::from(area.height.saturating_sub(1));
+        let first = self.scrolled.min(rows.len().saturating_sub(room));
+        let below = rows.len().saturating_sub(first + room);
+        let lasting = all.iter().filter(|fault| fault.until.is_none()).count();
+        let mut remark = Vec::new();
+        if !all.is_empty() {
+            remark.push(format!("{lasting} now, {} since connecting", all.len()));
+        }
+        // How far it can be scrolled stands in the heading: a row of its own would take that of a fault.
+        remark.extend((first > 0).then(|| format!("↑ {first} more")));
+        remark.extend((below > 0).then(|| format!("↓ {below} more, PgDn")));
+        let mut shown = vec![lines::rule(theme, area.width, "Faults", &remark.join(", "))];
+        if rows.is_empty() {
+            let word = if scene.view.monitor.stream.rows > 0 {
+                "None seen."
+            } else {
+                "None known: open and short circuits show in the stream."
+            };
+            shown.push(Line::styled(format!("  {word}"), theme.quiet()));
+        }
+        shown.extend(rows.into_iter().skip(first).take(room));
+        shown
     }
+}
+
+/// All faults, one in a row.
+fn fault_rows(scene: Scene) -> Vec<Line<'static>> {
+    let all = &scene.view.monitor.faults;
     // Lasting faults first: they are the ones to work on.
     let lasting = all.iter().filter(|fault| fault.until.is_none());
     let ended = all.iter().filter(|fault| fault.until.is_some());
     let mut rows: Vec<Line> = lasting.map(|fault| fault_row(scene, fault)).collect();
-    rows.extend(listed);
+    rows.extend(listed(scene));
     rows.extend(ended.map(|fault| fault_row(scene, fault)));
-    let room = usize::from(area.height.saturating_sub(1));
-    let hidden = rows.len().saturating_sub(room);
-    if hidden > 0 {
-        let fitting = room.saturating_sub(1);
-        let more = format!("  and {} more", rows.len() - fitting);
-        rows.truncate(fitting);
-        rows.push(Line::styled(more, theme.quiet()));
-    }
-    shown.extend(rows);
-    shown
+    rows
 }
 
 /// The errors in the unit's own list, as it was when the dictionary was read.
@@ -431,7 +499,7 @@ fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
     let (heading, canvas) = lines::split(area, 1);
     let theme = scene.theme;
     lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Trend of {}", channel.name), "")]);
-    let samples = channel.history.iter().map(|&(at, reading)| (at, reading.value())).collect();
+    let samples = channel.newest(usize::MAX).collect();
     let curve = Curve { samples, window: None, cursor: None, marks: Vec::new() };
     let (canvas, _) = lines::split(canvas, canvas.height.saturating_sub(1));
     chart::draw(theme, scene.start_of_day, &curve, canvas, frame);

@@ -187,8 +187,8 @@ impl Stream {
             Some(Source::ProcessValue) => "process value (7130h) in counts",
             Some(Source::FieldValue) | None => "field value (6100h) in °C",
         };
-        let every = values.period.map(|period| format!(", every {}", format::period(period))).unwrap_or_default();
-        let remark = format!("{source}{every}, {} rows", format::grouped(values.rows));
+        let every = values.period().map(|period| format!(", every {}", format::period(period))).unwrap_or_default();
+        let remark = format!("{source}{every}, {}", format::counted(values.rows, "row"));
         let mut rows = vec![lines::rule(theme, columns, "Stream", &remark)];
         let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
         let value = self.held.map_or_else(|| "Value".to_owned(), |held| format!("At {}", time(held.cursor)));
@@ -228,8 +228,7 @@ impl Stream {
         ]);
         let room = usize::from(columns).saturating_sub(TABLE_COLUMNS + 2);
         if room > 10 {
-            let newest = channel.history.len().saturating_sub(room);
-            let values: Vec<_> = channel.history.range(newest..).map(|sample| sample.1.value()).collect();
+            let values: Vec<_> = channel.newest(room).map(|(_, value)| value).collect();
             line.push_span(Span::styled(format!("  {}", sparkline(&values, room, LEAST_SPAN)), theme.curve()));
         }
         line
@@ -255,7 +254,7 @@ fn note(scene: Scene, columns: usize) -> Line<'static> {
     };
     let mut line = Line::from(Span::styled(warning, theme.warning()));
     if let Some(export) = &view.export {
-        let (begin, end) = (format!("  {} rows written to ", format::grouped(export.rows)), "; E ends it.");
+        let (begin, end) = (format!("  {} written to ", format::counted(export.rows, "row")), "; E ends it.");
         let room = columns.saturating_sub(format::width(warning) + format::width(&begin) + format::width(end));
         let path = format::keep_end(&visible::text(&export.path.to_string_lossy()), room);
         let style = if warning.is_empty() { theme.good() } else { theme.quiet() };

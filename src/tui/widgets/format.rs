@@ -18,6 +18,11 @@ pub fn grouped(number: impl TryInto<u64>) -> String {
     shown
 }
 
+/// `1 row`, `1,200 rows`.
+pub fn counted(number: u64, what: &str) -> String {
+    format!("{} {what}{}", grouped(number), if number == 1 { "" } else { "s" })
+}
+
 /// `0:21`, `12:05`, `1:00:00`.
 pub fn minutes(duration: Duration) -> String {
     let seconds = duration.as_secs();
@@ -100,6 +105,17 @@ pub fn keep_start(text: &str, columns: usize) -> String {
     kept
 }
 
+/// A name of two parts, `Low Temperature Warning Threshold, TC3`: at most `columns` wide, cut in its first part, because
+/// the last one tells which of several of the same name it is.
+pub fn keep_ends(text: &str, columns: usize) -> String {
+    let last = text.rfind(", ").unwrap_or(text.len());
+    let (first, last) = text.split_at(last);
+    match columns.checked_sub(width(last)).filter(|_| width(text) > columns) {
+        Some(room) if room > 0 => keep_start(first, room) + last,
+        _ => keep_start(text, columns),
+    }
+}
+
 /// Pads on the right to `columns`, shortening what is too long.
 pub fn left(text: &str, columns: usize) -> String {
     let text = keep_start(text, columns);
@@ -157,6 +173,7 @@ mod tests {
 
     #[test]
     fn numbers_are_grouped() {
+        assert_eq!([0, 1, 1200].map(|number| counted(number, "row")), ["0 rows", "1 row", "1,200 rows"]);
         assert_eq!([0, 999, 1000, 242_846, 1_000_000].map(grouped), ["0", "999", "1,000", "242,846", "1,000,000"]);
     }
 
@@ -177,6 +194,8 @@ mod tests {
         assert_eq!(keep_start("Performing First Start", 11), "Performing…");
         assert_eq!(keep_start("short", 5), "short");
         assert_eq!(keep_start("short", 0), "");
+        assert_eq!(keep_ends("High Warning Threshold, TC3", 20), "High Warning T…, TC3");
+        assert_eq!(["a, bcdefgh", "abcdefgh", "ab, c"].map(|name| keep_ends(name, 5)), ["a, b…", "abcd…", "ab, c"]);
         assert_eq!(keep_end("short", 0), "");
     }
 

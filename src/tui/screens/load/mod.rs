@@ -223,7 +223,7 @@ impl Load {
                         return Some(Action::Ask(Question::allow(facts.errors.clone())));
                     }
                     Cmd::Accept if objections(facts, view).is_empty() => {
-                        return Some(Action::Ask(Question::start_load(view, facts)));
+                        return Some(Question::start_load(view, facts));
                     }
                     _ => {}
                 }

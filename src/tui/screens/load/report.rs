@@ -6,6 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::file_name;
+use crate::session::UnitState;
 use crate::time::Duration;
 use crate::tui::input::ImageFacts;
 use crate::tui::screens::Scene;
@@ -139,7 +140,10 @@ fn plan(scene: Scene, facts: &ImageFacts, packed: bool, columns: u16) -> Vec<Lin
     if facts.ok {
         let steps: [String; PLAN_STEPS] = [
             format!("Make sure that the unit is {product}."),
-            "Send L and the password; the unit resets into its loader.".into(),
+            match view.facts.state {
+                UnitState::Loader => "Send neither L nor a password: the unit waits in its loader already.".into(),
+                _ => "Send L and the password; the unit resets into its loader.".into(),
+            },
             match packed {
                 false => format!("Send {sent} characters: some {time} with what the loader needs."),
                 true => format!("Send fewer than {sent} characters, in long records: less than {time}."),
@@ -159,7 +163,11 @@ fn plan(scene: Scene, facts: &ImageFacts, packed: bool, columns: u16) -> Vec<Lin
     if against.is_empty() {
         rows.push(Line::from(vec![
             Span::styled("  Enter", theme.key()),
-            Span::raw(" asks for the password and starts. Keep the unit powered meanwhile."),
+            Span::raw(match (view.needs_label(), view.facts.state) {
+                (true, UnitState::Loader) => " asks what the label says and starts. Keep the unit powered meanwhile.",
+                (false, UnitState::Loader) => " starts. Keep the unit powered meanwhile.",
+                _ => " asks for the password and starts. Keep the unit powered meanwhile.",
+            }),
         ]));
     } else {
         rows.extend(

@@ -44,10 +44,12 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
     };
     paragraph("Happened", &visible::sentence(&report.what));
     paragraph("Unit now", unit);
-    paragraph(
-        "Version",
-        &format!("before {}, after {}", version(report.version_before), version(report.version_after)),
-    );
+    let is_untouched = matches!(report.verdict, Verdict::Refused | Verdict::UnitRefused);
+    let versions = match (report.version_before, report.version_after) {
+        (Some(before), None) if is_untouched && report.unit == UnitNow::Application => format!("{before}, as before"),
+        (before, after) => format!("before {}, after {}", version(before), version(after)),
+    };
+    paragraph("Version", &versions);
     let (sent, total) = (format::grouped(report.records), format::grouped(report.records_total));
     paragraph("Sent", &format!("{sent} of {total} records in {}", format::minutes(report.duration)));
     if let Some(address) = report.address.filter(|_| report.verdict != Verdict::Done) {
