@@ -211,6 +211,11 @@ impl Worker {
     }
 }
 
+/// Who has a port that cannot be had: another process, or else this one itself, which has just opened it too.
+fn who_has(path: &Path) -> Option<ports::Holder> {
+    ports::other_holder(path).or_else(|| ports::holder(path))
+}
+
 fn open_exclusively(path: &Path) -> Result<OwnedFd, Cause> {
     // Looked at first: opening is not harmless for every file there is (a watchdog starts, a pipe waits).
     let metadata = fs::metadata(path).map_err(|error| match error.kind() {
@@ -233,7 +238,7 @@ fn open_exclusively(path: &Path) -> Result<OwnedFd, Cause> {
     let port = rustix::fs::open(path, flags, Mode::empty()).map_err(|error| match error {
         Errno::NOENT => Cause::Missing,
         Errno::ACCESS | Errno::PERM | Errno::ROFS => Cause::Denied { group: group_name(metadata.gid()) },
-        Errno::BUSY => Cause::Busy { holder: ports::holder(path) },
+        Errno::BUSY => Cause::Busy { holder: who_has(path) },
         Errno::NXIO | Errno::NODEV | Errno::IO => Cause::Gone,
         error => Cause::Io(error.into()),
     })?;
@@ -243,7 +248,7 @@ fn open_exclusively(path: &Path) -> Result<OwnedFd, Cause> {
     // The lock first: TIOCEXCL is the terminal's, not ours, and must not be touched while somebody else works here.
     match rustix::fs::flock(&port, FlockOperation::NonBlockingLockExclusive) {
         Ok(()) => {}
-        Err(Errno::WOULDBLOCK) => return Err(Cause::Busy { holder: ports::holder(path) }),
+        Err(Errno::WOULDBLOCK) => return Err(Cause::Busy { holder: who_has(path) }),
         Err(error) => return Err(cause(error)),
     }
     // Many programs set neither, and two readers would share what the unit says.

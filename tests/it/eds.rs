@@ -42,7 +42,8 @@ fn python_canopen_reads_the_dictionary_as_it_is() {
     let world = World::new();
     let client = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/clients/read_eds.py");
     for product in Product::all() {
-        world.run(&["eds", &product.name, "--out", "unit.eds"], b"");
+        let written = world.run(&["eds", &product.name, "--yes", "--out", "unit.eds"], b"");
+        assert_eq!(written.code, Some(0), "{}", written.err);
         let args = [client.display().to_string(), "unit.eds".into(), "127".into()];
         let args: Vec<&str> = args.iter().map(String::as_str).collect();
         let ran = Running::start(world.command_of(&PathBuf::from(&python), &args)).wait();
