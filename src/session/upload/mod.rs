@@ -38,7 +38,7 @@ const END_UNHEARD: Duration = Duration::from_millis(1500);
 const FILLER: [u8; 516] = [b'\r'; 516];
 /// How often a hold is told of while it lasts.
 const HOLD_TOLD: Duration = Duration::from_secs(1);
-/// How late the answer to that may be on a busy computer.
+/// How late a loader that was found waiting may answer what it was asked before the first record, on a busy computer.
 const LATE_ANSWER: Duration = Duration::from_secs(2);
 /// The loaders' number for a record that came while another was parked.
 const OVERRUN: u32 = 5;
