@@ -19,6 +19,9 @@ use crate::wire::{Message, Prompt, Text};
 const ANSWER: Duration = Duration::from_millis(1200);
 /// Silence behind lines that ends an answer: longer than an adapter's latency and a prompt's.
 const QUIET: Duration = Duration::from_millis(120);
+/// How long an entry without a line end has to stand still until it counts: half of one looks like another entry, and a
+/// busy computer may keep the other half back for longer than [`QUIET`].
+const STANDS_STILL: Duration = Duration::from_millis(400);
 /// How long an answer may go on: text that is none of it may come without end.
 const LONGEST_ANSWER: Duration = Duration::from_millis(4000);
 /// Answers without an entry behind which the walk counts as over: a unit may print a title or a last sentence.
@@ -151,7 +154,7 @@ impl ReadDictionary {
         {
             let moves = self.unended.replace(text.span.end) != Some(text.span.end);
             if moves && desk.now < self.asked_at + LONGEST_ANSWER {
-                self.deadline = Some(desk.now + QUIET);
+                self.deadline = Some(desk.now + STANDS_STILL);
                 return None;
             }
             self.take(text);
