@@ -124,7 +124,10 @@ fn a_program_that_is_killed_at_any_moment_is_run_again_and_that_is_all() {
             let loading = bench.start_load("u0", FAST);
             loading.wait_out(moment);
             loading.signal(Signal::KILL);
-            assert_eq!(loading.wait().code, None, "{loader} {moment}");
+            // Between the last step and the end there is hardly a moment: it may be through when the signal comes.
+            let code = loading.wait().code;
+            let is_through = code == Some(0) && moment.contains("verify");
+            assert!(code.is_none() || is_through, "{loader} {moment}: {code:?}");
             let ran = bench.load("u0", FAST);
             assert_eq!(ran.code, Some(0), "{loader} {moment}\n{}\n{}", ran.out, ran.err);
             assert_eq!(verdict(&ran)["version_after"], after);
