@@ -1,5 +1,10 @@
 //! Stories of talks with the firmware: console and unit on one cable, in virtual time.
 
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use axcon::canopen::{ObjectAddress, Value};
 use axcon::endpoint::{Arrived, Endpoint};
 use axcon::rng::Rng;
 use axcon::session::{Command, Event, Job, Origin, Outcome, Session, UnitState};
@@ -7,7 +12,7 @@ use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::stream::Source;
 
-use crate::support::bench::{Bench, axrtd8co};
+use crate::support::bench::{Bench, axrtd8co, axtc4co};
 
 #[test]
 fn the_unit_says_who_it_is() {
@@ -198,6 +203,59 @@ fn a_unit_whose_menu_does_not_name_it_is_known_by_its_product_code() {
     assert_eq!((product.value.as_str(), product.origin), ("AXRTD8CO", Origin::Dictionary));
     assert_eq!(reading.entries.len(), axrtd8co().dictionary.entries().count());
     assert!(reading.entries.iter().all(|entry| entry.known), "all of it is understood, from the first line on");
+}
+
+/// A busy computer keeps back what has come, from any byte on, and gives it with what the unit says next: seconds later,
+/// as an answer to something else.
+#[test]
+fn half_an_entry_is_never_read_as_a_value() {
+    const DIALECTS: u64 = 30;
+    let read = |dialect: u64, kept_from: Option<u64>| -> BTreeMap<ObjectAddress, (Option<Value>, String)> {
+        let mut bench = Bench::in_dialect(axtc4co(), dialect);
+        bench.run_for(Duration::from_secs(4));
+        bench.ask(Command::Identify);
+        let first = bench.received_so_far();
+        if let Some(from) = kept_from {
+            let asked_again = Rc::new(Cell::new(false));
+            let (mut kept, mut given) = (Vec::new(), false);
+            let noticed = asked_again.clone();
+            bench.disturb_answers(move |number, byte| {
+                if given || number < first + from {
+                    // What comes before the moment does not bring it nearer.
+                    noticed.set(false);
+                    return vec![byte];
+                }
+                kept.push(byte);
+                given = noticed.get();
+                if given { std::mem::take(&mut kept) } else { Vec::new() }
+            });
+            bench.disturb(move |_, byte| {
+                asked_again.set(true);
+                vec![byte]
+            });
+        }
+        match bench.ask(Command::ReadDictionary) {
+            Outcome::DictionaryRead(reading) => {
+                reading.entries.into_iter().map(|entry| (entry.at, (entry.value, entry.text))).collect()
+            }
+            // All of the first answer was kept back.
+            Outcome::NoAnswer { .. } => BTreeMap::new(),
+            outcome => panic!("kept back from {kept_from:?}: {outcome:?}"),
+        }
+    };
+    for dialect in 0..DIALECTS {
+        let whole = read(dialect, None);
+        let (mut readings, mut complete) = (0, 0);
+        for from in (61 * dialect..9_000).step_by(1_801) {
+            let read = read(dialect, Some(from));
+            for (at, shown) in &read {
+                assert_eq!(whole.get(at), Some(shown), "{at} in dialect {dialect}, kept back from byte {from} on");
+            }
+            readings += 1;
+            complete += u32::from(read.len() == whole.len());
+        }
+        assert!(complete * 2 > readings, "dialect {dialect}: {complete} of {readings} readings were complete");
+    }
 }
 
 #[test]

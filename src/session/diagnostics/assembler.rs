@@ -6,9 +6,9 @@ use crate::wire::{Text, diagnostics};
 
 /// Silence that ends a page: lines follow each other within a millisecond, an adapter adds some 20.
 const QUIET: Duration = Duration::from_millis(200);
-/// How long a text without a line end must stay as it is to count as a page's last line, and not as a row of the stream
-/// under way.
-const STILL: Duration = Duration::from_millis(40);
+/// How long a text without a line end must stay as it is to count as a page's last line, and neither as a row of the
+/// stream under way nor as the half of a line that a busy computer has got to.
+const STILL: Duration = Duration::from_millis(300);
 /// Lines of a page at most; more than a screen at 200x60 shows.
 const MOST_LINES: usize = 200;
 

@@ -94,6 +94,12 @@ impl Collector {
         trial.count() > 0
     }
 
+    /// Takes back what was read at this place: it was no whole line.
+    pub(in crate::session) fn forget(&mut self, span: Span) {
+        self.lines.retain(|line| line.span != span);
+        self.entries.retain(|_, entry| entry.span != span);
+    }
+
     /// What a unit that has not said its name is, by the product code it has shown; and where it has.
     pub(in crate::session) fn product_shown(&self) -> Option<(&'static Product, Span)> {
         let shown = self.entries.get(&PRODUCT_CODE)?;

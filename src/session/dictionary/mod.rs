@@ -19,8 +19,9 @@ use crate::wire::{Message, Prompt, Text};
 const ANSWER: Duration = Duration::from_millis(1200);
 /// Silence behind lines that ends an answer: longer than an adapter's latency and a prompt's.
 const QUIET: Duration = Duration::from_millis(120);
-/// How long an entry without a line end has to stand still until it counts: half of one looks like another entry, and a
-/// busy computer may keep the other half back for longer than [`QUIET`].
+/// How long an entry without a line end has to stand still until it counts, where it is not known whether the unit ends
+/// its lines: half of one looks like another entry, and a busy computer may keep the other half back for longer than
+/// [`QUIET`].
 const STANDS_STILL: Duration = Duration::from_millis(400);
 /// How long an answer may go on: text that is none of it may come without end.
 const LONGEST_ANSWER: Duration = Duration::from_millis(4000);
@@ -33,6 +34,8 @@ const MENU_ENTRIES: u32 = 3;
 /// Entries in a hundred that may be missing behind a walk for a second one to be worth its time: what a line loses are
 /// single lines; other software may lack whole objects.
 const LOST_ON_THE_LINE: usize = 10;
+/// Letters of a prompt at least: fewer are in any half of a line.
+const PROMPT_LETTERS: usize = 3;
 /// How often leaving is tried.
 const MOST_EXITS: u32 = 3;
 
@@ -46,6 +49,13 @@ pub(super) struct ReadDictionary {
     answered: bool,
     /// Where an entry without a line end ended when it was first looked at.
     unended: Option<u64>,
+    /// Answers whose last entry had a line end, and those whose last had none.
+    ended: u32,
+    not_ended: u32,
+    /// Entries without a line end that have been taken: halves, should it turn out that this unit ends its lines.
+    doubtful: Vec<Span>,
+    /// The letters of what stood without a line end behind the last answer.
+    prompt: String,
     idle: u32,
     steps: u32,
     menu: u32,
@@ -74,6 +84,10 @@ impl ReadDictionary {
             fresh: false,
             answered: false,
             unended: None,
+            ended: 0,
+            not_ended: 0,
+            doubtful: Vec::new(),
+            prompt: String::new(),
             idle: 0,
             steps: 0,
             menu: 0,
@@ -147,17 +161,57 @@ impl ReadDictionary {
         Outcome::NoAnswer { job: Job::ReadDictionary, awaited, heard: self.heard }
     }
 
-    fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        // The last line of an answer may have no end. Half of one looks like another entry, so it has to stand still.
-        if let (Some(text), Stage::Opening | Stage::Walking) = (desk.pending, &self.stage)
-            && self.collector.reads(text)
-        {
-            let moves = self.unended.replace(text.span.end) != Some(text.span.end);
-            if moves && desk.now < self.asked_at + LONGEST_ANSWER {
-                self.deadline = Some(desk.now + STANDS_STILL);
-                return None;
+    /// The last line of an answer may have no end: there are units of either kind, and half an entry looks like another
+    /// one. So it is taken when it stands still, of a unit that does not usually end its lines. True if more may come.
+    fn waits_for_the_rest(&mut self, desk: &Desk<'_>) -> bool {
+        let Some(text) = desk.pending.filter(|text| self.collector.reads(text)) else {
+            if self.fresh && matches!(self.stage, Stage::Walking) {
+                self.ended += 1;
             }
+            if self.ends_lines() {
+                for half in self.doubtful.drain(..) {
+                    self.collector.forget(half);
+                }
+            }
+            if let Some(text) = desk.pending {
+                self.leave_behind(text);
+            }
+            return false;
+        };
+        let moves = self.unended.replace(text.span.end) != Some(text.span.end);
+        let ends_lines = self.ends_lines();
+        if (moves || ends_lines) && desk.now < self.asked_at + LONGEST_ANSWER {
+            self.deadline = Some((desk.now + STANDS_STILL).min(self.asked_at + LONGEST_ANSWER));
+            return true;
+        }
+        self.not_ended += 1;
+        if ends_lines {
+            // Lost with the rest of it: the second walk reads it.
+            self.leave_behind(text);
+        } else {
+            self.doubtful.push(text.span);
             self.take(text);
+        }
+        false
+    }
+
+    fn ends_lines(&self) -> bool {
+        self.ended > self.not_ended
+    }
+
+    /// Text without a line end that is no entry is a prompt, or half of something. That may have been a heading: the
+    /// entries that follow would then belong to another object. A prompt is what stands there each time.
+    fn leave_behind(&mut self, text: &Text) {
+        let letters: String = text.text.chars().filter(|character| character.is_alphabetic()).collect();
+        if letters.len() < PROMPT_LETTERS || letters != self.prompt {
+            self.collector.interrupt();
+        }
+        self.prompt = letters;
+    }
+
+    fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if matches!(self.stage, Stage::Opening | Stage::Walking) && self.waits_for_the_rest(desk) {
+            return None;
         }
         let menu_is_back = self.menu.count_ones() >= MENU_ENTRIES;
         match &mut self.stage {
