@@ -90,6 +90,6 @@ fn busy_time(product: &Product, loader: LoaderKind, image: &CheckedImage) -> Dur
             PROGRAM_TIME * words as u32 + Duration::from_micros(600) * pages + ERASE_TIME * 4
         }
         // Everything is erased, in sectors of 512 words; programming goes on while characters come.
-        LoaderKind::G3 => ERASE_TIME * product.flash.program_words.div_ceil(512),
+        LoaderKind::G3 | LoaderKind::G3Early => ERASE_TIME * product.flash.program_words.div_ceil(512),
     }
 }

@@ -32,7 +32,7 @@ pub struct Args {
     /// Word everything that the manuals leave open in another way for each SEED; further units get the next seeds.
     #[arg(long, value_name = "SEED", value_parser = clap::value_parser!(u64).range(1..))]
     dialect: Option<u64>,
-    /// Which bootloader is in the unit, if not the product's own.
+    /// Which bootloader is in the unit, if not the product's own: g1, g2, g3, or g3-1.3, which hangs on odd data.
     #[arg(long, value_name = "PROFILE", value_parser = loader)]
     loader: Option<LoaderKind>,
     /// Let something go wrong: bytes lost, an XON that never comes, a reset or a power cut in the middle of a file, flash

@@ -20,11 +20,15 @@ pub enum LoaderKind {
     G2,
     /// Circular buffer, 2005 and later: XOFF behind every record.
     G3,
+    /// The same up to version 1.3: it takes the check sum of a record with an odd number of data bytes as data, and waits
+    /// for ever. The console sends whole words to every loader, so it treats both alike.
+    #[serde(rename = "g3-1.3")]
+    G3Early,
 }
 
 impl LoaderKind {
     /// All kinds, for the command line.
-    pub const ALL: [LoaderKind; 3] = [LoaderKind::G1, LoaderKind::G2, LoaderKind::G3];
+    pub const ALL: [LoaderKind; 4] = [LoaderKind::G1, LoaderKind::G2, LoaderKind::G3, LoaderKind::G3Early];
 
     /// The name the command line and the product files use.
     pub const fn name(self) -> &'static str {
@@ -32,6 +36,7 @@ impl LoaderKind {
             LoaderKind::G1 => "g1",
             LoaderKind::G2 => "g2",
             LoaderKind::G3 => "g3",
+            LoaderKind::G3Early => "g3-1.3",
         }
     }
 
@@ -39,7 +44,7 @@ impl LoaderKind {
     pub const fn outside(self) -> Outside {
         match self {
             LoaderKind::G1 | LoaderKind::G2 => Outside::Folds,
-            LoaderKind::G3 => Outside::Refuses,
+            LoaderKind::G3 | LoaderKind::G3Early => Outside::Refuses,
         }
     }
 
@@ -47,7 +52,7 @@ impl LoaderKind {
     pub const fn pacing(self) -> Pacing {
         match self {
             LoaderKind::G1 | LoaderKind::G2 => Pacing::Pages,
-            LoaderKind::G3 => Pacing::Records,
+            LoaderKind::G3 | LoaderKind::G3Early => Pacing::Records,
         }
     }
 }

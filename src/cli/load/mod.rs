@@ -37,8 +37,8 @@ pub struct Args {
     /// Send long records instead of the file's own: the same words in fewer characters, a sixth less time.
     #[arg(long)]
     pack: bool,
-    /// The loader the unit has, where it is known to be another than its product's (g1, g2, g3); what it really does
-    /// shows behind the first record in any case.
+    /// The loader the unit has, where it is known to be another than its product's (g1, g2, g3, g3-1.3); what it really
+    /// does shows behind the first record in any case.
     #[arg(long, value_name = "PROFILE", value_parser = super::emulate::loader)]
     loader: Option<LoaderKind>,
     /// Read the password from FILE; otherwise AXCON_PASSWORD is taken, or it is asked for.

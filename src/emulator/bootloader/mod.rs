@@ -32,7 +32,8 @@ impl Bootloader {
         match kind {
             LoaderKind::G1 => Bootloader::Paged(paged::Loader::start(&paged::G1, board)),
             LoaderKind::G2 => Bootloader::Paged(paged::Loader::start(&paged::G2, board)),
-            LoaderKind::G3 => Bootloader::G3(g3::Loader::start(board, may_leave)),
+            LoaderKind::G3 => Bootloader::G3(g3::Loader::start(g3::Version::V2_0, board, may_leave)),
+            LoaderKind::G3Early => Bootloader::G3(g3::Loader::start(g3::Version::V1_3, board, may_leave)),
         }
     }
 

@@ -320,6 +320,31 @@ fn line_ends_other_than_cr_are_an_error_or_silence_for_ever() {
 }
 
 #[test]
+fn half_a_word_is_filled_up_and_before_that_was_mended_it_was_the_end() {
+    let odd = s3(0, &[1, 2, 3]);
+    let sum = u8::from_str_radix(&odd[odd.len() - 3..odd.len() - 1], 16).expect("two digits");
+    let rest = [odd.clone(), s3(2, &[4, 5]), S7.to_owned()].concat();
+
+    let mut bench = erased();
+    let said = talk_over(&mut bench, &rest);
+    assert!(without_flow_control(&said).starts_with(&format!("..\r\n{LOADED}")), "{said}");
+    assert_eq!(bench.unit().flash()[..8], [1, 2, 3, 0xFF, 4, 5, 0xFF, 0xFF]);
+
+    let mut bench = Bench::new(Setup { loader: LoaderKind::G3Early, ..setup(flash_with(&old_program())) });
+    bench.run_ms(500);
+    let said = bench.keys(b"lAXIO-2010\r");
+    assert!(said.ends_with(&HEADER.replace("v2.0", "v1.3")), "{said}");
+    press_key(&mut bench);
+    bench.send(S0.as_bytes());
+    bench.run(ERASE + Duration::from_millis(100));
+    bench.take();
+    let said = talk_over(&mut bench, &rest);
+    assert_eq!(without_flow_control(&said), "", "neither a mark nor an error, and no success either");
+    assert_eq!(bench.unit().flash()[..8], [1, 2, 3, sum, 0xFF, 0xFF, 0xFF, 0xFF], "the check sum has become data");
+    assert_eq!(bench.unit().running(), Running::Loader);
+}
+
+#[test]
 fn the_usual_short_header_derails_it() {
     let mut bench = in_loader();
     let mut records = file(&new_program());

@@ -16,6 +16,7 @@ use super::super::memory::{Flash, StartDelay, Written};
 use super::super::uart::{XOFF, XON};
 use super::super::{Board, Reset};
 use crate::time::{Duration, Instant};
+pub use reader::Version;
 use reader::{Fault, Kind, Read, Reader};
 use ring::Ring;
 
@@ -24,8 +25,6 @@ pub const KEY_TIME: Duration = Duration::from_secs(10);
 /// Words erased together: a sector of the 56F8367's interleaved program flash (likely). 512 KByte take 10.2 s.
 pub const SECTOR_WORDS: u32 = 512;
 
-/// Who it is. The manual does not print it.
-const HEADER: &str = "56F83xx Serial Bootloader v2.0";
 /// What it asks before it wants the file. The manual does not print it.
 const ANY_KEY: &str = "Hit any key to continue ";
 /// What the public loader prints at the end, where the product has no text of its own.
@@ -34,6 +33,7 @@ const LOADED: &str = "Download Complete\r\nApplication started!";
 /// The loader while it runs.
 #[derive(Debug)]
 pub struct Loader {
+    version: Version,
     ring: Ring,
     reader: Reader,
     activity: Activity,
@@ -66,17 +66,18 @@ enum Activity {
 
 impl Loader {
     /// Starts the loader: it says who it is and asks for a key. `may_leave` says that there is an application to start.
-    pub fn start(board: &mut Board<'_>, may_leave: bool) -> Self {
+    pub fn start(version: Version, board: &mut Board<'_>, may_leave: bool) -> Self {
         let mut loader = Loader {
+            version,
             ring: Ring::new(),
-            reader: Reader::default(),
+            reader: Reader::new(version),
             activity: Activity::Reading,
             loading: false,
             unreadable: false,
             holds_sender: false,
             line_begun: false,
         };
-        loader.say(board, &format!("\r\n{HEADER}\r\n"));
+        loader.say(board, &format!("\r\n{}\r\n", version.header()));
         if board.product.loader.asks_for_key {
             loader.say(board, ANY_KEY);
             loader.activity = Activity::AwaitingKey { until: may_leave.then(|| board.now + KEY_TIME) };
@@ -254,7 +255,7 @@ impl Loader {
 
     /// Says what is wrong and starts over; what has been erased stays erased, what has been programmed stays.
     fn fail(&mut self, board: &mut Board<'_>, fault: Fault) {
-        self.reader = Reader::default();
+        self.reader = Reader::new(self.version);
         self.loading = false;
         self.end_line(board);
         self.say(board, &format!("Error: {:04X}\r\n", fault.bit()));
