@@ -404,12 +404,11 @@ impl Session {
         self.echo_due = self.redactor.keeps_back().then(|| self.now + ECHO_QUIET);
     }
 
-    /// What looked like the beginning of the password was none.
+    /// What looks like the beginning of the password has stood still for long enough.
     fn hand_out_echo(&mut self) {
         self.echo_due = None;
-        let bytes = self.redactor.flush();
-        if !bytes.is_empty() {
-            self.take_in(&bytes, Secrecy::Open);
+        for (bytes, secrecy) in self.redactor.flush() {
+            self.take_in(&bytes, secrecy);
         }
     }
 
@@ -434,19 +433,7 @@ impl Session {
         self.framer.push(bytes, |item| items.push(item));
         for item in items {
             match item {
-                Item::Line(mut text) => {
-                    self.password_asked = false;
-                    if !self.recognises {
-                        continue;
-                    }
-                    self.redactor.scrub(&mut text.text);
-                    if self.prompt.was(&text) {
-                        continue;
-                    }
-                    let message = self.understand(&text.text);
-                    self.conceal(&mut text);
-                    self.heard(text, message);
-                }
+                Item::Line(text) => self.line(text),
                 Item::Hold(held) => {
                     self.transmitter.hold(self.now, held);
                     self.events.push_back(Event::Held(held));
@@ -462,6 +449,39 @@ impl Session {
         });
         self.password_asked |= asks_password;
         self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);
+    }
+
+    /// A line is complete.
+    fn line(&mut self, mut text: Text) {
+        let question = self.password_asked || self.recognises;
+        let question = question.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
+        // Rows of the stream may go on while the unit waits for its password.
+        self.password_asked &= match question {
+            Some((prompt, _)) => prompt == Prompt::Password,
+            None => self.password_asked && self.vocabulary.is_row(&text.text),
+        };
+        if !self.recognises {
+            return;
+        }
+        self.redactor.scrub(&mut text.text);
+        if self.prompt.was(&text) {
+            return;
+        }
+        if let Some((prompt, at)) = question {
+            self.password_asked |= prompt == Prompt::Password;
+            let row = Text { text: text.text.split_off(at), ..text.clone() };
+            if !self.prompt.was(&text) {
+                self.hear_line(text, Message::Prompt(prompt));
+            }
+            text = row;
+        }
+        let message = self.understand(&text.text);
+        self.hear_line(text, message);
+    }
+
+    fn hear_line(&mut self, mut text: Text, message: Message) {
+        self.conceal(&mut text);
+        self.heard(text, message);
     }
 
     /// Looks at a text without a line end behind which the unit has fallen silent.

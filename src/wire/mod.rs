@@ -96,6 +96,22 @@ impl Vocabulary<'_> {
         self.layouts.iter().find_map(|layout| layout.parse_as(source, line))
     }
 
+    /// Whether a line is a row of the stream.
+    pub fn is_row(&self, line: &str) -> bool {
+        self.layouts.iter().any(|layout| layout.parse(line).is_some())
+    }
+
+    /// A question on whose line a row of the stream has come before the unit fell silent, and where that row begins.
+    pub fn question_before_row(&self, line: &str) -> Option<(Prompt, usize)> {
+        let first_end = line.find(';')?;
+        let formats = self.layouts.iter().flat_map(|layout| [&layout.field_value, &layout.process_value]);
+        formats.flat_map(|format| &format.widths).find_map(|width| {
+            let at = first_end.checked_sub(*width).filter(|&at| at > 0)?;
+            let (question, row) = line.split_at_checked(at)?;
+            self.is_row(row).then(|| self.prompt(question)).flatten().map(|prompt| (prompt, at))
+        })
+    }
+
     /// Whether a text without a line end asks for the password. Asked with every byte that comes, so cheap where it does
     /// not.
     pub fn asks_password(&self, text: &str) -> bool {
@@ -109,5 +125,32 @@ impl Vocabulary<'_> {
     /// What a text without a line end asks for, once the unit has fallen silent behind it.
     pub fn prompt(&self, text: &str) -> Option<Prompt> {
         prompt::recognise(text, &words::Words::of(text))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Product;
+
+    #[test]
+    fn a_question_is_known_before_a_row_that_came_behind_it() {
+        let products = Product::all();
+        let vocabulary = Vocabulary {
+            products: products.iter().map(|product| product.name.as_str()).collect(),
+            layouts: products.iter().map(|product| &product.stream).collect(),
+        };
+        let table = [
+            ("Password:   23.500;Disabled;OpenCct ;  25.000; 100.125", Some((Prompt::Password, 10))),
+            ("Password:     23.500;  24.000;  24.000;  25.000; 100.125", Some((Prompt::Password, 12))),
+            ("Enter Yes:  21.5; 21.5; 21.5; 21.5;Null ; 21.5; 21.5;Open", Some((Prompt::ConfirmDefaults, 11))),
+            ("  23.500;  24.000;  24.000;  25.000; 100.125", None),
+            ("Total:   23.500;  24.000;  24.000;  25.000; 100.125", None),
+            ("Password:   23.500;  24.000;  24.000", None),
+            ("Password: ", None),
+        ];
+        for (line, expected) in table {
+            assert_eq!(vocabulary.question_before_row(line), expected, "{line:?}");
+        }
     }
 }
