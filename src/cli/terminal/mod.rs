@@ -250,7 +250,7 @@ impl Conversation {
         for deed in self.keys.press(&bytes) {
             match deed {
                 Deed::Send(keys) => {
-                    let keys = keys.iter().flat_map(|&key| self.new_line.of_key(key).iter().copied()).collect();
+                    let keys = keys.iter().flat_map(|key| self.new_line.of_key(key).iter().copied()).collect();
                     self.type_keys(keys, output);
                 }
                 Deed::Leave => return Ok(true),
