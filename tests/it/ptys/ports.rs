@@ -90,7 +90,7 @@ fn a_port_that_goes_away_ends_the_connection_with_one_message() {
     let (_connection, received) = connect(unit.serial(), 115_200);
     drop(unit);
     match received.recv_timeout(PATIENCE).expect("a message") {
-        Input::Gone(error) => assert!(matches!(error.cause, Cause::Gone), "{error}"),
+        Input::Gone { error, .. } => assert!(matches!(error.cause, Cause::Gone), "{error}"),
         other => panic!("{other:?}"),
     }
     assert!(received.recv_timeout(Duration::from_millis(50)).is_err(), "one is enough");
