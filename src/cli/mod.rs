@@ -26,7 +26,7 @@ pub mod terminal;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use error::CliError;
 use output::Output;
@@ -105,41 +105,69 @@ enum Command {
     Ports(ports::Args),
     /// Find out what is at the other end.
     Identify(identify::Args),
+    /// A plain terminal: keys out, bytes in.
+    Terminal(terminal::Args),
     /// Switch the data stream on and write it down.
     Stream(stream::Args),
-    /// Read or compare object dictionaries.
-    Dictionary(dictionary::Args),
     /// Read the unit's diagnostics pages.
     Diagnostics(diagnostics::Args),
-    /// Restore the factory's object dictionary.
-    Defaults(defaults::Args),
+    /// Read or compare object dictionaries.
+    Dictionary(dictionary::Args),
     /// Put everything known of a unit on one page of HTML.
     Report(report::Args),
     /// Check an image, upload it, and verify the new banner.
     Load(load::Args),
-    /// A plain terminal: keys out, bytes in.
-    Terminal(terminal::Args),
+    /// Restore the factory's object dictionary.
+    Defaults(defaults::Args),
+    /// Work on image files: check, compare, convert, make.
+    Image(image::Args),
     /// Write a product's electronic data sheet.
     Eds(eds::Args),
     /// Host emulated units on pseudo-terminals.
     Emulate(emulate::Args),
-    /// Work on S-record images without a unit.
-    Image(image::Args),
     /// Write completions for a shell.
     Completions(manual::CompletionArgs),
     /// Write man pages.
     Man(manual::ManArgs),
 }
 
+/// The commands by what they are for, in the order in which the help lists them.
+const GROUPS: [(&str, &[&str]); 5] = [
+    ("Find a unit and talk to it", &["ports", "identify", "terminal"]),
+    ("Read a unit", &["stream", "diagnostics", "dictionary", "report"]),
+    ("Change a unit", &["load", "defaults"]),
+    ("Work without a unit", &["image", "eds", "emulate"]),
+    ("Set up your shell", &["completions", "man"]),
+];
+
 /// The whole command line as clap knows it: what completions, man pages and the reference are made from.
 pub fn command() -> clap::Command {
-    Cli::command()
+    let command = Cli::command();
+    // clap lists all commands under one heading.
+    let listed = listed(&command);
+    command.help_template(format!(
+        "{{before-help}}{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{listed}Options:\n{{options}}{{after-help}}"
+    ))
+}
+
+/// The commands in their groups, for the help.
+fn listed(command: &clap::Command) -> String {
+    let abouts = |name: &str| command.find_subcommand(name).and_then(clap::Command::get_about);
+    let group = |(title, names): &(&str, &[&str])| {
+        let rows = names.iter().map(|name| match abouts(name) {
+            Some(about) => format!("  {name:<12} {about}\n"),
+            None => format!("  {name}\n"),
+        });
+        format!("{title}:\n{}\n", rows.collect::<String>())
+    };
+    GROUPS.iter().map(group).collect()
 }
 
 /// Runs the program and gives its exit code.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args: Vec<OsString> = args.into_iter().collect();
-    let mut cli = match Cli::try_parse_from(&args) {
+    let parsed = command().try_get_matches_from(&args).and_then(|matches| Cli::from_arg_matches(&matches));
+    let mut cli = match parsed {
         Ok(cli) => cli,
         // Who asked for JSON gets the complaint as JSON; help and version are no complaints.
         Err(error) if error.use_stderr() && args.iter().any(|arg| arg == "--json") => {
@@ -190,5 +218,27 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Image(args)) => image::run(args, global, output),
         Some(Command::Completions(args)) => manual::completions(&args, output),
         Some(Command::Man(args)) => manual::man(&args, output),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_help_lists_every_command_once_in_the_order_of_the_groups() {
+        let command = command();
+        let grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        let all: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+        assert_eq!(grouped, all);
+        for help in [command.clone().render_help(), command.clone().render_long_help()] {
+            let help = help.to_string();
+            let (listed, options) = help.split_once("Options:\n").expect("options behind the commands");
+            for (title, names) in GROUPS {
+                assert!(listed.contains(&format!("\n{title}:\n  {}", names[0])), "{title}:\n{listed}");
+            }
+            assert!(listed.contains("\n  load         Check an image, upload it"), "{listed}");
+            assert!(options.contains("--port") && !options.contains("Commands:"), "{options}");
+        }
     }
 }

@@ -4,10 +4,12 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use jiff::tz::TimeZone;
+use serde::Serialize;
 
 use super::Global;
 use super::ask::{self, confirm};
 use super::error::CliError;
+use super::image::shown;
 use super::output::Output;
 use super::stream::{leave_as_found, watch};
 use super::talk::{Ended, Talk};
@@ -47,6 +49,15 @@ struct Findings {
     monitor: Monitor,
     reading: Option<DictionaryReading>,
     missing: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Object<'a> {
+    schema: &'static str,
+    file: String,
+    product: Option<&'a str>,
+    version: Option<String>,
+    missing: &'a [String],
 }
 
 /// Makes the report.
@@ -91,7 +102,17 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
         start_of_day: clock::time_of_day(start.as_millisecond()),
     };
     files::save(&args.out, contents.html().as_bytes(), global.yes)?;
-    output.remark(&format!("axcon: the report is in {}", args.out.display()));
+    let file = shown(&args.out);
+    if output.json {
+        return output.object(&Object {
+            schema: "axcon.report/1",
+            file,
+            product: facts.product.as_ref().map(|known| known.value.as_str()),
+            version: facts.version.as_ref().map(|known| known.value.to_string()),
+            missing: &findings.missing,
+        });
+    }
+    output.remark(&format!("axcon: the report is in {file}"));
     Ok(())
 }
 

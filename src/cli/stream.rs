@@ -94,7 +94,12 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if args.off {
         let outcome = talk.ask(Command::StreamOff)?;
         talk.close(output);
-        return talk.expect_done(outcome);
+        talk.expect_done(outcome)?;
+        if output.json {
+            return output.object(&OffObject { schema: "axcon.stream-off/1", stream: "off" });
+        }
+        output.remark("axcon: the stream is off");
+        return Ok(());
     }
     let sink = Sink { file, format, source: wanted, calendar: talk.calendar(), channels: None, rows: 0 };
     let period = args.period.map(Duration::from_millis);
@@ -345,6 +350,12 @@ struct Sink {
     /// How many channels the rows have, once one was written.
     channels: Option<usize>,
     rows: u64,
+}
+
+#[derive(Serialize)]
+struct OffObject {
+    schema: &'static str,
+    stream: &'static str,
 }
 
 #[derive(Serialize)]

@@ -216,6 +216,7 @@ const FILES: [(&str, &str); 2] =
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::{Prompt, Vocabulary};
 
     #[test]
     fn every_product_file_is_sound() {
@@ -243,5 +244,26 @@ mod tests {
     fn names_are_found_in_any_case() {
         assert_eq!(Product::named("axtc4co").map(|product| product.can.product_code), Some(0x0001_0114));
         assert_eq!(Product::named("AXTC4"), None);
+    }
+
+    #[test]
+    fn a_question_is_known_before_a_row_that_came_behind_it() {
+        let products = Product::all();
+        let vocabulary = Vocabulary {
+            products: products.iter().map(|product| product.name.as_str()).collect(),
+            layouts: products.iter().map(|product| &product.stream).collect(),
+        };
+        let table = [
+            ("Password:   23.500;Disabled;OpenCct ;  25.000; 100.125", Some((Prompt::Password, 10))),
+            ("Password:     23.500;  24.000;  24.000;  25.000; 100.125", Some((Prompt::Password, 12))),
+            ("Enter Yes:  21.5; 21.5; 21.5; 21.5;Null ; 21.5; 21.5;Open", Some((Prompt::ConfirmDefaults, 11))),
+            ("  23.500;  24.000;  24.000;  25.000; 100.125", None),
+            ("Total:   23.500;  24.000;  24.000;  25.000; 100.125", None),
+            ("Password:   23.500;  24.000;  24.000", None),
+            ("Password: ", None),
+        ];
+        for (line, expected) in table {
+            assert_eq!(vocabulary.question_before_row(line), expected, "{line:?}");
+        }
     }
 }

@@ -88,6 +88,13 @@ enum RawAccess {
     Rw,
 }
 
+/// Channels of a row at most, and characters of one of its fields: more than any product of this kind has, and so few
+/// that a row stays a line.
+const MOST_CHANNELS: usize = 64;
+const WIDEST_FIELD: usize = 40;
+/// Words of program flash at most: an emulated unit has all of it in memory. The largest product has 262,144.
+const MOST_WORDS: u32 = 1 << 22;
+
 /// Name of the implied entry at sub-index 0.
 const COUNT_NAME: &str = "Number of entries";
 
@@ -182,12 +189,25 @@ impl Reader<'_> {
         if layout.channels.is_empty() {
             self.complain(at, "stream.channels", "there is no channel");
         }
+        if layout.channels.len() > MOST_CHANNELS {
+            let message = format!("{} are more than {MOST_CHANNELS}", layout.channels.len());
+            self.complain(at, "stream.channels", message);
+        }
         for (name, format) in [("field_value", &layout.field_value), ("process_value", &layout.process_value)] {
             let key = format!("stream.{name}");
             let Some(&width) = format.widths.first() else {
                 self.complain(at, format!("{key}.widths"), "there is no width");
                 continue;
             };
+            if let Some(wrong) = format.widths.iter().find(|width| !(1..=WIDEST_FIELD).contains(*width)) {
+                let message = format!("{wrong} is not a width of 1 to {WIDEST_FIELD} characters");
+                self.complain(at, format!("{key}.widths"), message);
+            }
+            // Before the point stands a digit at least.
+            if format.decimals > 0 && format.decimals.saturating_add(2) > width {
+                let message = format!("{} digits behind the point do not fit into {width} characters", format.decimals);
+                self.complain(at, format!("{key}.decimals"), message);
+            }
             let words = [Some(&format.disabled), Some(&format.open), format.short.as_ref(), format.error.as_ref()];
             for word in words.into_iter().flatten() {
                 if word.is_empty() || word.len() > width {
@@ -213,6 +233,10 @@ impl Reader<'_> {
         let FlashMap { program_words, page_words, .. } = *flash.get_ref();
         if page_words == 0 || program_words == 0 || !program_words.is_multiple_of(page_words) {
             let message = format!("{program_words} words are no whole number of pages of {page_words}");
+            self.complain(flash.span().start, "flash.program_words", message);
+        }
+        if program_words > MOST_WORDS {
+            let message = format!("{program_words} words are more than {MOST_WORDS}");
             self.complain(flash.span().start, "flash.program_words", message);
         }
     }
@@ -565,6 +589,11 @@ mod tests {
             ("page_words = 256", "page_words = 255", "65536 words are no whole number of pages of 255"),
             ("start = 0x20000", "start = 0x2000", "boot_flash: 4096 words at 0x2000 do not lie behind"),
             ("_V{version}", "_V", "loader.file_name: 'AXTC4CO_V.elf.S' has no {version} in it"),
+            ("widths = [8]", "widths = [0]", "stream.field_value.widths: 0 is not a width of 1 to 40 characters"),
+            ("widths = [8]", "widths = [8, 4000000000]", "stream.field_value.widths: 4000000000 is not a width"),
+            ("decimals = 3", "decimals = 7", "field_value.decimals: 7 digits behind the point do not fit into 8"),
+            ("decimals = 3", "decimals = 9223372036854775807", "do not fit into 8 characters"),
+            ("program_words = 0x10000", "program_words = 4294967040", "4294967040 words are more than 4194304"),
             ("open = \"OpenCct\"", "open = \"OpenCircuit\"", "stream.field_value: 'OpenCircuit' is not a word"),
             ("[1, 60000]", "[100, 10]", "measurement.stream_period_ms: from 100 to 10 is no range"),
             ("index = 0x5010", "index = 0x5000", "object.index: 5000h is there already"),

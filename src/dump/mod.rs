@@ -84,12 +84,12 @@ pub struct Missing {
 #[derive(Debug, thiserror::Error)]
 pub enum DumpError {
     /// It is no JSON, or not that of a dump.
-    #[error("{name}:{}:{}: this is no dump: {source}", source.line(), source.column())]
+    #[error("{name}:{}:{}: this is no dump: {}", fault.line(), fault.column(), without_place(fault))]
     Syntax {
         /// What it was read from.
         name: String,
-        /// Where and what.
-        source: serde_json::Error,
+        /// Where and what. It is in the message, so it is no cause that would be said behind it again.
+        fault: serde_json::Error,
     },
     /// It is another kind of document.
     #[error("'{name}' has the schema '{found}', not '{SCHEMA}'")]
@@ -175,7 +175,7 @@ impl Dump {
     /// If it is none.
     pub fn parse(name: &str, text: &str) -> Result<Self, DumpError> {
         let mut dump: Dump =
-            serde_json::from_str(text).map_err(|source| DumpError::Syntax { name: name.to_owned(), source })?;
+            serde_json::from_str(text).map_err(|fault| DumpError::Syntax { name: name.to_owned(), fault })?;
         if dump.schema != SCHEMA {
             let found = visible::line(dump.schema.as_bytes());
             return Err(DumpError::Schema { name: name.to_owned(), found });
@@ -240,6 +240,12 @@ impl DumpEntry {
         let index = u16::from_str_radix(&self.index, 16).ok()?;
         Some(ObjectAddress { index, sub: self.subindex })
     }
+}
+
+/// What is wrong with a text, without the place that serde puts behind it.
+fn without_place(fault: &serde_json::Error) -> String {
+    let text = fault.to_string();
+    text.rfind(" at line ").map_or(text.as_str(), |end| &text[..end]).to_owned()
 }
 
 /// The entry's name with its object's, which tells sub-indices of the same name apart.

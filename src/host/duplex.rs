@@ -13,9 +13,9 @@ use std::thread::{self, JoinHandle};
 
 use serialport::{ErrorKind, FlowControl, SerialPort};
 
-use super::Input;
 use super::clock::Clock;
 use super::link::{Cause, LinkError, Operation, Options, QUEUED, WRITE_PATIENCE};
+use super::{Input, LinkId};
 use crate::time::Duration;
 
 /// The thread of an open port.
@@ -37,6 +37,7 @@ pub fn open(
     path: &Path,
     options: Options,
     clock: Clock,
+    link: LinkId,
     inputs: SyncSender<Input>,
 ) -> Result<(Lines, SyncSender<Vec<u8>>), LinkError> {
     let name = path.display().to_string();
@@ -54,7 +55,7 @@ pub fn open(
     let (outgoing, queue) = sync_channel(QUEUED);
     let (done, written) = sync_channel(1);
     let stop = Arc::new(AtomicBool::new(false));
-    let worker = Worker { name: name.clone(), port, stop: stop.clone(), inputs, clock };
+    let worker = Worker { name: name.clone(), port, stop: stop.clone(), link, inputs, clock };
     let thread = thread::Builder::new()
         .name("port".into())
         .spawn(move || worker.run(&queue, &done))
@@ -83,6 +84,7 @@ struct Worker {
     name: String,
     port: Box<dyn SerialPort>,
     stop: Arc<AtomicBool>,
+    link: LinkId,
     inputs: SyncSender<Input>,
     clock: Clock,
 }
@@ -111,7 +113,7 @@ impl Worker {
                 Ok(0) => return self.report(Operation::Read, Cause::Gone),
                 Ok(count) => {
                     let bytes = buffer[..count].to_vec();
-                    if !self.deliver(Input::Bytes { at: self.clock.now(), bytes }) {
+                    if !self.deliver(Input::Bytes { link: self.link, at: self.clock.now(), bytes }) {
                         return;
                     }
                 }
@@ -141,7 +143,8 @@ impl Worker {
     }
 
     fn report(&self, operation: Operation, cause: Cause) {
-        self.deliver(Input::Gone(LinkError { port: self.name.clone(), operation, cause }));
+        let error = LinkError { port: self.name.clone(), operation, cause };
+        self.deliver(Input::Gone { link: self.link, error });
     }
 
     /// Puts an input on the channel; `false` if the connection is being closed.
@@ -193,7 +196,7 @@ mod tests {
         let pty = Pty::open(115_200).expect("a pseudo-terminal");
         let (inputs, received) = super::super::channel();
         let (mut lines, outgoing) =
-            open(pty.path(), Options { baud: 115_200 }, Clock::start(), inputs).expect("opened");
+            open(pty.path(), Options { baud: 115_200 }, Clock::start(), LinkId::next(), inputs).expect("opened");
         pty.write(b"hello").expect("written");
         match received.recv_timeout(Duration::from_secs(5)) {
             Ok(Input::Bytes { bytes, .. }) => assert_eq!(bytes, b"hello"),

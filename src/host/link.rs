@@ -9,13 +9,13 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::mpsc::{SyncSender, TrySendError};
 
-use super::Input;
 use super::address::{Address, AddressError};
 use super::clock::Clock;
 use super::lines::Lines;
 use super::network::NetworkError;
 use super::ports::{self, Holder};
 use super::socket::{self, Dialled, Protocol};
+use super::{Input, LinkId};
 use crate::device::Product;
 use crate::record::Adapter;
 use crate::time::Duration;
@@ -220,6 +220,7 @@ pub struct Options {
 /// An open link. Dropping it closes the port, within [`CLOSE_PATIENCE`] and little more, whatever the other side does.
 #[derive(Debug)]
 pub struct Connection {
+    id: LinkId,
     // Closed in this order: first our side, then the unit that hangs on the other.
     lines: Lines,
     #[cfg(unix)]
@@ -267,9 +268,10 @@ impl Connection {
     pub fn open(spec: &LinkSpec, options: Options, clock: Clock, inputs: SyncSender<Input>) -> Result<Self, LinkError> {
         match spec {
             LinkSpec::Serial(path) => {
-                let (lines, outgoing) = serial::open(path, options, clock, inputs)?;
+                let id = LinkId::next();
+                let (lines, outgoing) = serial::open(path, options, clock, id, inputs)?;
                 let port = ports::describe(path);
-                let mut connection = Connection::new(spec, options, lines, outgoing, port.driver);
+                let mut connection = Connection::new(id, (spec, options), lines, outgoing, port.driver);
                 connection.adapter = port.usb.map(Adapter::from);
                 Ok(connection)
             }
@@ -315,8 +317,9 @@ impl Connection {
         inputs: SyncSender<Input>,
     ) -> Result<Self, LinkError> {
         let driver = if matches!(spec, LinkSpec::Tcp(_)) { "tcp" } else { "rfc2217" };
-        let (lines, outgoing) = socket::start(dialled, clock, inputs)?;
-        let mut connection = Connection::new(spec, options, lines, outgoing, Some(driver.into()));
+        let id = LinkId::next();
+        let (lines, outgoing) = socket::start(dialled, clock, id, inputs)?;
+        let mut connection = Connection::new(id, (spec, options), lines, outgoing, Some(driver.into()));
         if matches!(spec, LinkSpec::Tcp(_)) {
             connection.settings = "line rate set by the server".into();
         }
@@ -343,8 +346,9 @@ impl Connection {
         let hosting = Hosting { power: Power::AtFirstClient, ..Hosting::default() };
         let unit = Stage::bare(Unit::new(factory_setup(product, 0)));
         let unit = HostedUnit::start(unit, hosting).map_err(|error| failed(error.into()))?;
-        let (lines, outgoing) = serial::open(unit.serial(), options, clock, inputs)?;
-        let mut connection = Connection::new(spec, options, lines, outgoing, Some("emulator".into()));
+        let id = LinkId::next();
+        let (lines, outgoing) = serial::open(unit.serial(), options, clock, id, inputs)?;
+        let mut connection = Connection::new(id, (spec, options), lines, outgoing, Some("emulator".into()));
         connection.unit = Some((unit, product));
         Ok(connection)
     }
@@ -365,13 +369,14 @@ impl Connection {
     }
 
     fn new(
-        spec: &LinkSpec,
-        options: Options,
+        id: LinkId,
+        (spec, options): (&LinkSpec, Options),
         lines: impl Into<Lines>,
         outgoing: SyncSender<Vec<u8>>,
         driver: Option<String>,
     ) -> Self {
         Connection {
+            id,
             lines: lines.into(),
             #[cfg(unix)]
             unit: None,
@@ -401,6 +406,11 @@ impl Connection {
     /// If the link cannot do that.
     pub fn send_break(&self) -> io::Result<()> {
         self.lines.send_break()
+    }
+
+    /// What its inputs are marked with.
+    pub fn id(&self) -> LinkId {
+        self.id
     }
 
     /// The port as the user named it.

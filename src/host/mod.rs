@@ -36,6 +36,7 @@ pub mod state;
 pub mod unit;
 
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 
 use crate::endpoint::Arrived;
@@ -47,13 +48,20 @@ use link::LinkError;
 pub enum Input {
     /// Bytes came from the port.
     Bytes {
+        /// Over which connection.
+        link: LinkId,
         /// When they were read.
         at: Instant,
         /// What, at least one byte.
         bytes: Vec<u8>,
     },
     /// The port is gone. Told once for each connection; what was read before may still come behind it.
-    Gone(LinkError),
+    Gone {
+        /// Which connection has ended.
+        link: LinkId,
+        /// Why.
+        error: LinkError,
+    },
     /// The process got a signal (its number).
     Signal(i32),
     /// Bytes from standard input, where it is read as such.
@@ -62,6 +70,21 @@ pub enum Input {
     TypedEnd,
     /// A thread of the loop's own has left something for it elsewhere.
     Wake,
+}
+
+/// One connection among all that this process has ever opened; a later one is greater.
+///
+/// What comes of a connection is marked with it, since two may be open at once: the one that is given up, and the one
+/// that takes its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct LinkId(u64);
+
+impl LinkId {
+    /// Of a connection that is about to be opened.
+    pub fn next() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        LinkId(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
 }
 
 /// Inputs that wait at most: with the reader's 4 KiB each, a quarter of a megabyte, behind which the reader stops
@@ -81,6 +104,8 @@ pub fn channel() -> (SyncSender<Input>, Receiver<Input>) {
 pub struct Inbox {
     inputs: Receiver<Input>,
     waiting: VecDeque<Input>,
+    /// The connection that was closed last: of it, and of those before it, nothing is wanted any more.
+    closed: Option<LinkId>,
 }
 
 /// Nobody can put anything on the channel any more.
@@ -90,18 +115,19 @@ pub struct Closed;
 impl Inbox {
     /// Everything that comes on this channel.
     pub fn new(inputs: Receiver<Input>) -> Self {
-        Inbox { inputs, waiting: VecDeque::new() }
+        Inbox { inputs, waiting: VecDeque::new(), closed: None }
     }
 
-    /// All bytes that have come, in their pieces, up to the loss of the port if there is one.
+    /// All bytes that have come, in their pieces, up to the loss of the port if there is one. While two connections are
+    /// open, ask for the bytes of one ([`rest`](Inbox::rest)).
     pub fn arrived(&mut self) -> Vec<Arrived> {
         self.collect();
         let mut arrived = Vec::new();
         let mut others = VecDeque::new();
         while let Some(input) = self.waiting.pop_front() {
             match input {
-                Input::Bytes { at, bytes } => arrived.push(Arrived { at, bytes }),
-                Input::Gone(_) => {
+                Input::Bytes { at, bytes, .. } => arrived.push(Arrived { at, bytes }),
+                Input::Gone { .. } => {
                     self.waiting.push_front(input);
                     break;
                 }
@@ -120,7 +146,8 @@ impl Inbox {
     pub fn next(&mut self, patience: Duration) -> Result<Option<Input>, Closed> {
         if self.waiting.is_empty() {
             match self.inputs.recv_timeout(patience) {
-                Ok(input) => self.waiting.push_back(input),
+                Ok(input) if is_wanted(&input, self.closed) => self.waiting.push_back(input),
+                Ok(_) => return Ok(None),
                 Err(RecvTimeoutError::Timeout) => return Ok(None),
                 Err(RecvTimeoutError::Disconnected) => return Err(Closed),
             }
@@ -129,15 +156,46 @@ impl Inbox {
         Ok(if is_bytes { None } else { self.waiting.pop_front() })
     }
 
-    /// Forgets what has come from a link that is closed.
-    pub fn forget_link(&mut self) {
-        self.collect();
-        self.waiting.retain(|input| !matches!(input, Input::Bytes { .. } | Input::Gone(_)));
+    /// All bytes that have come over one connection, also those from behind its loss: for whoever is about to close it.
+    /// What another one has brought stays.
+    pub fn rest(&mut self, link: LinkId) -> Vec<Arrived> {
+        // The channel may be full, whatever waits here already.
+        self.take(INPUTS);
+        let mut rest = Vec::new();
+        let mut others = VecDeque::new();
+        for input in self.waiting.drain(..) {
+            match input {
+                Input::Bytes { link: from, at, bytes } if from == link => rest.push(Arrived { at, bytes }),
+                other => others.push_back(other),
+            }
+        }
+        self.waiting = others;
+        rest
+    }
+
+    /// Forgets a connection that is closed: nothing that came over it is handed out any more, not even what its threads
+    /// put on the channel in their last moment. One that was opened later loses nothing.
+    pub fn forget(&mut self, link: LinkId) {
+        self.closed = self.closed.max(Some(link));
+        let closed = self.closed;
+        self.waiting.retain(|input| is_wanted(input, closed));
     }
 
     fn collect(&mut self) {
-        let room = INPUTS.saturating_sub(self.waiting.len());
-        self.waiting.extend(self.inputs.try_iter().take(room));
+        self.take(INPUTS.saturating_sub(self.waiting.len()));
+    }
+
+    fn take(&mut self, most: usize) {
+        let closed = self.closed;
+        self.waiting.extend(self.inputs.try_iter().take(most).filter(|input| is_wanted(input, closed)));
+    }
+}
+
+/// Whether this is still to be handed out when that connection, and all before it, are closed.
+fn is_wanted(input: &Input, closed: Option<LinkId>) -> bool {
+    match input {
+        Input::Bytes { link, .. } | Input::Gone { link, .. } => Some(*link) > closed,
+        Input::Signal(_) | Input::Typed(_) | Input::TypedEnd | Input::Wake => true,
     }
 }
 
@@ -146,16 +204,31 @@ mod tests {
     use super::*;
     use link::{Cause, Operation};
 
+    const FIRST: LinkId = LinkId(1);
+    const SECOND: LinkId = LinkId(2);
+
     fn bytes(millis: u64, text: &str) -> Input {
-        Input::Bytes { at: Instant::from_millis(millis), bytes: text.into() }
+        bytes_of(FIRST, millis, text)
+    }
+
+    fn bytes_of(link: LinkId, millis: u64, text: &str) -> Input {
+        Input::Bytes { link, at: Instant::from_millis(millis), bytes: text.into() }
+    }
+
+    fn gone(link: LinkId) -> Input {
+        let error = LinkError { port: "u0".into(), operation: Operation::Read, cause: Cause::Gone };
+        Input::Gone { link, error }
+    }
+
+    fn texts(arrived: Vec<Arrived>) -> Vec<String> {
+        arrived.into_iter().map(|piece| String::from_utf8(piece.bytes).expect("text")).collect()
     }
 
     #[test]
     fn bytes_come_first_each_piece_with_its_time_and_none_from_behind_the_loss_of_the_port() {
         let (sender, inputs) = channel();
         let mut inbox = Inbox::new(inputs);
-        let gone = Input::Gone(LinkError { port: "u0".into(), operation: Operation::Read, cause: Cause::Gone });
-        for input in [bytes(1, "a"), Input::Wake, bytes(2, "b"), gone, Input::Signal(2), bytes(3, "c")] {
+        for input in [bytes(1, "a"), Input::Wake, bytes(2, "b"), gone(FIRST), Input::Signal(2), bytes(3, "c")] {
             sender.send(input).expect("there is room");
         }
         let arrived: Vec<(Instant, Vec<u8>)> =
@@ -163,7 +236,7 @@ mod tests {
         assert_eq!(arrived, [(Instant::from_millis(1), b"a".to_vec()), (Instant::from_millis(2), b"b".to_vec())]);
         let mut next = || inbox.next(Duration::ZERO);
         assert!(matches!(next(), Ok(Some(Input::Wake))));
-        assert!(matches!(next(), Ok(Some(Input::Gone(_)))));
+        assert!(matches!(next(), Ok(Some(Input::Gone { .. }))));
         assert!(matches!(next(), Ok(Some(Input::Signal(2)))));
         assert!(matches!(next(), Ok(None)), "bytes are taken by the other way");
         assert_eq!(inbox.arrived().len(), 1);
@@ -179,8 +252,27 @@ mod tests {
         for input in [bytes(1, "a"), Input::Signal(15)] {
             sender.send(input).expect("there is room");
         }
-        inbox.forget_link();
+        inbox.forget(FIRST);
         assert_eq!(inbox.arrived(), []);
         assert!(matches!(inbox.next(Duration::ZERO), Ok(Some(Input::Signal(15)))));
+    }
+
+    #[test]
+    fn what_a_new_link_says_before_the_old_one_is_closed_is_not_lost_with_it() {
+        let (sender, inputs) = channel();
+        let mut inbox = Inbox::new(inputs);
+        let send = |input| sender.send(input).expect("there is room");
+        for input in [bytes(1, "old"), bytes_of(SECOND, 2, "new"), gone(FIRST), bytes(3, " and last")] {
+            send(input);
+        }
+        assert_eq!(texts(inbox.rest(FIRST)), ["old", " and last"]);
+        inbox.forget(FIRST);
+        send(bytes(4, "too late"));
+        send(bytes_of(SECOND, 5, " and more"));
+        assert_eq!(texts(inbox.arrived()), ["new", " and more"]);
+        send(gone(FIRST));
+        assert!(matches!(inbox.next(Duration::ZERO), Ok(None)), "the loss of the old one is nothing to the new one");
+        send(gone(SECOND));
+        assert!(matches!(inbox.next(Duration::ZERO), Ok(Some(Input::Gone { link: SECOND, .. }))));
     }
 }

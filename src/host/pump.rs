@@ -96,7 +96,15 @@ impl Pump {
             }
             let wake = endpoint.poll_timeout().unwrap_or(Instant::NEVER).min(deadline);
             match self.inbox.next(self.clock.until(wake).min(LONGEST_WAIT)) {
-                Ok(Some(Input::Gone(error))) => return Err(PumpError::Link(error)),
+                Ok(Some(Input::Gone { link, error })) => {
+                    // Where the writer has noticed it first, the reader had more to tell.
+                    let rest = self.inbox.rest(link);
+                    if !rest.is_empty() {
+                        endpoint.handle_backlog(self.clock.now(), &rest);
+                        self.recorder.follow(record(endpoint));
+                    }
+                    return Err(PumpError::Link(error));
+                }
                 Ok(Some(Input::Signal(signal))) => return Err(PumpError::Interrupted(signal)),
                 Ok(Some(Input::Bytes { .. } | Input::Typed(_) | Input::TypedEnd | Input::Wake) | None) => {}
                 // The connection's threads hold the other end as long as it lives.
@@ -107,8 +115,9 @@ impl Pump {
 
     /// Closes a lost link. What it has put on the channel and nobody has taken is forgotten.
     pub fn disconnect(&mut self) {
-        self.connection = None;
-        self.inbox.forget_link();
+        if let Some(link) = self.connection.take() {
+            self.inbox.forget(link.id());
+        }
     }
 
     /// Goes on over another connection, which puts its inputs on the same channel.
@@ -160,6 +169,7 @@ impl Pump {
 mod tests {
     use super::*;
     use crate::endpoint::{Arrived, Secrecy, Transmit};
+    use crate::host::LinkId;
     use crate::host::link::{LinkSpec, Options};
     use crate::host::pty::Pty;
     use crate::record::Direction;
@@ -211,7 +221,8 @@ mod tests {
         let (_pty, mut pump, sender) = pump(Recorder::nothing());
         for (at, text) in [(1, "XOFF"), (2, "XON")] {
             let at = Instant::ZERO + Duration::from_nanos(at);
-            sender.send(Input::Bytes { at, bytes: text.into() }).expect("there is room");
+            let link = LinkId::next();
+            sender.send(Input::Bytes { link, at, bytes: text.into() }).expect("there is room");
         }
         let mut notes = Notes::default();
         let ended = pump.run(&mut notes, Instant::ZERO, |notes| &notes.record, |_, _| ControlFlow::<()>::Continue(()));
@@ -222,7 +233,8 @@ mod tests {
     #[test]
     fn that_a_recording_ends_is_told_at_once() {
         let (_pty, mut pump, sender) = pump(crate::host::recorder::tests::doomed());
-        sender.send(Input::Bytes { at: Instant::ZERO, bytes: b"x".to_vec() }).expect("there is room");
+        let x = Input::Bytes { link: LinkId::next(), at: Instant::ZERO, bytes: b"x".to_vec() };
+        sender.send(x).expect("there is room");
         let told = pump.run(
             &mut Notes::default(),
             Instant::NEVER,

@@ -38,7 +38,14 @@ pub fn save(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), SaveError>
     admit(path, overwrite)?;
     let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let beside = beside(&place);
-    let mut file = File::create_new(&beside)?;
+    let mut file = match File::create_new(&beside) {
+        // Left behind by a process of the same number that was killed: in a container they all have the same.
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            fs::remove_file(&beside)?;
+            File::create_new(&beside)?
+        }
+        created => created?,
+    };
     let written = file
         .write_all(bytes)
         .and_then(|()| file.sync_all())
@@ -71,6 +78,7 @@ mod tests {
         save(&path, b"one", false).expect("written");
         assert!(matches!(save(&path, b"two", false), Err(SaveError::Exists)));
         assert_eq!(fs::read(&path).expect("there"), b"one");
+        fs::write(beside(&path), b"half").expect("left behind");
         save(&path, b"three", true).expect("replaced");
         assert_eq!(fs::read(&path).expect("there"), b"three");
         assert!(matches!(save(folder.path(), b"four", true), Err(SaveError::NotAFile)));

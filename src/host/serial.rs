@@ -23,11 +23,11 @@ use rustix::termios::{
     ioctl_tiocnxcl, isatty, tcdrain, tcflow, tcflush, tcgetattr, tcsendbreak, tcsetattr,
 };
 
-use super::Input;
 use super::clock::Clock;
 use super::link::{Cause, LinkError, Operation, Options, QUEUED, WRITE_PATIENCE};
 use super::ports;
 use super::wait::{Stop, Stopper, ready, stop};
+use super::{Input, LinkId};
 use crate::time::Duration;
 
 /// The two threads of an open port.
@@ -52,6 +52,7 @@ pub fn open(
     path: &Path,
     options: Options,
     clock: Clock,
+    link: LinkId,
     inputs: SyncSender<Input>,
 ) -> Result<(Lines, SyncSender<Vec<u8>>), LinkError> {
     let name = path.display().to_string();
@@ -69,10 +70,11 @@ pub fn open(
         name: name.clone(),
         port: port.clone(),
         stopped: stopped.try_clone().map_err(system)?,
+        link,
         inputs: inputs.clone(),
         gone: gone.clone(),
     };
-    let writer = Worker { name: name.clone(), port: port.clone(), stopped, inputs, gone };
+    let writer = Worker { name: name.clone(), port: port.clone(), stopped, link, inputs, gone };
     let (outgoing, queue) = sync_channel(QUEUED);
     let (done, written) = sync_channel(1);
     let reader = thread::Builder::new().name("port reader".into()).spawn(move || reader.read(clock)).map_err(system)?;
@@ -136,6 +138,7 @@ struct Worker {
     name: String,
     port: Arc<OwnedFd>,
     stopped: Stop,
+    link: LinkId,
     inputs: SyncSender<Input>,
     /// Whether one of them has already said that the port is gone.
     gone: Arc<AtomicBool>,
@@ -155,7 +158,7 @@ impl Worker {
                 Ok(0) => return self.report(Operation::Read, Cause::Gone),
                 Ok(count) => {
                     let bytes = buffer[..count].to_vec();
-                    if !self.deliver(Input::Bytes { at: clock.now(), bytes }) {
+                    if !self.deliver(Input::Bytes { link: self.link, at: clock.now(), bytes }) {
                         return;
                     }
                 }
@@ -192,7 +195,8 @@ impl Worker {
 
     fn report(&self, operation: Operation, cause: Cause) {
         if !self.gone.swap(true, Ordering::Relaxed) {
-            self.deliver(Input::Gone(LinkError { port: self.name.clone(), operation, cause }));
+            let error = LinkError { port: self.name.clone(), operation, cause };
+            self.deliver(Input::Gone { link: self.link, error });
         }
     }
 

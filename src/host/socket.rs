@@ -11,11 +11,11 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-use super::Input;
 use super::address::Address;
 use super::clock::Clock;
 use super::link::{Cause, LinkError, Operation, Options, QUEUED, WRITE_PATIENCE};
 use super::network::{self, NetworkError};
+use super::{Input, LinkId};
 use crate::telnet::{self, Client};
 use crate::time::Duration;
 
@@ -88,6 +88,7 @@ pub fn dial(
 pub fn start(
     dialled: Dialled,
     clock: Clock,
+    link: LinkId,
     inputs: SyncSender<Input>,
 ) -> Result<(Lines, SyncSender<Vec<u8>>), LinkError> {
     let Dialled { name, socket, client, early } = dialled;
@@ -97,6 +98,7 @@ pub fn start(
     let shared = Arc::new(Shared {
         name,
         socket,
+        link,
         inputs,
         turn: Mutex::new(()),
         suspended: Mutex::new(client.as_ref().is_some_and(Client::is_suspended)),
@@ -158,6 +160,7 @@ impl Lines {
 struct Shared {
     name: String,
     socket: TcpStream,
+    link: LinkId,
     inputs: SyncSender<Input>,
     /// Whose turn it is to write: a reply must not get between the bytes of a piece.
     turn: Mutex<()>,
@@ -173,7 +176,7 @@ struct Shared {
 impl Shared {
     fn read(&self, mut client: Option<Client>, early: Vec<u8>, clock: Clock) {
         if !early.is_empty() {
-            self.deliver(Input::Bytes { at: clock.now(), bytes: early });
+            self.deliver(Input::Bytes { link: self.link, at: clock.now(), bytes: early });
         }
         let mut buffer = [0; READ];
         loop {
@@ -194,7 +197,7 @@ impl Shared {
                 }
             };
             if !bytes.is_empty() {
-                self.deliver(Input::Bytes { at: clock.now(), bytes });
+                self.deliver(Input::Bytes { link: self.link, at: clock.now(), bytes });
             }
             if let Some(client) = &mut client {
                 while let Some(reply) = client.poll_transmit() {
@@ -251,7 +254,8 @@ impl Shared {
 
     fn report(&self, operation: Operation, cause: Cause) {
         if !self.gone.swap(true, Ordering::Relaxed) {
-            self.deliver(Input::Gone(LinkError { port: self.name.clone(), operation, cause }));
+            let error = LinkError { port: self.name.clone(), operation, cause };
+            self.deliver(Input::Gone { link: self.link, error });
         }
     }
 

@@ -11,6 +11,7 @@ use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
+use super::save::{self, SaveError};
 use crate::device::Product;
 use crate::emulator::memory::{Parameters, ParametersError};
 use crate::emulator::{Area, Store};
@@ -77,13 +78,12 @@ pub enum StateError {
         folder: PathBuf,
     },
     /// It belongs to a unit of another product.
-    #[error("the state directory '{}' is of another product: {source}; nothing in it has been touched", folder.display())]
+    #[error("the state directory '{}' is of another product: {found}; nothing in it has been touched", folder.display())]
     OtherProduct {
         /// The directory.
         folder: PathBuf,
-        /// Which.
-        #[source]
-        source: ParametersError,
+        /// Which. It is in the message, so it is no cause that would be said behind it again.
+        found: ParametersError,
     },
     /// The system refused.
     #[error("cannot {operation} '{}'", path.display())]
@@ -114,8 +114,8 @@ impl State {
         let (flash_file, parameters_file) = (folder.join(FLASH), folder.join(PARAMETERS));
         let (flash, parameters) = (read(&flash_file)?, read(&parameters_file)?);
         let unfit = match parameters.as_deref().map(|bytes| Parameters::read(product, bytes)) {
-            Some(Err(source @ ParametersError::Product { .. })) => {
-                return Err(StateError::OtherProduct { folder: folder.to_owned(), source });
+            Some(Err(found @ ParametersError::Product { .. })) => {
+                return Err(StateError::OtherProduct { folder: folder.to_owned(), found });
             }
             Some(Err(error)) => Some(error.to_string()),
             Some(Ok(_)) | None => None,
@@ -212,11 +212,10 @@ fn keep_aside(file: &Path) -> Result<PathBuf, StateError> {
 
 /// Writes a whole file so that the old or the new content is there at any moment.
 fn replace(file: &Path, bytes: &[u8]) -> Result<(), StateError> {
-    let mut new = file.as_os_str().to_owned();
-    new.push(".new");
-    let new = PathBuf::from(new);
-    fs::write(&new, bytes).map_err(failed("write", &new))?;
-    fs::rename(&new, file).map_err(failed("replace", file))
+    save::save(file, bytes, true).map_err(|error| match error {
+        SaveError::Io(error) => failed("replace", file)(error),
+        other @ (SaveError::Exists | SaveError::NotAFile) => failed("replace", file)(io::Error::other(other)),
+    })
 }
 
 fn failed(operation: &'static str, path: &Path) -> impl FnOnce(io::Error) -> StateError {

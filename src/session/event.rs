@@ -85,6 +85,23 @@ impl LoadOrder {
             flaw: None,
         }
     }
+
+    /// Where it stands before anything has been done: the unit is being looked at.
+    pub fn at_its_beginning(&self) -> Progress {
+        let (records_total, bytes_total) = super::upload::size(self);
+        Progress {
+            phase: Phase::Check,
+            records: 0,
+            records_total,
+            bytes: 0,
+            bytes_total,
+            address: 0,
+            elapsed: Duration::ZERO,
+            moving: Duration::ZERO,
+            moved: 0,
+            held: None,
+        }
+    }
 }
 
 /// Which job.
@@ -218,7 +235,7 @@ pub struct DictionaryReading {
     pub entries: Vec<ReadEntry>,
     /// Whether the walk came to its end.
     pub complete: bool,
-    /// Lines of the view in which no entry was recognised, titles and hints among them.
+    /// Lines of the view with a number in them that nobody understood: neither an entry nor anything else known.
     pub unrecognised_lines: u64,
 }
 
@@ -254,7 +271,7 @@ pub struct Facts {
     pub nmt_state: Option<Known<String>>,
     /// Whether the stream runs, and with what.
     pub stream: Option<Source>,
-    /// Lines that no recogniser understood.
+    /// Lines with a number in them that nobody understood; titles, hints and dialogues have none.
     pub unrecognised_lines: u64,
 }
 

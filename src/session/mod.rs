@@ -25,7 +25,7 @@ use zeroize::Zeroizing;
 
 use crate::device::Product;
 use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
-use crate::record::{Direction, REDACTED, Record, Span};
+use crate::record::{Direction, REDACTED, Record};
 use crate::time::character_time;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
@@ -404,12 +404,11 @@ impl Session {
         self.echo_due = self.redactor.keeps_back().then(|| self.now + ECHO_QUIET);
     }
 
-    /// What looked like the beginning of the password was none.
+    /// What looks like the beginning of the password has stood still for long enough.
     fn hand_out_echo(&mut self) {
         self.echo_due = None;
-        let bytes = self.redactor.flush();
-        if !bytes.is_empty() {
-            self.take_in(&bytes, Secrecy::Open);
+        for (bytes, secrecy) in self.redactor.flush() {
+            self.take_in(&bytes, secrecy);
         }
     }
 
@@ -434,19 +433,7 @@ impl Session {
         self.framer.push(bytes, |item| items.push(item));
         for item in items {
             match item {
-                Item::Line(mut text) => {
-                    self.password_asked = false;
-                    if !self.recognises {
-                        continue;
-                    }
-                    self.redactor.scrub(&mut text.text);
-                    if self.prompt.was(&text) {
-                        continue;
-                    }
-                    let message = self.understand(&text.text);
-                    self.conceal(&mut text);
-                    self.heard(text, message);
-                }
+                Item::Line(text) => self.line(text),
                 Item::Hold(held) => {
                     self.transmitter.hold(self.now, held);
                     self.events.push_back(Event::Held(held));
@@ -462,6 +449,39 @@ impl Session {
         });
         self.password_asked |= asks_password;
         self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);
+    }
+
+    /// A line is complete.
+    fn line(&mut self, mut text: Text) {
+        let question = self.password_asked || self.recognises;
+        let question = question.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
+        // Rows of the stream may go on while the unit waits for its password.
+        self.password_asked &= match question {
+            Some((prompt, _)) => prompt == Prompt::Password,
+            None => self.password_asked && self.vocabulary.is_row(&text.text),
+        };
+        if !self.recognises {
+            return;
+        }
+        self.redactor.scrub(&mut text.text);
+        if self.prompt.was(&text) {
+            return;
+        }
+        if let Some((prompt, at)) = question {
+            self.password_asked |= prompt == Prompt::Password;
+            let row = Text { text: text.text.split_off(at), ..text.clone() };
+            if !self.prompt.was(&text) {
+                self.hear_line(text, Message::Prompt(prompt));
+            }
+            text = row;
+        }
+        let message = self.understand(&text.text);
+        self.hear_line(text, message);
+    }
+
+    fn hear_line(&mut self, mut text: Text, message: Message) {
+        self.conceal(&mut text);
+        self.heard(text, message);
     }
 
     /// Looks at a text without a line end behind which the unit has fallen silent.
@@ -501,7 +521,7 @@ impl Session {
     }
 
     fn heard(&mut self, text: Text, message: Message) {
-        self.learn(text.span, &message);
+        self.learn(&text, &message);
         // A unit that starts has forgotten that it stopped us, and will never say "go on".
         let starts = matches!(
             message,
@@ -522,7 +542,8 @@ impl Session {
     }
 
     /// Folds a message into the facts.
-    fn learn(&mut self, span: Span, message: &Message) {
+    fn learn(&mut self, text: &Text, message: &Message) {
+        let span = text.span;
         let before = self.facts.clone();
         let asked = self.menu_asked_at.is_some_and(|at| self.now <= at + MENU_ANSWER);
         // What comes in a dialogue is no banner, but for those that end with a reset.
@@ -531,7 +552,7 @@ impl Session {
         let origin = if asked { Origin::Menu } else { Origin::Banner };
         let facts = &mut self.facts;
         match message {
-            Message::Text => facts.unrecognised_lines += 1,
+            Message::Text => facts.unrecognised_lines += u64::from(may_hold_a_fact(&text.text)),
             Message::Refusal | Message::Prompt(_) => {}
             Message::Row(row) => {
                 facts.state = UnitState::Application;
@@ -602,7 +623,10 @@ impl Session {
         };
         let outcome = running.work.handle(signal, &mut desk);
         let cut = desk.cut;
-        if desk.understood && matches!(signal, Signal::Heard(_, Message::Text)) {
+        if desk.understood
+            && let Signal::Heard(text, Message::Text) = signal
+            && may_hold_a_fact(&text.text)
+        {
             self.facts.unrecognised_lines = self.facts.unrecognised_lines.saturating_sub(1);
         }
         if self.facts != before {
@@ -626,6 +650,12 @@ impl Session {
         self.prompt.due = None;
         self.framer.cut(|_| {});
     }
+}
+
+/// Whether a line that no recogniser understood may say something that one should have: all that is recognised has
+/// numbers in it, or is known by its words. What has none is a title, a hint or a part of a dialogue.
+fn may_hold_a_fact(line: &str) -> bool {
+    line.bytes().any(|byte| byte.is_ascii_digit())
 }
 
 impl Endpoint for Session {

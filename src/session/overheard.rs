@@ -30,10 +30,10 @@ impl Work for Dictionary {
                 None
             }
             Signal::Heard(..) if self.viewing == Some(false) => None,
-            Signal::Heard(text, _) => {
+            Signal::Heard(text, message) => {
                 let product = desk.facts.product.as_ref().and_then(|known| Product::named(&known.value));
                 self.collector.product = product.or(self.collector.product);
-                desk.understood = self.collector.line(text);
+                desk.understood = self.collector.line(text, message);
                 if desk.understood {
                     self.heard = Some(text.span);
                     self.left = false;
@@ -117,6 +117,8 @@ impl Work for Diagnostics {
             Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults | Prompt::Source(_))) => None,
             Signal::Heard(text, _) => {
                 self.heard = Some(text.span);
+                // A page is told as it is printed: nothing of it is lost.
+                desk.understood = self.switched_on;
                 self.page.line(text, desk.now);
                 None
             }

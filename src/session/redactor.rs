@@ -2,14 +2,17 @@
 //!
 //! Behind the password's own prompt everything is secret up to the end of the line. This is for the rest: a unit that
 //! says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
-//! next ones tell, for a moment at most: the session hands them out when the line has been silent.
+//! next ones tell, for a moment at most: they are handed out when the line has been silent, or when flow control stands
+//! among them, which cannot wait. The password is looked for across either, so no more of it than its first
+//! [`SHORTEST`]` - 1` characters can be seen.
 
 use zeroize::Zeroizing;
 
 use crate::endpoint::Secrecy;
 use crate::record::REDACTED;
+use crate::wire::{XOFF, XON};
 
-/// A password shorter than this is found in too much that has nothing to do with it.
+/// A password shorter than this is found in too much that has nothing to do with it, and so is its beginning.
 const SHORTEST: usize = 4;
 /// Longer ones are compared as far as this.
 const LONGEST: usize = 128;
@@ -22,6 +25,8 @@ pub(super) struct Redactor {
     fallback: Vec<usize>,
     /// How many of the secret's first bytes have come last.
     matched: usize,
+    /// How many of these have been handed out.
+    told: usize,
 }
 
 /// Bytes, and whether they are the secret.
@@ -57,41 +62,49 @@ impl Redactor {
         if self.secret.is_empty() {
             return vec![(bytes.to_vec(), Secrecy::Open)];
         }
-        let mut pieces = Vec::new();
-        let mut open = Vec::new();
+        let mut pieces = Pieces::default();
         for &byte in bytes {
+            if matches!(byte, XON | XOFF) {
+                self.tell(&mut pieces);
+                pieces.push(&[byte], Secrecy::Open);
+                continue;
+            }
             while self.matched > 0 && self.secret[self.matched] != byte {
                 let shorter = self.fallback[self.matched - 1];
-                open.extend_from_slice(&self.secret[..self.matched - shorter]);
+                let passed = self.matched - shorter;
+                pieces.push(&self.secret[self.told.min(passed)..passed], Secrecy::Open);
+                self.told = self.told.saturating_sub(passed);
                 self.matched = shorter;
             }
             if self.secret[self.matched] != byte {
-                open.push(byte);
+                pieces.push(&[byte], Secrecy::Open);
                 continue;
             }
             self.matched += 1;
             if self.matched == self.secret.len() {
-                if !open.is_empty() {
-                    pieces.push((std::mem::take(&mut open), Secrecy::Open));
-                }
-                pieces.push((self.secret.to_vec(), Secrecy::Secret));
-                self.matched = 0;
+                pieces.push(&self.secret[self.told..], Secrecy::Secret);
+                (self.matched, self.told) = (0, 0);
             }
         }
-        if !open.is_empty() {
-            pieces.push((open, Secrecy::Open));
-        }
-        pieces
+        pieces.0
     }
 
     /// Whether bytes are kept back.
     pub(super) fn keeps_back(&self) -> bool {
-        self.matched > 0
+        self.matched > self.told
     }
 
-    /// What was kept back: no more will come soon.
-    pub(super) fn flush(&mut self) -> Vec<u8> {
-        self.secret[..std::mem::take(&mut self.matched)].to_vec()
+    /// What was kept back: no more will come soon. If it does all the same, it is known as the rest.
+    pub(super) fn flush(&mut self) -> Vec<Piece> {
+        let mut pieces = Pieces::default();
+        self.tell(&mut pieces);
+        pieces.0
+    }
+
+    fn tell(&mut self, pieces: &mut Pieces) {
+        let secrecy = if self.matched < SHORTEST { Secrecy::Open } else { Secrecy::Secret };
+        pieces.push(&self.secret[self.told..self.matched], secrecy);
+        self.told = self.matched;
     }
 
     /// Replaces the secret in a text.
@@ -105,22 +118,37 @@ impl Redactor {
     }
 }
 
+/// Bytes in their order, those of the same nature together.
+#[derive(Default)]
+struct Pieces(Vec<Piece>);
+
+impl Pieces {
+    fn push(&mut self, bytes: &[u8], secrecy: Secrecy) {
+        match self.0.last_mut() {
+            _ if bytes.is_empty() => {}
+            Some((last, nature)) if *nature == secrecy => last.extend_from_slice(bytes),
+            Some(_) | None => self.0.push((bytes.to_vec(), secrecy)),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// What is left of these chunks. Behind an empty one the line falls silent.
     fn redacted(secret: &[u8], chunks: &[&[u8]]) -> Vec<u8> {
         let mut redactor = Redactor::default();
         redactor.look_for(secret);
         let mut all = Vec::new();
-        for chunk in chunks {
-            for (bytes, secrecy) in redactor.push(chunk) {
+        for chunk in chunks.iter().copied().chain([&b""[..]]) {
+            let pieces = if chunk.is_empty() { redactor.flush() } else { redactor.push(chunk) };
+            for (bytes, secrecy) in pieces {
                 let is_open = secrecy == Secrecy::Open;
                 all.extend(bytes.iter().map(|&byte| if is_open { byte } else { REDACTED }));
             }
         }
-        all.extend(redactor.flush());
         all
     }
 
@@ -138,6 +166,28 @@ mod tests {
     }
 
     #[test]
+    fn neither_flow_control_nor_a_pause_brings_the_secret_through() {
+        let said = |chunks: &[&str]| {
+            let chunks: Vec<&[u8]> = chunks.iter().map(|chunk| chunk.as_bytes()).collect();
+            String::from_utf8(redacted(b"AXIO-2010", &chunks)).expect("ASCII")
+        };
+        assert_eq!(said(&["wrong: AXIO-\x13\x1120\x1310\x11\r\n"]), "wrong: *****\x13\x11**\x13**\x11\r\n");
+        assert_eq!(said(&["A\x13X\x11IO-2010"]), "A\x13X\x11*******", "its first characters could be anything");
+        assert_eq!(said(&["AXIO-", "", "20", "", "10"]), "*********");
+        assert_eq!(said(&["AX", "", "TC4CO"]), "AXTC4CO", "the beginning of a name is none of a secret");
+        assert_eq!(said(&["AXIO-", "", "AXIO-2010"]), "**************");
+    }
+
+    #[test]
+    fn flow_control_does_not_wait() {
+        let mut redactor = Redactor::default();
+        redactor.look_for(b"AXIO-2010");
+        assert_eq!(redactor.push(b"AX\x13"), [(b"AX\x13".to_vec(), Secrecy::Open)]);
+        let told = redactor.push(b"IO\x11");
+        assert_eq!(told, [(b"IO".to_vec(), Secrecy::Secret), (b"\x11".to_vec(), Secrecy::Open)]);
+    }
+
+    #[test]
     fn a_text_is_scrubbed() {
         let mut redactor = Redactor::default();
         redactor.look_for(b"AXIO-2010");
@@ -150,16 +200,18 @@ mod tests {
         #[test]
         fn nothing_is_lost_and_the_secret_never_comes_through(
             secret in "[ab]{4,6}",
-            text in "[abc]{0,60}",
+            text in "[abc\x11\x13]{0,60}",
             cuts in prop::collection::vec(0usize..60, 0..6),
         ) {
+            // A place that is cut twice is one at which the line falls silent.
             let mut cuts: Vec<usize> = cuts.into_iter().map(|cut| cut.min(text.len())).collect();
             cuts.extend([0, text.len()]);
             cuts.sort_unstable();
             let chunks: Vec<&[u8]> = cuts.windows(2).map(|pair| &text.as_bytes()[pair[0]..pair[1]]).collect();
             let found = redacted(secret.as_bytes(), &chunks);
             prop_assert_eq!(found.len(), text.len());
-            prop_assert!(!found.windows(secret.len()).any(|window| window == secret.as_bytes()));
+            let shown: Vec<u8> = found.iter().copied().filter(|byte| !matches!(*byte, XON | XOFF)).collect();
+            prop_assert!(!shown.windows(secret.len()).any(|window| window == secret.as_bytes()));
             for (was, is) in text.bytes().zip(&found) {
                 prop_assert!(was == *is || *is == REDACTED);
             }

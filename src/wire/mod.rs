@@ -96,6 +96,22 @@ impl Vocabulary<'_> {
         self.layouts.iter().find_map(|layout| layout.parse_as(source, line))
     }
 
+    /// Whether a line is a row of the stream.
+    pub fn is_row(&self, line: &str) -> bool {
+        self.layouts.iter().any(|layout| layout.parse(line).is_some())
+    }
+
+    /// A question on whose line a row of the stream has come before the unit fell silent, and where that row begins.
+    pub fn question_before_row(&self, line: &str) -> Option<(Prompt, usize)> {
+        let first_end = line.find(';')?;
+        let formats = self.layouts.iter().flat_map(|layout| [&layout.field_value, &layout.process_value]);
+        formats.flat_map(|format| &format.widths).find_map(|width| {
+            let at = first_end.checked_sub(*width).filter(|&at| at > 0)?;
+            let (question, row) = line.split_at_checked(at)?;
+            self.is_row(row).then(|| self.prompt(question)).flatten().map(|prompt| (prompt, at))
+        })
+    }
+
     /// Whether a text without a line end asks for the password. Asked with every byte that comes, so cheap where it does
     /// not.
     pub fn asks_password(&self, text: &str) -> bool {

@@ -229,7 +229,7 @@ fn a_port_that_is_changed_under_us_ends_the_connection() {
     let (connection, received) = open(&server.link(RFC2217));
     connection.send(*b"opened").expect("queued");
     match received.recv_timeout(PATIENCE).expect("a message") {
-        Input::Gone(error) => assert!(matches!(error.cause, Cause::Baud { set: 9_600, .. }), "{error}"),
+        Input::Gone { error, .. } => assert!(matches!(error.cause, Cause::Baud { set: 9_600, .. }), "{error}"),
         other => panic!("{other:?}"),
     }
 }

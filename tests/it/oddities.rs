@@ -4,11 +4,11 @@
 use std::collections::VecDeque;
 
 use axcon::endpoint::{Endpoint, Transmit};
-use axcon::session::{Command, Job, LoadOrder, LoadReport, Outcome, UnitNow, UnitState, Verdict};
+use axcon::session::{Command, Event, Job, LoadOrder, LoadReport, Outcome, Session, UnitNow, UnitState, Verdict};
 use axcon::time::{Duration, Instant};
 use axcon::wire::stream::Source;
 
-use crate::support::bench::{order, small_image};
+use crate::support::bench::{BAUD, order, small_image};
 use crate::support::visit::{HandMade, Visit};
 
 /// What a unit has to say, and how many milliseconds later.
@@ -286,4 +286,63 @@ fn an_answer_of_a_waiting_loader_that_comes_late_is_not_the_first_records() {
     assert!(report.found_in_loader && report.remark.is_none(), "{report:?}");
     let headers = bench.wire.windows(2).filter(|start| start == b"S0").count();
     assert_eq!(headers, 2, "it was sent anew");
+}
+
+/// A row of the stream, which comes so fast that the unit is never silent for long.
+const ROW: &str = "  23.500;  24.000;  24.000;  25.000; 100.125\r\n";
+
+fn streaming(answer: impl FnMut(u8) -> Says + 'static) -> Visit<Odd> {
+    let mut unit = Odd::new(answer);
+    unit.unasked = Some((Duration::from_millis(20), ROW));
+    Visit::to(unit)
+}
+
+#[test]
+fn a_question_is_heard_though_rows_go_on_behind_it() {
+    let mut typed = Vec::new();
+    let mut bench = streaming(move |key| match key {
+        b'm' => said(MENU),
+        b'l' => said("Password: "),
+        b'd' => said("Restore the defaults? Enter Yes: "),
+        b'\r' => match std::mem::take(&mut typed).as_slice() {
+            b"AXIO-2010" => said("wrong password\r\n"),
+            b"Yes" => said("AXTC4CO V1.1.0\r\n"),
+            _ => Vec::new(),
+        },
+        key => {
+            typed.extend((!key.is_ascii_control()).then_some(key));
+            Vec::new()
+        }
+    });
+    assert_eq!(bench.ask(Command::RestoreDefaults), Outcome::Done(Job::RestoreDefaults));
+    let (outcome, heard) = bench.ask_and_listen(Command::Load(Box::new(order(small_image("AXTC4CO", "1.2.0")))));
+    let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+    assert_eq!((report.verdict, report.unit), (Verdict::UnitRefused, UnitNow::Application), "{report:?}");
+    assert_eq!(report.what, "the unit did not accept the password");
+    assert!(heard.iter().any(|event| matches!(event, Event::Row { .. })), "and the rows are not lost");
+    let kept: String = bench.session.record().entries().map(|entry| entry.bytes.escape_ascii().to_string()).collect();
+    assert!(!kept.contains("AXIO"), "{kept}");
+}
+
+#[test]
+fn what_is_typed_at_the_password_is_secret_while_rows_go_on() {
+    for mut session in [Session::new(BAUD), Session::plain(BAUD)] {
+        let mut now = Instant::ZERO;
+        session.handle_bytes(now, b"\r\nPassword: ");
+        for _ in 0..50 {
+            now += Duration::from_millis(20);
+            session.handle_timeout(now);
+            session.handle_bytes(now, ROW.as_bytes());
+            assert!(session.password_open());
+        }
+        session.command(now, Command::Keys(b"AXIO-2010\r".to_vec())).expect("taken");
+        while session.poll_transmit().is_some() {
+            now += Duration::from_millis(5);
+            session.handle_timeout(now);
+        }
+        session.handle_bytes(now, b"\r\nwrong\r\n");
+        assert!(!session.password_open(), "the question is over");
+        let kept: Vec<u8> = session.record().entries().flat_map(|entry| entry.bytes.clone()).collect();
+        assert!(!kept.windows(4).any(|window| window == b"AXIO"), "{}", kept.escape_ascii());
+    }
 }

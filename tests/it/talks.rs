@@ -6,6 +6,7 @@ use std::rc::Rc;
 
 use axcon::canopen::{ObjectAddress, Value};
 use axcon::endpoint::{Arrived, Endpoint};
+use axcon::record::Direction;
 use axcon::rng::Rng;
 use axcon::session::{Command, Event, Job, Origin, Outcome, Session, UnitState};
 use axcon::time::{Duration, Instant};
@@ -331,6 +332,34 @@ fn what_is_typed_behind_l_is_secret_however_the_unit_asks_for_it() {
     let record = String::from_utf8(record).expect("text");
     assert!(!record.contains("AXIO") && record.starts_with("ml*********\r"), "{record}");
     assert!(record.ends_with("So sei es.\r\n"), "{record}");
+}
+
+#[test]
+fn a_password_that_is_repeated_with_flow_control_or_a_pause_in_it_is_recorded_nowhere() {
+    let mut session = Session::new(115_200);
+    session.command(Instant::ZERO, Command::Keys(b"lAXIO-2010\r".to_vec())).expect("taken");
+    let mut now = Instant::ZERO;
+    let pieces: [&[u8]; 6] =
+        [b"\r\nwrong password: AXIO\x13", b"-20\x1110\r\n", b"you said AXIO-", b"2010", b" and ", b"AXIO-2010"];
+    for piece in pieces {
+        now += Duration::from_millis(40);
+        session.handle_timeout(now);
+        while session.poll_transmit().is_some() {}
+        session.handle_bytes(now, piece);
+        let is_held = session.held_since().is_some();
+        assert_eq!(is_held, piece.ends_with(b"\x13"), "flow control is obeyed at once");
+    }
+    session.handle_timeout(now + Duration::from_millis(40));
+    let from_unit = session.record().entries().filter(|entry| entry.direction == Direction::FromUnit);
+    let record: Vec<u8> = from_unit.flat_map(|entry| entry.bytes.clone()).collect();
+    assert_eq!(
+        record.escape_ascii().to_string(),
+        "\\r\\nwrong password: ****\\x13***\\x11**\\r\\nyou said ********* and *********"
+    );
+    while let Some(event) = session.poll_event() {
+        let told = format!("{event:?}");
+        assert!(!told.contains("AXIO") && !told.contains("2010"), "{told}");
+    }
 }
 
 #[test]

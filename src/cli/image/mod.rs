@@ -18,7 +18,7 @@ use super::output::Output;
 use super::{Global, files};
 use crate::device::{LoaderKind, Product};
 use crate::image::make::{self, Recipe};
-use crate::image::{self, DefectId, Report, Target};
+use crate::image::{self, DefectId, Report, Severity, Target};
 use crate::version::Version;
 
 pub use report::{DefectObject, ImageObject, defect_objects, report_text};
@@ -225,12 +225,21 @@ fn loader(name: &str) -> Result<LoaderKind, String> {
 /// # Errors
 /// If there is none of this name, or if nothing could be sent in spite of it.
 pub fn allowable(name: &str) -> Result<DefectId, String> {
-    let id: DefectId = name.parse().map_err(|error| format!("{error}; `docs/images.md` lists them"))?;
+    let id: DefectId = name.parse().map_err(|error| {
+        let known: Vec<&str> = DefectId::ALL.into_iter().filter(|id| can_be_meant(*id)).map(DefectId::name).collect();
+        format!("{error}; possible: {}", known.join(", "))
+    })?;
     if id.can_be_allowed() {
         Ok(id)
     } else {
         Err("it leaves part of the program unknown, so it cannot be allowed".into())
     }
+}
+
+/// Whether allowing it makes a difference somewhere: what is only a warning passes by itself, but for the missing
+/// identity, which is an error where a product is expected.
+fn can_be_meant(id: DefectId) -> bool {
+    id.can_be_allowed() && (id.severity() == Severity::Error || id == DefectId::NoIdentity)
 }
 
 fn flaw(name: &str) -> Result<DefectId, String> {

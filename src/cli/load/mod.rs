@@ -156,6 +156,8 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         allowed: args.allow.clone(),
         ..LoadOrder::new(image.clone(), password)
     };
+    // Until the unit has been found to be the right one the session has nothing to tell of.
+    meter.show(&order.at_its_beginning(), output);
     let ended = talk.run(Command::Load(Box::new(order)), |_, event| {
         if let Event::Progress(progress) = event {
             // The unit has been found to be the right one, and L or the first record is about to leave.

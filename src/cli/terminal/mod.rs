@@ -218,7 +218,7 @@ impl Conversation {
                 Some(at) => inputs.recv_timeout(self.clock.until(at)),
             };
             match input {
-                Ok(Input::Bytes { at, bytes }) => {
+                Ok(Input::Bytes { at, bytes, .. }) => {
                     self.last = at;
                     self.session.handle_bytes(at, &bytes);
                     self.follow(output)?;
@@ -233,7 +233,7 @@ impl Conversation {
                     self.ended = true;
                     self.last = self.clock.now();
                 }
-                Ok(Input::Gone(error)) => self.lost(link::link_error(error), output)?,
+                Ok(Input::Gone { error, .. }) => self.lost(link::link_error(error), output)?,
                 Ok(Input::Signal(_)) => return Err(CliError::reported(Kind::Interrupted)),
                 Ok(Input::Wake) | Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
@@ -250,7 +250,7 @@ impl Conversation {
         for deed in self.keys.press(&bytes) {
             match deed {
                 Deed::Send(keys) => {
-                    let keys = keys.iter().flat_map(|&key| self.new_line.of_key(key).iter().copied()).collect();
+                    let keys = keys.iter().flat_map(|key| self.new_line.of_key(key).iter().copied()).collect();
                     self.type_keys(keys, output);
                 }
                 Deed::Leave => return Ok(true),

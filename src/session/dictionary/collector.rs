@@ -6,13 +6,25 @@ use crate::canopen::ObjectAddress;
 use crate::device::Product;
 use crate::record::Span;
 use crate::session::event::{DictionaryReading, ReadEntry};
-use crate::wire::{Text, dictionary};
+use crate::session::may_hold_a_fact;
+use crate::wire::{Message, Text, dictionary};
 
 /// Entries that are kept at most; and lines, as long as nobody knows whose objects they are.
 const MOST_ENTRIES: usize = 20_000;
 
 /// Where an object dictionary says which product it is: its code (manuals, object 1018h).
 const PRODUCT_CODE: ObjectAddress = ObjectAddress::new(0x1018, 2);
+
+/// What a line was.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Read {
+    /// An entry, or the heading of an object that is known.
+    Understood,
+    /// It may be the heading of another object.
+    PerhapsHeading,
+    /// Nothing that belongs into an object dictionary.
+    Nothing,
+}
 
 /// What has been read so far.
 #[derive(Clone, Default)]
@@ -21,8 +33,8 @@ pub(in crate::session) struct Collector {
     pub(in crate::session) product: Option<&'static Product>,
     entries: BTreeMap<ObjectAddress, ReadEntry>,
     unrecognised_lines: u64,
-    /// All lines, as long as the product is not known: with it they say more.
-    lines: Vec<Text>,
+    /// All lines, as long as the product is not known: with it they say more. And whether they mean something else.
+    lines: Vec<(Text, bool)>,
     /// The object whose entries follow.
     heading: Option<u16>,
     /// The last entry that was read: its sub-index tells how the next one is written.
@@ -31,23 +43,29 @@ pub(in crate::session) struct Collector {
 
 impl Collector {
     /// Takes a line of the view, or something else. Says whether it was understood.
-    pub(in crate::session) fn line(&mut self, text: &Text) -> bool {
+    pub(in crate::session) fn line(&mut self, text: &Text, message: &Message) -> bool {
+        self.take_line(text, *message != Message::Text)
+    }
+
+    /// `otherwise`: the line means something that is no entry, as a menu behind the view does.
+    fn take_line(&mut self, text: &Text, otherwise: bool) -> bool {
         if self.product.is_none() && self.lines.len() < MOST_ENTRIES {
-            self.lines.push(text.clone());
+            self.lines.push((text.clone(), otherwise));
         }
+        let read = self.read(text);
+        let counts = read == Read::Nothing && !otherwise && may_hold_a_fact(&text.text);
+        self.unrecognised_lines += u64::from(counts);
+        read == Read::Understood
+    }
+
+    fn read(&mut self, text: &Text) -> Read {
         let product = self.product;
         let knows = |index| product.is_none_or(|product| product.dictionary.object(index).is_some());
-        let Some(line) = dictionary::line(&text.text, knows) else {
-            self.unrecognised_lines += 1;
-            return false;
-        };
+        let Some(line) = dictionary::line(&text.text, knows) else { return Read::Nothing };
         if line.index.is_some() {
             self.heading = line.index;
         }
-        let Some(index) = self.heading else {
-            self.unrecognised_lines += 1;
-            return false;
-        };
+        let Some(index) = self.heading else { return Read::Nothing };
         let object = product.and_then(|product| product.dictionary.object(index));
         let single = object.is_none_or(|object| object.entries.len() == 1);
         let before = self.last.filter(|last| last.index == index).map(|last| last.sub);
@@ -61,7 +79,7 @@ impl Collector {
                 dictionary::value(&line.rest, entry.data_type, &[&object.name, &entry.name, unit, &plain])
             }
             // A heading: no entry, but understood.
-            (Some(_), Some(_)) => return true,
+            (Some(_), Some(_)) => return Read::Understood,
             (Some(_), None) | (None, _) => None,
         };
         match (shown, entry) {
@@ -71,32 +89,30 @@ impl Collector {
                     dictionary::Shown::Nothing => None,
                 };
                 self.keep(ReadEntry { at, value, text: line.rest, span: text.span, known: true });
-                true
+                Read::Understood
             }
             // An object that the manual does not have is kept as it is printed.
             (None, None) if line.sub.is_some() => {
                 self.keep(ReadEntry { at, value: None, text: line.rest, span: text.span, known: false });
-                true
+                Read::Understood
             }
-            // A heading of such an object, or of a variable whose value stands below.
-            (None, None) => false,
-            (None, Some(_)) => {
-                self.unrecognised_lines += u64::from(line.sub.is_some());
-                false
-            }
+            // The heading of a variable whose value stands below.
+            (None, Some(_)) if line.sub.is_none() => Read::Understood,
+            (None, Some(_)) => Read::Nothing,
+            (None, None) => Read::PerhapsHeading,
         }
     }
 
     /// Whether an entry would be read from a line.
     pub(in crate::session) fn reads(&self, text: &Text) -> bool {
         let mut trial = Collector { product: self.product, heading: self.heading, last: self.last, ..Self::default() };
-        trial.line(text);
+        trial.read(text);
         trial.count() > 0
     }
 
     /// Takes back what was read at this place: it was no whole line.
     pub(in crate::session) fn forget(&mut self, span: Span) {
-        self.lines.retain(|line| line.span != span);
+        self.lines.retain(|(line, _)| line.span != span);
         self.entries.retain(|_, entry| entry.span != span);
     }
 
@@ -121,8 +137,8 @@ impl Collector {
             return;
         }
         let mut again = Collector { product, ..Collector::default() };
-        for line in &lines {
-            again.line(line);
+        for (line, otherwise) in &lines {
+            again.take_line(line, *otherwise);
         }
         for (at, entry) in &self.entries {
             if entry.known || !again.entries.contains_key(at) {

@@ -100,10 +100,10 @@ impl ReadDictionary {
     }
 
     /// Takes a line of an answer. What has been read before is no progress: a unit may repaint for ever.
-    fn take(&mut self, text: &Text) -> bool {
+    fn take(&mut self, text: &Text, message: &Message) -> bool {
         self.answered = true;
         let before = self.collector.count();
-        let understood = self.collector.line(text);
+        let understood = self.collector.line(text, message);
         // The second time round everything has been read before.
         self.fresh |= self.collector.count() > before || (self.again && understood);
         understood
@@ -190,7 +190,7 @@ impl ReadDictionary {
             self.leave_behind(text);
         } else {
             self.doubtful.push(text.span);
-            self.take(text);
+            self.take(text, &Message::Text);
         }
         false
     }
@@ -292,7 +292,7 @@ impl Work for ReadDictionary {
                         self.leave(desk, outcome);
                     }
                     (_, Stage::Opening | Stage::Walking) => {
-                        desk.understood = self.take(text);
+                        desk.understood = self.take(text, message);
                     }
                 }
                 None

@@ -21,6 +21,7 @@ use crate::image::DefectId;
 use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text, visible};
+use records::Size;
 use transfer::{Stall, Transfer};
 use verify::{After, NEW_BANNER};
 
@@ -129,6 +130,13 @@ enum Unheard {
     Key,
     /// [`FILLER`].
     Filler,
+}
+
+/// Records and characters that an order sends, as far as that is known before the loader has shown what it is.
+pub(super) fn size(order: &LoadOrder) -> (usize, usize) {
+    let size = if order.packed { Size::Packed(records::LONGEST) } else { Size::AsInFile };
+    let records = records::build(order.image.image(), size, records::LINE_END);
+    (records.len(), records.iter().map(|record| record.text.len()).sum())
 }
 
 impl Upload {

@@ -5,8 +5,11 @@
 //! loop without an input or a due timer. Files, ports and folders are looked at in threads of their own, and a network
 //! link is dialled in one, so that a slow disk or a silent host does not hold the keys.
 
+mod connecting;
 mod files;
 mod player;
+#[cfg(all(test, unix))]
+mod tests;
 
 use std::io;
 use std::path::PathBuf;
@@ -16,19 +19,20 @@ use std::thread;
 
 use ratatui::crossterm::event::Event as TerminalEvent;
 
+use connecting::DialResult;
 use player::{Player, Step};
 
-use super::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Noted, Options, Palette, Playback};
+use super::{App, Effect, Failure, ImageFacts, Input, Options, Palette, Playback};
+use crate::endpoint::Arrived;
 use crate::host;
 use crate::host::Inbox;
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
-use crate::host::link::{self, Connection, LinkError, LinkSpec};
+use crate::host::link::{Connection, LinkError, LinkSpec};
 use crate::host::ports;
 use crate::host::recorder::{Plan, Recorder};
 use crate::host::replay::{Recording, RecordingError};
 use crate::host::signal::{self, Signals};
-use crate::host::socket::Dialled;
 use crate::host::terminal::{self, Screen};
 use crate::image::DefectId;
 use crate::time::{Duration, Instant};
@@ -92,41 +96,16 @@ pub fn run(world: World) -> io::Result<End> {
         palette: world.palette,
         size: (size.width, size.height),
     });
-    let (answer, answers) = channel();
-    let (dialling, dialled) = channel();
-    let (found, waker) = (answer.clone(), sender.clone());
+    let mut console = Console::new(app, world, clock, sender, inputs, keys);
+    let (found, waker) = (console.answer.clone(), console.sender.clone());
     // Without a watch, R looks again.
     let _ = ports::watch(move || {
         if found.send(Input::PortsListed(files::ports())).is_ok() {
             let _ = waker.try_send(host::Input::Wake);
         }
     });
-    let mut console = Console {
-        app,
-        world,
-        clock,
-        inbox: Inbox::new(inputs),
-        keys,
-        sender,
-        answer,
-        answers,
-        link: None,
-        dialling,
-        dialled,
-        dial: 0,
-        comeback: None,
-        retry: None,
-        player: None,
-        skew: Duration::ZERO,
-        recorder: Recorder::nothing(),
-        suspends: false,
-        over: None,
-    };
     console.serve(&mut screen)
 }
-
-/// Which dial, of what, and what came of it.
-type DialResult = (u64, String, LinkSpec, Result<Dialled, LinkError>);
 
 struct Console {
     app: App,
@@ -160,6 +139,39 @@ struct Console {
 }
 
 impl Console {
+    fn new(
+        app: App,
+        world: World,
+        clock: Clock,
+        sender: SyncSender<host::Input>,
+        inputs: Receiver<host::Input>,
+        keys: Receiver<TerminalEvent>,
+    ) -> Self {
+        let (answer, answers) = channel();
+        let (dialling, dialled) = channel();
+        Console {
+            app,
+            world,
+            clock,
+            inbox: Inbox::new(inputs),
+            keys,
+            sender,
+            answer,
+            answers,
+            link: None,
+            dialling,
+            dialled,
+            dial: 0,
+            comeback: None,
+            retry: None,
+            player: None,
+            skew: Duration::ZERO,
+            recorder: Recorder::nothing(),
+            suspends: false,
+            over: None,
+        }
+    }
+
     /// The console's time: the clock's, or that of the recording that is played. Never runs backward.
     fn now(&self) -> Instant {
         self.player.as_ref().map_or_else(|| self.clock.now() + self.skew, Player::now)
@@ -224,7 +236,7 @@ impl Console {
             // The channel cannot be closed, since this struct holds a sender.
             let Ok(Some(input)) = self.inbox.next(wake.since(self.clock.now()).min(LONGEST_WAIT)) else { continue };
             let leaves = match input {
-                host::Input::Gone(error) => {
+                host::Input::Gone { error, .. } => {
                     let failure = (self.world.explain)(error);
                     self.lose_link(failure)
                 }
@@ -278,7 +290,11 @@ impl Console {
 
     /// Hands the app the bytes that have come. Gives `true` when it is to end.
     fn take_arrived(&mut self) -> bool {
-        let mut arrived = self.inbox.arrived();
+        let arrived = self.inbox.arrived();
+        self.hand_in(arrived)
+    }
+
+    fn hand_in(&mut self, mut arrived: Vec<Arrived>) -> bool {
         if arrived.is_empty() {
             return false;
         }
@@ -318,10 +334,7 @@ impl Console {
                     }
                     match (self.world.resolve)(&name) {
                         Ok(spec) if spec.is_network() => self.dial(name, spec),
-                        Ok(spec) => {
-                            let opened = self.open(&name, spec);
-                            leaves |= self.handle(opened);
-                        }
+                        Ok(spec) => leaves |= self.open(&name, spec),
                         Err(failure) => leaves |= self.handle(Input::LinkFailed(failure)),
                     }
                 }
@@ -376,74 +389,6 @@ impl Console {
             }
         }
         leaves
-    }
-
-    fn open(&mut self, name: &str, spec: LinkSpec) -> Input {
-        if let LinkSpec::Replay(path) = &spec {
-            return match Recording::open(path) {
-                Ok(recording) => {
-                    self.close_link();
-                    let player = Player::begin(name, path.clone(), recording, self.now());
-                    let info = player.link_info(self.world.baud);
-                    self.player = Some(player);
-                    Input::LinkOpened(info)
-                }
-                Err(error) => Input::LinkFailed((self.world.unreadable)(error)),
-            };
-        }
-        match (self.world.open)(&spec, self.world.baud, self.clock, self.sender.clone()) {
-            Ok(connection) => self.begin(name, connection, spec),
-            Err(failure) => Input::LinkFailed(failure),
-        }
-    }
-
-    /// Begins to dial a network link, in a thread: a host that is switched off answers nothing for seconds.
-    fn dial(&mut self, name: String, spec: LinkSpec) {
-        let (dial, clock, options) = (self.dial, self.clock, link::Options { baud: self.world.baud });
-        let (dialling, sender) = (self.dialling.clone(), self.sender.clone());
-        in_thread("dial", move || {
-            let result = Connection::dial(&spec, options, clock);
-            if dialling.send((dial, name, spec, result)).is_ok() {
-                let _ = sender.try_send(host::Input::Wake);
-            }
-        });
-    }
-
-    /// Takes what came of dialling, unless the user has gone on to something else. Gives `true` when it is to end.
-    fn take_dialled(&mut self, (dial, name, spec, result): DialResult) -> bool {
-        if dial != self.dial {
-            return false;
-        }
-        let options = link::Options { baud: self.world.baud };
-        let connection =
-            result.and_then(|dialled| Connection::over(&spec, dialled, options, self.clock, self.sender.clone()));
-        let input = match connection {
-            Ok(connection) => self.begin(&name, connection, spec),
-            Err(error) => Input::LinkFailed((self.world.explain)(error)),
-        };
-        self.handle(input)
-    }
-
-    /// Takes over an open link and starts its recording.
-    fn begin(&mut self, name: &str, connection: Connection, spec: LinkSpec) -> Input {
-        // What the new link has said in the moment since it is open goes with what the old one has.
-        self.close_link();
-        self.recorder = Recorder::start_ahead(&self.world.recording, &connection, self.clock, self.skew);
-        let recording = self.recorder.path().map(|path| path.display().to_string());
-        let options = link::Options { baud: self.world.baud };
-        self.comeback = Comeback::of(&spec, options);
-        self.link = Some(connection);
-        let start_of_day = host::clock::day_before(self.clock.time_of_day(), self.skew);
-        Input::LinkOpened(LinkInfo {
-            link: name.to_owned(),
-            baud: self.world.baud,
-            read_only: false,
-            recording,
-            noted: (self.world.noted)(name).map(|(product, image)| Noted { product, image }),
-            start_of_day,
-            start_millis: self.clock.wall(Instant::ZERO).as_millisecond()
-                - i64::try_from(self.skew.as_millis()).unwrap_or_default(),
-        })
     }
 
     /// Plays what is due of a recording.
@@ -515,51 +460,6 @@ impl Console {
                 let _ = sender.try_send(host::Input::Wake);
             }
         });
-    }
-
-    fn lose_link(&mut self, failure: Failure) -> bool {
-        if self.link.is_none() {
-            return false;
-        }
-        let recorder = std::mem::take(&mut self.recorder);
-        let mut comeback = self.comeback.take();
-        self.close_link();
-        if let Some(comeback) = &mut comeback {
-            comeback.lost();
-            self.recorder = recorder;
-            self.recorder.mark(self.now(), "link lost");
-            self.retry = Some(self.clock.now() + Comeback::RETRY);
-        }
-        self.comeback = comeback;
-        self.handle(Input::LinkGone(failure))
-    }
-
-    /// Looks whether the lost link is there again.
-    fn look_for_link(&mut self) {
-        let Some(comeback) = &self.comeback else { return self.retry = None };
-        let Some(connection) = comeback.open(self.clock, self.sender.clone()) else {
-            self.retry = Some(self.clock.now() + Comeback::RETRY);
-            return;
-        };
-        self.retry = None;
-        let name = connection.port().to_owned();
-        self.recorder.mark(self.now(), &format!("link back as {name}"));
-        self.link = Some(connection);
-        self.handle(Input::LinkBack(name));
-    }
-
-    /// Closes the link; what it has put on the channel and nobody has taken is forgotten.
-    fn close_link(&mut self) {
-        // The console's time goes on from where the recording's stands.
-        let now = self.now();
-        self.player = None;
-        self.skew += now.since(self.now());
-        self.comeback = None;
-        self.retry = None;
-        if self.link.take().is_some() {
-            self.inbox.forget_link();
-        }
-        self.recorder = Recorder::nothing();
     }
 
     /// Finds something out in a thread, which wakes the loop when it has.

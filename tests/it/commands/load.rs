@@ -55,6 +55,10 @@ fn an_upload_in_json_is_progress_line_by_line_and_then_the_verdict() {
     for phase in ["enter-loader", "transfer", "finish", "verify"] {
         assert!(phases.contains(&phase), "{phases:?}");
     }
+    // What is said before the unit is known to be the right one agrees with what is sent then.
+    assert_eq!(phases.iter().filter(|phase| **phase == "check").count(), 1, "{phases:?}");
+    assert_eq!((phases[0], &progress[0]["record"]), ("check", &0.into()));
+    assert_eq!(progress[0]["records"], verdict["records_total"]);
     let bytes: Vec<u64> = progress.iter().filter_map(|object| object["bytes"].as_u64()).collect();
     assert!(bytes.is_sorted(), "{bytes:?}");
     assert_eq!(bytes.last().copied(), progress[0]["bytes_total"].as_u64());

@@ -65,6 +65,7 @@ fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
     let one = json(&std::fs::read_to_string(world.path("one.json")).expect("written"));
     assert_eq!((&one["schema"], &one["product"]), (&"axcon.dictionary/1".into(), &"AXTC4CO".into()));
     assert_eq!((&one["complete"], &one["missing"]), (&true.into(), &serde_json::json!([])));
+    assert_eq!(one["unrecognised_lines"], 0, "titles, hints and the menu behind the view are none");
     let entries = one["entries"].as_array().expect("a list");
     assert_eq!(entries.len(), 227);
     let deviating: Vec<String> = entries
@@ -88,6 +89,10 @@ fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
     let bad = world.run(&["dictionary", "diff", "u1-nowhere.json", "factory:axtc4co"], b"");
     assert_eq!(bad.code, Some(2));
     assert!(bad.err.contains("cannot read the dump 'u1-nowhere.json'"), "{}", bad.err);
+    fs::write(world.path("other.json"), "{\"a\": 1}").expect("written");
+    let bad = world.run(&["dictionary", "diff", "other.json", "factory:axtc4co"], b"");
+    let said = "axcon: other.json:1:8: this is no dump: missing field `schema`\n";
+    assert!(bad.err.starts_with(said), "what is wrong once, and its place once: {}", bad.err);
     let unasked = world.run(&["dictionary", "dump", "--port", "u1"], b"");
     assert_eq!(unasked.code, Some(2), "{}", unasked.err);
 }
@@ -119,11 +124,14 @@ fn a_report_tells_all_of_a_unit_and_its_recording_tells_the_same() {
     ] {
         assert!(live.contains(said), "no {said} in\n{live}");
     }
-    assert_eq!(bench.run(&["stream", "--off", "--json"]).code, Some(0));
+    assert_eq!(json(&bench.run(&["stream", "--off", "--json"]).out)["stream"], "off");
 
-    let replay = ["report", "--out", "again.html", "--port", "replay:said.cast"];
+    let replay = ["report", "--out", "again.html", "--port", "replay:said.cast", "--json"];
     let ran = bench.world.run(&replay, b"");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let said = json(&ran.out);
+    assert_eq!((&said["schema"], &said["file"]), (&"axcon.report/1".into(), &"again.html".into()));
+    assert_eq!((&said["product"], &said["missing"]), (&"AXTC4CO".into(), &serde_json::json!([])), "{said}");
     let again = page("again.html");
     let section = |page: &str, name: &str| {
         let text = page.split(&format!("<h2>{name}</h2>")).nth(1).and_then(|text| text.split("<h2>").next());
@@ -282,4 +290,42 @@ fn what_is_no_text_on_standard_input_ends_no_emulator() {
         objects(&ran.out).into_iter().filter(|object| object["schema"] == "axcon.emulate-answer/1").collect();
     let refused = answers.iter().filter(|answer| answer["ok"] == false && answer["unit"].is_null()).count();
     assert_eq!(refused, 2, "{}", ran.out);
+}
+
+#[test]
+fn a_log_that_cannot_be_written_is_said_before_the_port_is_looked_at() {
+    let world = World::new();
+    let ran = world.run(&["terminal", "--log", "nowhere/log", "--port", "no-such-port"], b"");
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.starts_with("axcon: cannot write the log 'nowhere/log': "), "{}", ran.err);
+}
+
+#[test]
+fn a_defect_that_cannot_be_allowed_is_answered_with_those_that_can() {
+    let world = World::new();
+    let ran = world.run(&["image", "check", "x.S", "--allow", "foo"], b"");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    let (_, known) = ran.err.split_once("there is no defect called 'foo'; possible: ").expect(&ran.err);
+    let known: Vec<&str> = known.lines().next().unwrap_or_default().split(", ").collect();
+    assert!(known.contains(&"bad-checksum") && known.contains(&"no-identity"), "{known:?}");
+    for name in known {
+        let ran = world.run(&["image", "check", "x.S", "--allow", name], b"");
+        assert_eq!(ran.code, Some(5), "{name} is taken, the file is missing: {}", ran.err);
+    }
+    let ran = world.run(&["image", "check", "x.S", "--allow", "no-data"], b"");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+}
+
+#[test]
+fn what_is_no_fact_is_not_counted_as_not_recognised() {
+    let bench = Bench::new();
+    for args in [&["identify", "--json"][..], &["identify", "--json", "--deep", "--yes", "--record", "deep.cast"]] {
+        let ran = bench.run(args);
+        assert_eq!(json(&ran.out)["unrecognised_lines"], 0, "{args:?}: {}", ran.out);
+    }
+    assert_eq!(bench.run(&["diagnostics", "--count", "2", "--record", "pages.cast"]).code, Some(0));
+    for recording in ["replay:deep.cast", "replay:pages.cast"] {
+        let ran = bench.world.run(&["identify", "--json", "--port", recording], b"");
+        assert_eq!(json(&ran.out)["unrecognised_lines"], 0, "{recording}: {}", ran.out);
+    }
 }

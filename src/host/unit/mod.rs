@@ -1,0 +1,241 @@
+//! An emulated unit on a pseudo-terminal, in real time, in a thread of its own.
+//!
+//! Here is what it is hosted as and what it can be told; `serving` is its thread.
+
+mod serving;
+
+use std::io::{self, PipeWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::thread::{self, JoinHandle};
+
+use super::pty::Pty;
+use super::state::{State, StateError};
+use crate::device::Product;
+use crate::emulator::scenario::{Stage, Verb};
+use crate::emulator::{Setup, Store};
+use crate::endpoint::Endpoint;
+use crate::image::make;
+use crate::time::Instant;
+use serving::Host;
+
+/// What can be hosted: a unit's serial port with the knobs the host needs.
+pub trait Hosted: Endpoint + Send + 'static {
+    /// Supply voltage comes.
+    fn power_on(&mut self, now: Instant);
+    /// Does something to the unit; gives what there is to say about it, or why it refuses.
+    ///
+    /// # Errors
+    /// If the unit refuses.
+    fn perform(&mut self, now: Instant, verb: &Verb) -> Answer;
+    /// Whether the client has heard XOFF and not yet XON.
+    fn holds_sender(&self) -> bool;
+    /// Another client has come, which knows nothing of an XOFF.
+    fn forget_hold(&mut self) {}
+    /// Bytes that an adapter takes ahead of the line, beside [`AHEAD`].
+    fn queue(&self) -> usize {
+        0
+    }
+    /// Whether the cable is in.
+    fn is_plugged(&self) -> bool {
+        true
+    }
+    /// The next write to memory that outlives the power.
+    fn poll_store(&mut self) -> Option<Store>;
+}
+
+/// What a verb brought: something to say, nothing, or a refusal.
+pub type Answer = Result<Option<String>, String>;
+
+impl Hosted for Stage {
+    fn power_on(&mut self, now: Instant) {
+        Stage::power_on(self, now);
+    }
+
+    fn perform(&mut self, now: Instant, verb: &Verb) -> Answer {
+        Stage::perform(self, now, verb)
+    }
+
+    fn holds_sender(&self) -> bool {
+        self.holds_client()
+    }
+
+    fn forget_hold(&mut self) {
+        Stage::forget_hold(self);
+    }
+
+    fn queue(&self) -> usize {
+        Stage::queue(self)
+    }
+
+    fn is_plugged(&self) -> bool {
+        Stage::is_plugged(self)
+    }
+
+    fn poll_store(&mut self) -> Option<Store> {
+        Stage::poll_store(self)
+    }
+}
+
+/// A hosted unit. Dropping it takes the cable away, after the client had a moment to read what was sent.
+#[derive(Debug)]
+pub struct HostedUnit {
+    serial: PathBuf,
+    counts: Arc<Counts>,
+    orders: SyncSender<Order>,
+    /// A byte on it says that there is a command; its end says that it is over.
+    bell: Option<PipeWriter>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Hears what a client opens now that the cable is in again.
+pub type Replugged = Box<dyn FnMut(&Path) + Send>;
+
+/// How a unit is hosted.
+#[derive(Default)]
+pub struct Hosting {
+    /// Whether the client's bytes arrive as on a wire.
+    pub line_rate: LineRate,
+    /// When the unit gets its power.
+    pub power: Power,
+    /// Where the unit's memories are kept; nowhere if `None`.
+    pub state: Option<State>,
+    /// Decides what garbage looks like.
+    pub seed: u64,
+    /// Called from the unit's thread when a cable that was pulled is in again, with what a client opens from then on.
+    pub replugged: Option<Replugged>,
+    /// Called once, from the unit's thread, if hosting fails later on.
+    pub failed: Option<Box<dyn FnOnce(HostError) + Send>>,
+}
+
+/// Whether the client's bytes arrive as on a wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LineRate {
+    /// At [`BAUD`]; a client at another rate gets garbage and sends garbage.
+    #[default]
+    Real,
+    /// As fast as they come, whatever rate the client has set.
+    Off,
+}
+
+/// When the unit gets its power.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Power {
+    /// At once, heard by nobody, like a unit on a running machine.
+    #[default]
+    AtStart,
+    /// When the first client opens the port, so that it hears the power-up messages.
+    AtFirstClient,
+}
+
+/// What a hosted unit is told, and who hears the answer.
+struct Order {
+    verb: Verb,
+    answered: Box<dyn FnOnce(Answer) + Send>,
+}
+
+/// Why a unit is not hosted, or no longer.
+#[derive(Debug, thiserror::Error)]
+pub enum HostError {
+    /// The pseudo-terminal.
+    #[error("cannot {0} a pseudo-terminal")]
+    Pty(&'static str, #[source] io::Error),
+    /// The state directory.
+    #[error(transparent)]
+    State(#[from] StateError),
+}
+
+/// What became of the bytes, for a bench or a test to look at.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Bytes that reached the unit.
+    pub to_unit: AtomicU64,
+    /// Bytes that the client could read.
+    pub to_client: AtomicU64,
+    /// Bytes of the unit that were lost: the client read too slowly, or was not there.
+    pub lost: AtomicU64,
+}
+
+/// Line rate of all units (AXTC4CO manual, chapter 4).
+pub const BAUD: u32 = 115_200;
+
+/// Characters the line runs ahead of the unit: the transmit buffer of a 16550, which goes on after an XOFF too.
+pub const AHEAD: usize = 16;
+
+/// Orders that wait at most: they are a person's, or a script's line by line.
+const ORDERS: usize = 64;
+
+impl HostedUnit {
+    /// Puts a unit on a new pseudo-terminal and lets time run.
+    ///
+    /// # Errors
+    /// If the system gives no pseudo-terminal or no thread.
+    pub fn start<U: Hosted>(unit: U, mut hosting: Hosting) -> Result<Self, HostError> {
+        let pty = Pty::open(BAUD).map_err(|error| HostError::Pty("open", error))?;
+        let (ring, bell) = io::pipe().map_err(|error| HostError::Pty("watch", error))?;
+        let (sender, orders) = sync_channel(ORDERS);
+        let counts = Arc::new(Counts::default());
+        let serial = pty.path().to_owned();
+        let failed = hosting.failed.take();
+        let host = Host::new(unit, hosting, pty, counts.clone());
+        let thread = thread::Builder::new()
+            .name("emulated unit".into())
+            .spawn(move || {
+                if let Err(error) = host.run(ring, &orders)
+                    && let Some(failed) = failed
+                {
+                    failed(error);
+                }
+            })
+            .map_err(|error| HostError::Pty("serve", error))?;
+        Ok(HostedUnit { serial, counts, orders: sender, bell: Some(bell), thread: Some(thread) })
+    }
+
+    /// What a client opens, as long as nobody has pulled the cable.
+    pub fn serial(&self) -> &Path {
+        &self.serial
+    }
+
+    /// What became of the bytes.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Has something done to the unit; `answered` hears what came of it, from the unit's thread. `false` if too much
+    /// waits to be done, or the unit has ended.
+    pub fn order(&self, verb: Verb, answered: impl FnOnce(Answer) + Send + 'static) -> bool {
+        let queued = match self.orders.try_send(Order { verb, answered: Box::new(answered) }) {
+            Ok(()) => true,
+            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
+        };
+        queued && self.bell.as_ref().is_some_and(|mut bell| bell.write_all(&[1]).is_ok())
+    }
+}
+
+impl Drop for HostedUnit {
+    fn drop(&mut self) {
+        self.bell = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What a unit is made of as it leaves the factory.
+pub fn factory_setup(product: &'static Product, seed: u64) -> Setup {
+    let loader = product.loader.kind;
+    Setup { product, loader, seed, dialect: 0, flash: factory_flash(product), parameters: Vec::new() }
+}
+
+/// The program flash of a unit as it leaves the factory: the sample image of its first version, erased behind it.
+pub fn factory_flash(product: &Product) -> Vec<u8> {
+    let mut flash = vec![0xFF; product.flash.program_words as usize * 2];
+    let target = product.target();
+    let words = make::usual_words(&target);
+    let version = product.loader.factory_version;
+    let program = make::program(&make::Recipe { target: &target, version, words, flaw: None });
+    flash[..program.len()].copy_from_slice(&program);
+    flash
+}

@@ -1,0 +1,91 @@
+//! The loop without its terminal: what happens around links that no machine in virtual time can show.
+
+use std::sync::mpsc::sync_channel;
+
+use ratatui::crossterm::event::KeyCode;
+
+use super::*;
+use crate::host::link::Options as LinkOptions;
+use crate::host::pty::Pty;
+
+/// A console that has been told nothing yet.
+fn console() -> Console {
+    let world = World {
+        link: None,
+        baud: 115_200,
+        recording: Plan::Nothing,
+        palette: Palette::Mono,
+        resolve: |name| Ok(LinkSpec::Serial(name.into())),
+        open: |spec, baud, clock, inputs| {
+            let connection = Connection::open(spec, LinkOptions { baud }, clock, inputs.clone());
+            let connection = connection.map_err(|error| Failure { text: error.to_string(), hints: Vec::new() })?;
+            // A reader that is quicker than whoever has opened the link.
+            let (link, bytes) = (connection.id(), format!("hello from {}\r\n", spec).into_bytes());
+            inputs.send(host::Input::Bytes { link, at: clock.now(), bytes }).expect("there is room");
+            Ok(connection)
+        },
+        explain: |error| Failure { text: error.to_string(), hints: Vec::new() },
+        unreadable: |error| Failure { text: error.to_string(), hints: Vec::new() },
+        check: |path, _| ImageFacts::unreadable(path, "nobody asks for it here".into()),
+        note: |_, _| {},
+        noted: |_| None,
+    };
+    let app = App::new(Options { link: None, directory: PathBuf::new(), palette: Palette::Mono, size: (80, 24) });
+    let (sender, inputs) = host::channel();
+    let (_, keys) = sync_channel(1);
+    Console::new(app, world, Clock::start(), sender, inputs, keys)
+}
+
+fn type_keys(console: &mut Console, keys: &str) {
+    for key in keys.chars() {
+        let code = if key == '\r' { KeyCode::Enter } else { KeyCode::Char(key) };
+        console.handle(Input::Terminal(TerminalEvent::Key(code.into())));
+    }
+}
+
+/// What the unit says over the open link just now.
+fn say(console: &Console, text: &str) {
+    let link = console.link.as_ref().expect("a link").id();
+    let bytes = host::Input::Bytes { link, at: console.clock.now(), bytes: text.into() };
+    console.sender.send(bytes).expect("there is room");
+}
+
+fn failure() -> Failure {
+    Failure { text: "the port has gone".into(), hints: Vec::new() }
+}
+
+#[test]
+fn no_byte_is_lost_when_one_link_takes_the_place_of_another() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (first, second) = (Pty::open(115_200).expect("a port"), Pty::open(115_200).expect("another"));
+    let mut console = console();
+    for (pty, name) in [(&first, "first.cast"), (&second, "second.cast")] {
+        console.world.recording = Plan::File(folder.path().join(name));
+        type_keys(&mut console, &format!("1p{}\r", pty.path().display()));
+        if console.link.is_some() && name == "second.cast" {
+            say(&console, "last words\r\n");
+            type_keys(&mut console, "y");
+        }
+    }
+    console.take_arrived();
+    console.close_link();
+    let recorded = |name| std::fs::read_to_string(folder.path().join(name)).expect("a recording");
+    let (first_heard, second_heard) = (recorded("first.cast"), recorded("second.cast"));
+    let greeting = |pty: &Pty| format!("hello from {}", pty.path().display());
+    assert!(first_heard.contains(&greeting(&first)) && first_heard.contains("last words"), "{first_heard}");
+    assert!(second_heard.contains(&greeting(&second)), "{second_heard}");
+    assert!(!second_heard.contains("last words") && !first_heard.contains(&greeting(&second)));
+}
+
+#[test]
+fn what_the_reader_has_brought_counts_also_behind_the_loss_of_the_link() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pty = Pty::open(115_200).expect("a port");
+    let mut console = console();
+    console.world.recording = Plan::File(folder.path().join("it.cast"));
+    type_keys(&mut console, &format!("1p{}\r", pty.path().display()));
+    say(&console, "last words\r\n");
+    console.lose_link(failure());
+    let recorded = std::fs::read_to_string(folder.path().join("it.cast")).expect("a recording");
+    assert!(recorded.contains("hello from") && recorded.contains("last words"), "{recorded}");
+}
