@@ -25,7 +25,7 @@ use zeroize::Zeroizing;
 
 use crate::device::Product;
 use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
-use crate::record::{Direction, REDACTED, Record};
+use crate::record::{Direction, REDACTED, Record, Span};
 use crate::time::character_time;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
@@ -521,7 +521,7 @@ impl Session {
     }
 
     fn heard(&mut self, text: Text, message: Message) {
-        self.learn(&text, &message);
+        self.learn(text.span, &message);
         // A unit that starts has forgotten that it stopped us, and will never say "go on".
         let starts = matches!(
             message,
@@ -542,8 +542,7 @@ impl Session {
     }
 
     /// Folds a message into the facts.
-    fn learn(&mut self, text: &Text, message: &Message) {
-        let span = text.span;
+    fn learn(&mut self, span: Span, message: &Message) {
         let before = self.facts.clone();
         let asked = self.menu_asked_at.is_some_and(|at| self.now <= at + MENU_ANSWER);
         // What comes in a dialogue is no banner, but for those that end with a reset.
@@ -552,7 +551,7 @@ impl Session {
         let origin = if asked { Origin::Menu } else { Origin::Banner };
         let facts = &mut self.facts;
         match message {
-            Message::Text => facts.unrecognised_lines += u64::from(may_hold_a_fact(&text.text)),
+            Message::Text => facts.unrecognised_lines += 1,
             Message::Refusal | Message::Prompt(_) => {}
             Message::Row(row) => {
                 facts.state = UnitState::Application;
@@ -623,10 +622,7 @@ impl Session {
         };
         let outcome = running.work.handle(signal, &mut desk);
         let cut = desk.cut;
-        if desk.understood
-            && let Signal::Heard(text, Message::Text) = signal
-            && may_hold_a_fact(&text.text)
-        {
+        if desk.understood && matches!(signal, Signal::Heard(_, Message::Text)) {
             self.facts.unrecognised_lines = self.facts.unrecognised_lines.saturating_sub(1);
         }
         if self.facts != before {
@@ -650,12 +646,6 @@ impl Session {
         self.prompt.due = None;
         self.framer.cut(|_| {});
     }
-}
-
-/// Whether a line that no recogniser understood may say something that one should have: all that is recognised has
-/// numbers in it, or is known by its words. What has none is a title, a hint or a part of a dialogue.
-fn may_hold_a_fact(line: &str) -> bool {
-    line.bytes().any(|byte| byte.is_ascii_digit())
 }
 
 impl Endpoint for Session {
