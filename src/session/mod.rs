@@ -6,6 +6,7 @@
 
 mod console;
 mod diagnostics;
+mod dialogue;
 mod dictionary;
 mod event;
 #[doc(hidden)]
@@ -25,11 +26,12 @@ use zeroize::Zeroizing;
 
 use crate::device::Product;
 use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
-use crate::record::{Direction, REDACTED, Record, Span};
+use crate::record::{Direction, REDACTED, Record};
 use crate::time::character_time;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
 use crate::wire::{Confidence, Framer, Item, LoaderText, Message, NmtState, Prompt, Text, Vocabulary};
+use dialogue::Dialogue;
 use job::{Desk, Signal, Work};
 use redactor::Redactor;
 use transmitter::Transmitter;
@@ -82,6 +84,10 @@ pub struct Session {
     recognises: bool,
     /// When the menu was asked for last.
     menu_asked_at: Option<Instant>,
+    /// Which lines answer a key.
+    dialogue: Dialogue,
+    /// The line at hand was counted as one that nobody understands.
+    counted: bool,
     /// Where in what was received the last echo of a secret begins and ends.
     echo: (u64, u64),
     /// What the stream was asked to send, or was last seen to.
@@ -145,6 +151,8 @@ impl Session {
             passive: false,
             recognises: true,
             menu_asked_at: None,
+            dialogue: Dialogue::default(),
+            counted: false,
             echo: (0, 0),
             source: None,
         }
@@ -416,6 +424,7 @@ impl Session {
     fn note_menu_key(&mut self, sent: &[u8]) {
         // X leaves the view, behind which the menu stands.
         self.menu_asked_at = sent.iter().any(|key| matches!(key.to_ascii_lowercase(), b'm' | b'x')).then_some(self.now);
+        self.dialogue.sent(self.now, sent);
     }
 
     fn take_in(&mut self, bytes: &[u8], secrecy: Secrecy) {
@@ -521,7 +530,7 @@ impl Session {
     }
 
     fn heard(&mut self, text: Text, message: Message) {
-        self.learn(text.span, &message);
+        self.learn(&text, &message);
         // A unit that starts has forgotten that it stopped us, and will never say "go on".
         let starts = matches!(
             message,
@@ -542,16 +551,18 @@ impl Session {
     }
 
     /// Folds a message into the facts.
-    fn learn(&mut self, span: Span, message: &Message) {
+    fn learn(&mut self, text: &Text, message: &Message) {
+        let span = text.span;
         let before = self.facts.clone();
         let asked = self.menu_asked_at.is_some_and(|at| self.now <= at + MENU_ANSWER);
         // What comes in a dialogue is no banner, but for those that end with a reset.
         let talks = matches!(self.job(), Some(Job::Identify | Job::ReadDictionary | Job::StreamOn | Job::StreamOff));
         let asked = asked || talks;
         let origin = if asked { Origin::Menu } else { Origin::Banner };
+        self.counted = *message == Message::Text && !self.dialogue.owns(self.dated, &text.text);
         let facts = &mut self.facts;
         match message {
-            Message::Text => facts.unrecognised_lines += 1,
+            Message::Text => facts.unrecognised_lines += u64::from(self.counted),
             Message::Refusal | Message::Prompt(_) => {}
             Message::Row(row) => {
                 facts.state = UnitState::Application;
@@ -560,7 +571,11 @@ impl Session {
                     self.source = Some(row.source);
                 }
             }
-            Message::MenuKey(_) | Message::FirstStart => facts.state = UnitState::Application,
+            Message::MenuKey(_) => {
+                facts.state = UnitState::Application;
+                facts.unrecognised_lines = facts.unrecognised_lines.saturating_sub(self.dialogue.menu());
+            }
+            Message::FirstStart => facts.state = UnitState::Application,
             Message::Loader(text) => {
                 // "Press any key" and "restarting" an application may say as well.
                 if matches!(text, LoaderText::Waiting) {
@@ -622,7 +637,8 @@ impl Session {
         };
         let outcome = running.work.handle(signal, &mut desk);
         let cut = desk.cut;
-        if desk.understood && matches!(signal, Signal::Heard(_, Message::Text)) {
+        if desk.understood && self.counted && matches!(signal, Signal::Heard(_, Message::Text)) {
+            self.counted = false;
             self.facts.unrecognised_lines = self.facts.unrecognised_lines.saturating_sub(1);
         }
         if self.facts != before {

@@ -146,6 +146,8 @@ impl Work for Diagnostics {
             Signal::Heard(text, _) => {
                 self.heard = Some(text.span);
                 self.page.line(text, desk.now);
+                // Pages that came before anybody has pressed a key belong to no key.
+                desk.understood = self.stage == Stage::Reading;
                 None
             }
             Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
