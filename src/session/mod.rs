@@ -462,8 +462,11 @@ impl Session {
 
     /// A line is complete.
     fn line(&mut self, mut text: Text) {
-        let question = self.password_asked || self.recognises;
-        let question = question.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
+        if self.recognises {
+            self.redactor.scrub(&mut text.text);
+        }
+        let matters = self.password_asked || self.recognises;
+        let question = matters.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
         // Rows of the stream may go on while the unit waits for its password.
         self.password_asked &= match question {
             Some((prompt, _)) => prompt == Prompt::Password,
@@ -472,7 +475,6 @@ impl Session {
         if !self.recognises {
             return;
         }
-        self.redactor.scrub(&mut text.text);
         if self.prompt.was(&text) {
             return;
         }
