@@ -74,7 +74,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if talk.is_recorded() {
         // Read below, in one go with everything else.
         if !args.deep {
-            talk.ask(Command::Overhear)?;
+            talk.hear_out()?;
         }
     } else if args.wait {
         wait_for_banner(&mut talk, output)?;

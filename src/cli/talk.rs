@@ -218,6 +218,17 @@ impl Talk {
         }
     }
 
+    /// Listens to a recording to its end.
+    ///
+    /// # Errors
+    /// If the recording cannot be read to its end, or the user interrupts.
+    pub fn hear_out(&mut self) -> Result<(), CliError> {
+        match self.listen(Instant::NEVER, |_, _| Ok(ControlFlow::Continue(())))? {
+            true => Ok(()),
+            false => Err(CliError::message(Kind::Interrupted, "interrupted")),
+        }
+    }
+
     /// Listens until somebody who was asked has answered.
     ///
     /// # Errors

@@ -8,13 +8,14 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use serialport::{ErrorKind, FlowControl, SerialPort};
 
 use super::clock::Clock;
 use super::link::{Cause, LinkError, Operation, Options, QUEUED, WRITE_PATIENCE};
+use super::outlet::Outlet;
 use super::{Input, LinkId};
 use crate::time::Duration;
 
@@ -55,7 +56,8 @@ pub fn open(
     let (outgoing, queue) = sync_channel(QUEUED);
     let (done, written) = sync_channel(1);
     let stop = Arc::new(AtomicBool::new(false));
-    let worker = Worker { name: name.clone(), port, stop: stop.clone(), link, inputs, clock };
+    let outlet = Outlet::new(name.clone(), link, inputs);
+    let worker = Worker { port, stop: stop.clone(), outlet, clock };
     let thread = thread::Builder::new()
         .name("port".into())
         .spawn(move || worker.run(&queue, &done))
@@ -81,11 +83,9 @@ impl Lines {
 }
 
 struct Worker {
-    name: String,
     port: Box<dyn SerialPort>,
     stop: Arc<AtomicBool>,
-    link: LinkId,
-    inputs: SyncSender<Input>,
+    outlet: Outlet,
     clock: Clock,
 }
 
@@ -113,7 +113,7 @@ impl Worker {
                 Ok(0) => return self.report(Operation::Read, Cause::Gone),
                 Ok(count) => {
                     let bytes = buffer[..count].to_vec();
-                    if !self.deliver(Input::Bytes { link: self.link, at: self.clock.now(), bytes }) {
+                    if !self.outlet.deliver(self.clock.now(), bytes, |time| self.is_closing(time)) {
                         return;
                     }
                 }
@@ -143,23 +143,13 @@ impl Worker {
     }
 
     fn report(&self, operation: Operation, cause: Cause) {
-        let error = LinkError { port: self.name.clone(), operation, cause };
-        self.deliver(Input::Gone { link: self.link, error });
+        self.outlet.report(operation, cause, |time| self.is_closing(time));
     }
 
-    /// Puts an input on the channel; `false` if the connection is being closed.
-    fn deliver(&self, mut input: Input) -> bool {
-        loop {
-            match self.inputs.try_send(input) {
-                Ok(()) => return true,
-                Err(TrySendError::Disconnected(_)) => return false,
-                Err(TrySendError::Full(back)) => input = back,
-            }
-            if self.stop.load(Ordering::Relaxed) {
-                return false;
-            }
-            thread::sleep(READ_TIMEOUT);
-        }
+    /// Waits for so long, and says whether the connection is being closed.
+    fn is_closing(&self, time: Duration) -> bool {
+        thread::sleep(time);
+        self.stop.load(Ordering::Relaxed)
     }
 }
 

@@ -22,6 +22,7 @@ pub mod terminal;
 #[cfg(any(windows, test))]
 mod duplex;
 mod lines;
+mod outlet;
 #[cfg(unix)]
 mod serial;
 pub mod socket;

@@ -11,8 +11,7 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use rustix::event::PollFlags;
@@ -25,6 +24,7 @@ use rustix::termios::{
 
 use super::clock::Clock;
 use super::link::{Cause, LinkError, Operation, Options, QUEUED, WRITE_PATIENCE};
+use super::outlet::Outlet;
 use super::ports;
 use super::wait::{Stop, Stopper, ready, stop};
 use super::{Input, LinkId};
@@ -42,10 +42,6 @@ pub struct Lines {
 
 /// Bytes read at once: Linux hands out no more than 4 KiB of a terminal's bytes at a time.
 const READ: usize = 4096;
-
-/// How often a reader tries again to hand over bytes while the channel is full. The owner is far behind then, and a
-/// wait on the channel itself could not be called off.
-const RETRY: Duration = Duration::from_millis(2);
 
 /// Opens a port and starts its threads; the sender feeds the writer, which ends when it is dropped.
 pub fn open(
@@ -65,16 +61,10 @@ pub fn open(
 
     let system = |error| failed(Operation::Open)(Cause::Io(error));
     let (stopper, stopped) = stop().map_err(system)?;
-    let gone = Arc::new(AtomicBool::new(false));
-    let reader = Worker {
-        name: name.clone(),
-        port: port.clone(),
-        stopped: stopped.try_clone().map_err(system)?,
-        link,
-        inputs: inputs.clone(),
-        gone: gone.clone(),
-    };
-    let writer = Worker { name: name.clone(), port: port.clone(), stopped, link, inputs, gone };
+    let outlet = Arc::new(Outlet::new(name.clone(), link, inputs));
+    let stops = stopped.try_clone().map_err(system)?;
+    let reader = Worker { port: port.clone(), stopped: stops, outlet: outlet.clone() };
+    let writer = Worker { port: port.clone(), stopped, outlet };
     let (outgoing, queue) = sync_channel(QUEUED);
     let (done, written) = sync_channel(1);
     let reader = thread::Builder::new().name("port reader".into()).spawn(move || reader.read(clock)).map_err(system)?;
@@ -135,13 +125,9 @@ fn empty(drain: impl FnOnce() + Send + 'static, discard: impl FnOnce(), patience
 
 /// What both threads have.
 struct Worker {
-    name: String,
     port: Arc<OwnedFd>,
     stopped: Stop,
-    link: LinkId,
-    inputs: SyncSender<Input>,
-    /// Whether one of them has already said that the port is gone.
-    gone: Arc<AtomicBool>,
+    outlet: Arc<Outlet>,
 }
 
 impl Worker {
@@ -158,7 +144,7 @@ impl Worker {
                 Ok(0) => return self.report(Operation::Read, Cause::Gone),
                 Ok(count) => {
                     let bytes = buffer[..count].to_vec();
-                    if !self.deliver(Input::Bytes { link: self.link, at: clock.now(), bytes }) {
+                    if !self.outlet.deliver(clock.now(), bytes, |time| self.stopped.wait(time)) {
                         return;
                     }
                 }
@@ -194,24 +180,7 @@ impl Worker {
     }
 
     fn report(&self, operation: Operation, cause: Cause) {
-        if !self.gone.swap(true, Ordering::Relaxed) {
-            let error = LinkError { port: self.name.clone(), operation, cause };
-            self.deliver(Input::Gone { link: self.link, error });
-        }
-    }
-
-    /// Puts an input on the channel; `false` if the connection is being closed.
-    fn deliver(&self, mut input: Input) -> bool {
-        loop {
-            match self.inputs.try_send(input) {
-                Ok(()) => return true,
-                Err(TrySendError::Disconnected(_)) => return false,
-                Err(TrySendError::Full(back)) => input = back,
-            }
-            if self.stopped.wait(RETRY) {
-                return false;
-            }
-        }
+        self.outlet.report(operation, cause, |time| self.stopped.wait(time));
     }
 }
 

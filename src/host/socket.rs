@@ -7,7 +7,7 @@
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
@@ -15,9 +15,10 @@ use super::address::Address;
 use super::clock::Clock;
 use super::link::{Cause, LinkError, Operation, Options, QUEUED, WRITE_PATIENCE};
 use super::network::{self, NetworkError};
+use super::outlet::Outlet;
 use super::{Input, LinkId};
 use crate::telnet::{self, Client};
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 
 /// What is spoken on a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,10 +41,6 @@ pub struct Lines {
 
 /// Bytes read at once.
 const READ: usize = 4096;
-
-/// How often a reader tries again to hand over bytes while the channel is full. The owner is far behind then, and a
-/// wait on the channel itself could not be called off.
-const RETRY: Duration = Duration::from_millis(2);
 
 /// A connection that has come about, with its port set up where there is one to set up; nobody reads from it yet.
 #[derive(Debug)]
@@ -96,15 +93,12 @@ pub fn start(
     let port = name.clone();
     let system = |error: io::Error| LinkError { port, operation: Operation::Open, cause: Cause::Io(error) };
     let shared = Arc::new(Shared {
-        name,
         socket,
-        link,
-        inputs,
+        outlet: Outlet::new(name, link, inputs),
         turn: Mutex::new(()),
         suspended: Mutex::new(client.as_ref().is_some_and(Client::is_suspended)),
         resumed: Condvar::new(),
         closing: AtomicBool::new(false),
-        gone: AtomicBool::new(false),
     });
     let (outgoing, queue) = sync_channel(QUEUED);
     let (done, written) = sync_channel(1);
@@ -158,10 +152,8 @@ impl Lines {
 /// What both threads have.
 #[derive(Debug)]
 struct Shared {
-    name: String,
     socket: TcpStream,
-    link: LinkId,
-    inputs: SyncSender<Input>,
+    outlet: Outlet,
     /// Whose turn it is to write: a reply must not get between the bytes of a piece.
     turn: Mutex<()>,
     /// Whether the server wants nothing for now.
@@ -169,14 +161,12 @@ struct Shared {
     resumed: Condvar,
     /// From here on nobody wants to hear anything.
     closing: AtomicBool,
-    /// Whether one of the threads has already said that the connection is gone.
-    gone: AtomicBool,
 }
 
 impl Shared {
     fn read(&self, mut client: Option<Client>, early: Vec<u8>, clock: Clock) {
         if !early.is_empty() {
-            self.deliver(Input::Bytes { link: self.link, at: clock.now(), bytes: early });
+            self.deliver(clock.now(), early);
         }
         let mut buffer = [0; READ];
         loop {
@@ -197,7 +187,7 @@ impl Shared {
                 }
             };
             if !bytes.is_empty() {
-                self.deliver(Input::Bytes { link: self.link, at: clock.now(), bytes });
+                self.deliver(clock.now(), bytes);
             }
             if let Some(client) = &mut client {
                 while let Some(reply) = client.poll_transmit() {
@@ -253,21 +243,23 @@ impl Shared {
     }
 
     fn report(&self, operation: Operation, cause: Cause) {
-        if !self.gone.swap(true, Ordering::Relaxed) {
-            let error = LinkError { port: self.name.clone(), operation, cause };
-            self.deliver(Input::Gone { link: self.link, error });
+        // Closing it is what ends the reads.
+        if !self.closing.load(Ordering::Relaxed) {
+            self.outlet.report(operation, cause, |time| self.is_closing(time));
         }
     }
 
-    /// Puts an input on the channel; while the connection is being closed, nobody wants it.
-    fn deliver(&self, mut input: Input) {
-        while !self.closing.load(Ordering::Relaxed) {
-            match self.inputs.try_send(input) {
-                Ok(()) | Err(TrySendError::Disconnected(_)) => return,
-                Err(TrySendError::Full(back)) => input = back,
-            }
-            thread::sleep(RETRY);
+    /// Hands over what has been read; while the connection is being closed, nobody wants it.
+    fn deliver(&self, at: Instant, bytes: Vec<u8>) {
+        if !self.closing.load(Ordering::Relaxed) {
+            self.outlet.deliver(at, bytes, |time| self.is_closing(time));
         }
+    }
+
+    /// Waits for so long, and says whether the connection is being closed.
+    fn is_closing(&self, time: Duration) -> bool {
+        thread::sleep(time);
+        self.closing.load(Ordering::Relaxed)
     }
 }
 

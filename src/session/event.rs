@@ -271,7 +271,8 @@ pub struct Facts {
     pub nmt_state: Option<Known<String>>,
     /// Whether the stream runs, and with what.
     pub stream: Option<Source>,
-    /// Lines with a number in them that nobody understood; titles, hints and dialogues have none.
+    /// Lines that no recogniser understood and that answer no key: titles of the menu, questions, pages and the view are
+    /// none.
     pub unrecognised_lines: u64,
 }
 

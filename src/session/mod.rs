@@ -6,6 +6,7 @@
 
 mod console;
 mod diagnostics;
+mod dialogue;
 mod dictionary;
 mod event;
 #[doc(hidden)]
@@ -30,6 +31,7 @@ use crate::time::character_time;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
 use crate::wire::{Confidence, Framer, Item, LoaderText, Message, NmtState, Prompt, Text, Vocabulary};
+use dialogue::Dialogue;
 use job::{Desk, Signal, Work};
 use redactor::Redactor;
 use transmitter::Transmitter;
@@ -82,6 +84,10 @@ pub struct Session {
     recognises: bool,
     /// When the menu was asked for last.
     menu_asked_at: Option<Instant>,
+    /// Which lines answer a key.
+    dialogue: Dialogue,
+    /// The line at hand was counted as one that nobody understands.
+    counted: bool,
     /// Where in what was received the last echo of a secret begins and ends.
     echo: (u64, u64),
     /// What the stream was asked to send, or was last seen to.
@@ -145,6 +151,8 @@ impl Session {
             passive: false,
             recognises: true,
             menu_asked_at: None,
+            dialogue: Dialogue::default(),
+            counted: false,
             echo: (0, 0),
             source: None,
         }
@@ -416,6 +424,7 @@ impl Session {
     fn note_menu_key(&mut self, sent: &[u8]) {
         // X leaves the view, behind which the menu stands.
         self.menu_asked_at = sent.iter().any(|key| matches!(key.to_ascii_lowercase(), b'm' | b'x')).then_some(self.now);
+        self.dialogue.sent(self.now, sent);
     }
 
     fn take_in(&mut self, bytes: &[u8], secrecy: Secrecy) {
@@ -453,8 +462,11 @@ impl Session {
 
     /// A line is complete.
     fn line(&mut self, mut text: Text) {
-        let question = self.password_asked || self.recognises;
-        let question = question.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
+        if self.recognises {
+            self.redactor.scrub(&mut text.text);
+        }
+        let matters = self.password_asked || self.recognises;
+        let question = matters.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
         // Rows of the stream may go on while the unit waits for its password.
         self.password_asked &= match question {
             Some((prompt, _)) => prompt == Prompt::Password,
@@ -463,7 +475,6 @@ impl Session {
         if !self.recognises {
             return;
         }
-        self.redactor.scrub(&mut text.text);
         if self.prompt.was(&text) {
             return;
         }
@@ -550,9 +561,10 @@ impl Session {
         let talks = matches!(self.job(), Some(Job::Identify | Job::ReadDictionary | Job::StreamOn | Job::StreamOff));
         let asked = asked || talks;
         let origin = if asked { Origin::Menu } else { Origin::Banner };
+        self.counted = *message == Message::Text && !self.dialogue.owns(self.dated, &text.text);
         let facts = &mut self.facts;
         match message {
-            Message::Text => facts.unrecognised_lines += u64::from(may_hold_a_fact(&text.text)),
+            Message::Text => facts.unrecognised_lines += u64::from(self.counted),
             Message::Refusal | Message::Prompt(_) => {}
             Message::Row(row) => {
                 facts.state = UnitState::Application;
@@ -561,7 +573,11 @@ impl Session {
                     self.source = Some(row.source);
                 }
             }
-            Message::MenuKey(_) | Message::FirstStart => facts.state = UnitState::Application,
+            Message::MenuKey(_) => {
+                facts.state = UnitState::Application;
+                facts.unrecognised_lines = facts.unrecognised_lines.saturating_sub(self.dialogue.menu());
+            }
+            Message::FirstStart => facts.state = UnitState::Application,
             Message::Loader(text) => {
                 // "Press any key" and "restarting" an application may say as well.
                 if matches!(text, LoaderText::Waiting) {
@@ -623,10 +639,8 @@ impl Session {
         };
         let outcome = running.work.handle(signal, &mut desk);
         let cut = desk.cut;
-        if desk.understood
-            && let Signal::Heard(text, Message::Text) = signal
-            && may_hold_a_fact(&text.text)
-        {
+        if desk.understood && self.counted && matches!(signal, Signal::Heard(_, Message::Text)) {
+            self.counted = false;
             self.facts.unrecognised_lines = self.facts.unrecognised_lines.saturating_sub(1);
         }
         if self.facts != before {
@@ -650,12 +664,6 @@ impl Session {
         self.prompt.due = None;
         self.framer.cut(|_| {});
     }
-}
-
-/// Whether a line that no recogniser understood may say something that one should have: all that is recognised has
-/// numbers in it, or is known by its words. What has none is a title, a hint or a part of a dialogue.
-fn may_hold_a_fact(line: &str) -> bool {
-    line.bytes().any(|byte| byte.is_ascii_digit())
 }
 
 impl Endpoint for Session {

@@ -117,8 +117,6 @@ impl Work for Diagnostics {
             Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults | Prompt::Source(_))) => None,
             Signal::Heard(text, _) => {
                 self.heard = Some(text.span);
-                // A page is told as it is printed: nothing of it is lost.
-                desk.understood = self.switched_on;
                 self.page.line(text, desk.now);
                 None
             }

@@ -3,8 +3,8 @@
 //! Behind the password's own prompt everything is secret up to the end of the line. This is for the rest: a unit that
 //! says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
 //! next ones tell, for a moment at most: they are handed out when the line has been silent, or when flow control stands
-//! among them, which cannot wait. The password is looked for across either, so no more of it than its first
-//! [`SHORTEST`]` - 1` characters can be seen.
+//! among them, which cannot wait. The password is looked for across either, so no more of it than its first three
+//! characters can be seen.
 
 use zeroize::Zeroizing;
 

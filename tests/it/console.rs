@@ -343,6 +343,33 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
 }
 
 #[test]
+fn what_answers_a_key_is_no_text_that_nobody_understands() {
+    let mut desk = Desk::new();
+    let other_text = |desk: &mut Desk| {
+        desk.keys("2");
+        let picture = desk.drawn();
+        let line = picture.lines().find(|line| line.contains("Other text")).expect("the line");
+        line.split("Other text").nth(1).expect("what it says").trim().to_owned()
+    };
+    assert_eq!(other_text(&mut desk), "none", "the menu and its titles");
+    desk.keys("t500").press(KeyCode::Enter);
+    desk.wait_for("every 500 ms");
+    desk.keys("t");
+    desk.wait_for("The stream is off.");
+    assert_eq!(other_text(&mut desk), "none", "a switch with its questions");
+    desk.keys("v").press(KeyCode::Enter);
+    desk.wait_for("0 not as factory");
+    assert_eq!(other_text(&mut desk), "none", "the object dictionary");
+    desk.keys("s").run(Duration::from_secs(10)).keys("s").run(Duration::from_secs(3));
+    assert_eq!(other_text(&mut desk), "none", "pages of diagnostics");
+    // The same by hand.
+    desk.keys("3s").run(Duration::from_secs(10)).keys("sv").run(Duration::from_secs(2));
+    desk.press(KeyCode::Enter).press(KeyCode::Enter).keys("xt").run(Duration::from_secs(2)).press(KeyCode::Enter);
+    desk.run(Duration::from_secs(5)).key(KeyCode::Char('5'), KeyModifiers::CONTROL);
+    assert_eq!(other_text(&mut desk), "none", "whoever has pressed the keys");
+}
+
+#[test]
 fn a_period_the_line_cannot_carry_is_named_before_it_is_set() {
     let mut desk = Desk::new();
     desk.keys("t3");

@@ -12,7 +12,7 @@ use super::event::{Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
-use crate::wire::{Message, Prompt, diagnostics};
+use crate::wire::{Message, Prompt};
 
 /// How long to look for pages that come already: one comes every second.
 const WATCH: Duration = Duration::from_millis(1300);
@@ -145,9 +145,9 @@ impl Work for Diagnostics {
             Signal::Heard(_, Message::Row(_) | Message::Prompt(_)) => None,
             Signal::Heard(text, _) => {
                 self.heard = Some(text.span);
-                // A page is told as it is printed: nothing of it is lost.
-                desk.understood = self.stage != Stage::Watching || !diagnostics::quantities(&text.text).is_empty();
                 self.page.line(text, desk.now);
+                // Pages that came before anybody has pressed a key belong to no key.
+                desk.understood = self.stage == Stage::Reading;
                 None
             }
             Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,

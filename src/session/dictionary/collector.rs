@@ -6,7 +6,6 @@ use crate::canopen::ObjectAddress;
 use crate::device::Product;
 use crate::record::Span;
 use crate::session::event::{DictionaryReading, ReadEntry};
-use crate::session::may_hold_a_fact;
 use crate::wire::{Message, Text, dictionary};
 
 /// Entries that are kept at most; and lines, as long as nobody knows whose objects they are.
@@ -53,7 +52,7 @@ impl Collector {
             self.lines.push((text.clone(), otherwise));
         }
         let read = self.read(text);
-        let counts = read == Read::Nothing && !otherwise && may_hold_a_fact(&text.text);
+        let counts = read == Read::Nothing && !otherwise && may_be_an_entry(&text.text);
         self.unrecognised_lines += u64::from(counts);
         read == Read::Understood
     }
@@ -186,4 +185,10 @@ impl Collector {
             self.entries.insert(entry.at, entry);
         }
     }
+}
+
+/// Whether a line in which nothing was recognised may be an entry all the same: it has a number. Titles and hints have
+/// none.
+fn may_be_an_entry(line: &str) -> bool {
+    line.bytes().any(|byte| byte.is_ascii_digit())
 }

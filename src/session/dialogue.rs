@@ -1,0 +1,130 @@
+//! Which lines answer a key that was sent: they are no text that nobody understands, even where no single line of them
+//! means anything.
+//!
+//! A dialogue is questions, echoes and sentences in words of the unit's own; a page of diagnostics has headings; the view
+//! of the object dictionary has titles and hints. What matters of them their jobs read. Who counts what the console does
+//! not understand wants to know of the rest. Keys tell, whoever has pressed them, so a recording gives the same.
+
+use crate::time::{Duration, Instant};
+use crate::wire::diagnostics;
+
+/// How long behind a key, or behind the last page, what comes is its answer: pages come every second, and a unit that
+/// computes needs a moment.
+const ANSWER: Duration = Duration::from_secs(3);
+/// Bytes of a piece that somebody may have typed: anything longer is a record of a file, and its letters are no keys.
+const LONGEST_TYPED: usize = 16;
+
+/// The dialogue that is open, as far as keys tell.
+#[derive(Debug, Default)]
+pub(super) struct Dialogue {
+    asked: Option<Asked>,
+    until: Instant,
+    /// Lines since the menu was asked for, which nobody has understood and which are its titles if it comes.
+    before_menu: u64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asked {
+    /// The menu, which has not shown itself yet: anything may answer an `m`.
+    Menu,
+    /// The menu, which has come, the view, a switch with its questions.
+    Answer,
+    /// Pages, which come until the key is pressed again.
+    Pages,
+}
+
+impl Dialogue {
+    /// These bytes have been sent.
+    pub(super) fn sent(&mut self, now: Instant, bytes: &[u8]) {
+        if bytes.len() > LONGEST_TYPED {
+            self.asked = None;
+            return;
+        }
+        // A letter in "Yes" looks like a key as well; what comes soon behind it is an answer either way.
+        for key in bytes {
+            match key.to_ascii_lowercase() {
+                b'm' | b'x' => (self.asked, self.before_menu) = (Some(Asked::Menu), 0),
+                b'v' | b'd' | b't' | b'l' => self.asked = Some(Asked::Answer),
+                b's' => self.asked = Some(Asked::Pages),
+                _ => {}
+            }
+        }
+        self.until = now + ANSWER;
+    }
+
+    /// Whether a line that nobody has understood belongs to what was asked for.
+    pub(super) fn owns(&mut self, at: Instant, line: &str) -> bool {
+        let is_soon = at <= self.until;
+        match self.asked.filter(|_| is_soon) {
+            None => false,
+            Some(Asked::Menu) => {
+                self.before_menu += 1;
+                false
+            }
+            Some(Asked::Answer) => true,
+            Some(Asked::Pages) => {
+                if !diagnostics::quantities(line).is_empty() {
+                    self.until = at + ANSWER;
+                }
+                true
+            }
+        }
+    }
+
+    /// An entry of the menu has come: how many of the lines before it were its titles.
+    pub(super) fn menu(&mut self) -> u64 {
+        if self.asked == Some(Asked::Menu) {
+            self.asked = Some(Asked::Answer);
+        }
+        std::mem::take(&mut self.before_menu)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(millis: u64) -> Instant {
+        Instant::from_millis(millis)
+    }
+
+    #[test]
+    fn what_answers_a_key_belongs_to_it_and_what_comes_later_does_not() {
+        let mut dialogue = Dialogue::default();
+        assert!(!dialogue.owns(at(0), "nobody has asked"));
+        dialogue.sent(at(1000), b"t");
+        assert!(dialogue.owns(at(1500), "Field or process value?"));
+        dialogue.sent(at(60_000), b"1000\r");
+        assert!(dialogue.owns(at(60_100), "Now every 1000 ms."));
+        assert!(!dialogue.owns(at(63_001), "something else"));
+    }
+
+    #[test]
+    fn pages_go_on_as_long_as_they_have_numbers() {
+        let mut dialogue = Dialogue::default();
+        dialogue.sent(at(0), b"s");
+        for second in 1..100 {
+            assert!(dialogue.owns(at(second * 1000), "--- Diagnostics ---"), "{second}");
+            assert!(dialogue.owns(at(second * 1000), "Supply 24.0 V"), "{second}");
+        }
+        assert!(!dialogue.owns(at(103_000), "noise"));
+    }
+
+    #[test]
+    fn titles_belong_to_a_menu_once_it_has_shown_itself() {
+        let mut dialogue = Dialogue::default();
+        dialogue.sent(at(0), b"\x11m");
+        assert!(!dialogue.owns(at(100), "Some Corporation"), "a modem may say so too");
+        assert!(!dialogue.owns(at(101), "=========="));
+        assert_eq!(dialogue.menu(), 2);
+        assert!(dialogue.owns(at(102), "----------"));
+        assert_eq!(dialogue.menu(), 0, "taken back once");
+    }
+
+    #[test]
+    fn a_record_of_a_file_is_no_key() {
+        let mut dialogue = Dialogue::default();
+        dialogue.sent(at(0), b"S315000000000D0D0D0D0D0D0D0D0D0D0D\r");
+        assert!(!dialogue.owns(at(1), "strange"));
+    }
+}
