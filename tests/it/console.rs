@@ -370,6 +370,30 @@ fn what_answers_a_key_is_no_text_that_nobody_understands() {
 }
 
 #[test]
+fn a_threshold_is_shown_in_degrees_and_found_by_either_number() {
+    let mut desk = Desk::new();
+    let now = desk.now;
+    let (at, value) = (ObjectAddress::new(0x4000, 2), Value::Integer16(-155));
+    desk.unit.unit_mut().write_object(now, at, &value.encode()).expect("written");
+    desk.keys("v").press(KeyCode::Enter);
+    desk.wait_for("1 not as factory");
+    for words in ["-15.5", "-155"] {
+        desk.keys("/").keys(words).press(KeyCode::Enter);
+        let picture = desk.drawn();
+        assert!(picture.contains("* 4000:02  Low Temperature Warning Threshold, TC2"), "{picture}");
+        assert!(picture.contains(" -15.5 °C ") && picture.contains(" -20.0"), "{picture}");
+        assert!(picture.contains("Value       -15.5 °C (raw -155); not as the factory made it"), "{picture}");
+        assert!(picture.contains("Factory     -20.0 °C"), "{picture}");
+        assert!(picture.contains("INTEGER16, read and write, -273.0 to 4010:02 - 10.0 °C"), "{picture}");
+        desk.press(KeyCode::Esc);
+    }
+    // What is written to files is what the unit keeps.
+    desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("a.csv").press(KeyCode::Enter);
+    let text = String::from_utf8_lossy(&desk.files[Path::new("a.csv")]).into_owned();
+    assert!(text.contains("-155,") && !text.contains("-15.5"), "{text}");
+}
+
+#[test]
 fn a_period_the_line_cannot_carry_is_named_before_it_is_set() {
     let mut desk = Desk::new();
     desk.keys("t3");
