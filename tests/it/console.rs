@@ -7,7 +7,7 @@ use axcon::canopen::{ObjectAddress, Value};
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
 use axcon::emulator::knob::Knob;
-use axcon::emulator::{Setup, Unit};
+use axcon::emulator::{NmtCommand, Setup, Unit};
 use axcon::image::make;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::tui::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Noted, Options, Palette, RecordingEntry};
@@ -367,6 +367,20 @@ fn what_answers_a_key_is_no_text_that_nobody_understands() {
     desk.press(KeyCode::Enter).press(KeyCode::Enter).keys("xt").run(Duration::from_secs(2)).press(KeyCode::Enter);
     desk.run(Duration::from_secs(5)).key(KeyCode::Char('5'), KeyModifiers::CONTROL);
     assert_eq!(other_text(&mut desk), "none", "whoever has pressed the keys");
+}
+
+#[test]
+fn a_canopen_state_is_told_with_its_age_until_it_is_heard_again() {
+    let mut desk = Desk::new();
+    desk.keys("m").run(Duration::from_secs(3));
+    assert!(desk.picture().contains("pre-operational (menu)  "), "{}", desk.picture());
+    let now = desk.now;
+    desk.unit.unit_mut().nmt(now, NmtCommand::Start);
+    desk.wait_for("pre-operational (menu), 10 s ago");
+    desk.wait_for("pre-operational (menu), 40 s ago");
+    desk.wait_for("pre-operational (menu), 1 min ago");
+    desk.keys("m").run(Duration::from_secs(1));
+    assert!(desk.drawn().contains("CANopen     operational (menu)\n"), "{}", desk.drawn());
 }
 
 #[test]

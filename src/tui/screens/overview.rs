@@ -270,6 +270,7 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         1 => "1 line, see the terminal".into(),
         count => format!("{} lines, see the terminal", format::grouped(count)),
     };
+    let half = usize::from(columns) / 2 - 2;
     let left = [
         ("Product", known(&facts.product, |product| visible::text(product))),
         ("Version", known(&facts.version, |version| version.to_string())),
@@ -278,11 +279,10 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     ];
     let right = [
         ("State", state),
-        ("CANopen", known(&facts.nmt_state, |state| visible::text(state))),
+        ("CANopen", canopen_state(scene, usize::from(columns).saturating_sub(half + 2 + lines::LABEL_COLUMNS))),
         ("Stream", Span::raw(stream)),
         ("Other text", Span::raw(other_text)),
     ];
-    let half = usize::from(columns) / 2 - 2;
     let mut shown = vec![lines::rule(theme, columns, "Unit", &title)];
     for ((left_label, left_value), (right_label, right_value)) in left.into_iter().zip(right) {
         let mut line = lines::labelled(theme, left_label, left_value);
@@ -318,6 +318,18 @@ fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
     let text = format::keep_start(&said.join(", "), room);
     let time = format::time_of_day(scene.start_of_day, at);
     (!said.is_empty()).then(|| lines::labelled(scene.theme, "Diagnosed", Span::raw(format!("{text} ({time})"))))
+}
+
+/// The CANopen state, in `room` columns. Any master on the bus changes it without the unit saying so here: what was
+/// heard a while ago is told with its age, and does not look like what is.
+fn canopen_state(scene: Scene, room: usize) -> Span<'static> {
+    let state = &scene.view.facts.nmt_state;
+    let now = known(state, |state| visible::text(state));
+    let age = scene.view.nmt_heard.and_then(|heard| format::ago(heard, scene.now));
+    let (Some(state), Some(age)) = (state, age) else { return now };
+    let full = format!("{}, {age}", now.content);
+    let text = if format::width(&full) <= room { full } else { format!("{}, {age}", visible::text(&state.value)) };
+    Span::styled(text, scene.theme.quiet())
 }
 
 /// A fact and where it comes from: `127 (menu)`.
