@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::{Scene, terminal};
-use crate::monitor::{Channel, Fault};
+use crate::monitor::{Channel, Fault, Tracked};
 use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
 use crate::tui::action::Action;
@@ -142,6 +142,7 @@ impl Overview {
             let room = usize::from(columns).saturating_sub(4);
             let broken = without_values(scene).into_iter().flat_map(|text| format::wrap(text, room));
             shown.extend(broken.map(|line| Line::raw(format!("  {line}"))));
+            shown.extend(diagnosed_values(scene));
             shown.push(Line::default());
             return shown;
         };
@@ -296,6 +297,24 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     shown
 }
 
+/// The channels' temperatures on the newest page of diagnostics: without a stream they are all there is to know.
+fn diagnosed_values(scene: Scene) -> Vec<Line<'static>> {
+    let diagnostics = &scene.view.monitor.diagnostics;
+    let (Some(at), Some(product)) = (diagnostics.at, scene.view.product()) else { return Vec::new() };
+    let time = format::time_of_day(scene.start_of_day, at);
+    let is_celsius = |found: &&Tracked| found.unit.as_deref().is_some_and(|unit| matches!(unit, "C" | "°C" | "degC"));
+    let row = |name: &String| {
+        let found = diagnostics.found.iter().filter(is_celsius).find(|found| found.label == *name)?;
+        let value = format!("{} °C", found.text(found.value?));
+        Some(Line::from(vec![
+            Span::raw(format!("    {name:<8}")),
+            Span::styled(format!("{value:>13}"), scene.theme.quiet()),
+            Span::styled(format!("   on the diagnostics' last page, {time}"), scene.theme.quiet()),
+        ]))
+    };
+    product.stream.channels.iter().filter_map(row).collect()
+}
+
 /// What the unit's diagnostics say beside the channels: supply, cold junction, active errors.
 fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
     let view = scene.view;
@@ -309,7 +328,7 @@ fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
         });
     let said = said.filter_map(|found| {
         let unit = found.unit.as_deref().map(|unit| format!(" {}", visible::text(unit))).unwrap_or_default();
-        Some(format!("{} {}{unit}", visible::text(&found.label), found.value?))
+        Some(format!("{} {}{unit}", visible::text(&found.label), found.text(found.value?)))
     });
     let mut said: Vec<String> = said.collect();
     // What does not fit is cut off, and that must not be the errors.
