@@ -7,7 +7,7 @@ use super::widgets::format;
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::dump::Dump;
-use crate::monitor::Monitor;
+use crate::monitor::{Mark, Monitor};
 use crate::session::{DictionaryReading, Event, Facts, Job, LoadReport, Origin, Outcome, Progress, UnitState};
 use crate::time::{Duration, Instant};
 
@@ -136,6 +136,9 @@ const AVERAGES: u16 = 0x2100;
 /// They are in tenths of a degree.
 const LIMIT_STEPS: f64 = 10.0;
 
+/// How a recording says that a moment was marked; the mark's number follows.
+pub const MARK: &str = "mark ";
+
 /// A file that rows are written to as they come.
 #[derive(Debug)]
 pub struct Export {
@@ -220,9 +223,11 @@ impl View {
         self.monitor.stream.restart_extremes();
     }
 
-    /// Marks a moment of the stream.
-    pub fn mark(&mut self, at: Instant) {
-        self.monitor.stream.mark(at);
+    /// A remark in a recording: where it is a mark, it is one again.
+    pub fn remarked(&mut self, at: Instant, text: &str) {
+        if let Some(number) = text.strip_prefix(MARK).and_then(|number| number.parse().ok()) {
+            self.monitor.stream.set_mark(Mark { number, at });
+        }
     }
 
     /// A new link: what was known of the unit before says nothing about the one at its end.

@@ -321,6 +321,7 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
     desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("rows.csv").press(KeyCode::Enter);
     desk.run(Duration::from_secs(10)).keys("k");
     assert_eq!(desk.marks, ["mark 1"]);
+    assert!(desk.picture().contains("mark 1 is set, in chart, recording and file."), "{}", desk.picture());
     desk.press(KeyCode::Left).press(KeyCode::Left);
     let held = desk.picture();
     assert!(held.contains("held, End follows again"), "{held}");
@@ -335,11 +336,28 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
     assert_eq!(lines[0], "time,source,CJ,TC1,TC2,TC3,TC4");
     // 30 s before, 15 s behind its beginning.
     assert!((215..235).contains(&lines.len()), "{} lines", lines.len());
-    assert!(lines[1..].iter().all(|line| line.contains("Z,fv,") && line.split(',').count() == 7), "{text}");
+    let is_row = |line: &&str| line.contains("Z,fv,") || line.ends_with("Z,mark 1,,,,,");
+    assert!(lines[1..].iter().all(|line| is_row(line) && line.split(',').count() == 7), "{text}");
+    assert_eq!(lines.iter().filter(|line| line.contains("mark")).count(), 1, "{text}");
     assert!(lines[1..].windows(2).all(|pair| pair[0] < pair[1]), "in the order of time");
     let rows = lines.len();
     desk.run(Duration::from_secs(5));
     assert_eq!(desk.files[Path::new("rows.csv")].split(|&byte| byte == b'\n').count(), rows + 1, "it has ended");
+}
+
+#[test]
+fn marks_that_were_set_before_an_export_stand_between_its_rows() {
+    let mut desk = Desk::new();
+    desk.keys("6k").keys("t1000").press(KeyCode::Enter);
+    desk.wait_for("every 1 s");
+    desk.run(Duration::from_secs(5)).keys("k").run(Duration::from_secs(5)).keys("k");
+    desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("rows.csv").press(KeyCode::Enter);
+    let text = String::from_utf8(desk.files[Path::new("rows.csv")].clone()).expect("text");
+    let kinds: Vec<&str> = text.lines().skip(1).filter_map(|line| line.split(',').nth(1)).collect();
+    let marks: Vec<&&str> = kinds.iter().filter(|kind| **kind != "fv").collect();
+    assert_eq!(marks, [&"mark 2", &"mark 3"], "the first mark has no row before it: {text}");
+    assert!(kinds.first() == Some(&"fv") && kinds.iter().position(|kind| *kind == "mark 2") > Some(4), "{text}");
+    assert!(text.lines().skip(1).map(|line| &line[..24]).is_sorted(), "{text}");
 }
 
 #[test]

@@ -158,7 +158,10 @@ impl App {
                     session.handle_sent(now, &bytes);
                 }
             }
-            Input::Mark(text) => self.scrollback.note(now, super::visible::text(&text)),
+            Input::Mark(text) => {
+                self.view.remarked(now, &text);
+                self.scrollback.note(now, super::visible::text(&text));
+            }
             Input::Unrecorded(why) => self.unrecorded(now, why),
             Input::RecordingOver(failure) => self.recording_over(now, failure),
             Input::FilesListed { directory, entries } => {

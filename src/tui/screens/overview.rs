@@ -6,6 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::{Scene, terminal};
+use crate::device::Product;
 use crate::monitor::{Channel, Fault, Tracked};
 use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
@@ -13,7 +14,7 @@ use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::view::View;
 use crate::tui::visible;
-use crate::tui::widgets::chart::{self, Curve};
+use crate::tui::widgets::chart::{self, Curve, Quantity};
 use crate::tui::widgets::spark::sparkline;
 use crate::tui::widgets::{format, lines};
 use crate::wire::stream::Source;
@@ -234,9 +235,13 @@ fn averages(scene: Scene) -> Option<Line<'static>> {
     (!said.is_empty()).then(|| Line::styled(text, scene.theme.quiet()))
 }
 
-/// Digits behind the point, as the product prints them.
+/// Digits behind the point, as the product prints them; before it has said its name, as the one with such channels does.
 pub fn decimals(view: &View, source: Source) -> usize {
-    view.product().map_or_else(
+    let channels = &view.monitor.stream.channels;
+    let has_these =
+        |product: &&Product| product.stream.channels.iter().eq(channels.iter().map(|channel| &channel.name));
+    let product = view.product().or_else(|| Product::all().iter().find(has_these));
+    product.map_or_else(
         || if source == Source::FieldValue { 3 } else { 0 },
         |product| product.stream.format(source).decimals,
     )
@@ -528,10 +533,20 @@ fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
 
 fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
     let (heading, canvas) = lines::split(area, 1);
-    let theme = scene.theme;
+    let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
     lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Trend of {}", channel.name), "")]);
-    let samples = channel.newest(usize::MAX).collect();
-    let curve = Curve { samples, window: None, cursor: None, marks: Vec::new() };
+    let source = stream.source.unwrap_or(Source::FieldValue);
+    let samples: Vec<_> = channel.newest(usize::MAX).collect();
+    let ends = samples.first().zip(samples.last());
+    let curve = Curve {
+        window: ends.map(|(first, last)| (first.0, last.0)).unwrap_or_default(),
+        quantity: Quantity::of(source, decimals(scene.view, source)),
+        cursor: None,
+        marks: stream.marks.iter().copied().collect(),
+        without: super::stream::without_value(channel),
+        label_columns: 0,
+        samples,
+    };
     let (canvas, _) = lines::split(canvas, canvas.height.saturating_sub(1));
     chart::draw(theme, scene.start_of_day, &curve, canvas, frame);
 }
