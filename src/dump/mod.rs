@@ -4,6 +4,7 @@
 //! [`differences`] compares two of them; they are written for people and spreadsheets, and read again as JSON.
 
 mod difference;
+mod measure;
 mod text;
 
 use std::collections::BTreeMap;
@@ -11,6 +12,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use difference::{Difference, differences};
+pub use measure::Measure;
 
 use crate::canopen::{DataType, ObjectAddress, Value};
 use crate::device::dictionary::{Access, Entry, Object};

@@ -26,6 +26,8 @@ pub struct Tracked {
     pub label: String,
     /// As printed, where there is one.
     pub unit: Option<String>,
+    /// Digits behind the point, as printed.
+    pub decimals: usize,
     /// On the newest page; `None` if it is not there any more.
     pub value: Option<f64>,
     /// Smallest since the first page.
@@ -49,6 +51,7 @@ impl Diagnostics {
             match self.found.iter().position(same) {
                 Some(place) => {
                     let tracked = &mut self.found[place];
+                    tracked.decimals = tracked.decimals.max(quantity.decimals);
                     tracked.value = Some(quantity.value);
                     tracked.min = tracked.min.min(quantity.value);
                     tracked.max = tracked.max.max(quantity.value);
@@ -56,6 +59,7 @@ impl Diagnostics {
                 None if self.found.len() < MOST_TRACKED => self.found.push(Tracked {
                     label: quantity.label,
                     unit: quantity.unit,
+                    decimals: quantity.decimals,
                     value: Some(quantity.value),
                     min: quantity.value,
                     max: quantity.value,
@@ -63,6 +67,14 @@ impl Diagnostics {
                 None => {}
             }
         }
+    }
+}
+
+impl Tracked {
+    /// One of its numbers, as finely as the page prints them.
+    pub fn text(&self, value: f64) -> String {
+        let decimals = self.decimals;
+        format!("{value:.decimals$}")
     }
 }
 
@@ -83,6 +95,7 @@ mod tests {
         }
         let supply = &diagnostics.found[0];
         assert_eq!((supply.value, supply.min, supply.max), (Some(24.0), 23.0, 24.1));
+        assert_eq!(supply.text(supply.min), "23.0", "as finely as any page has printed it");
         assert_eq!(
             diagnostics.found.iter().map(|found| found.value).collect::<Vec<_>>(),
             [Some(24.0), Some(5.0), Some(7.0)]

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 
 pub use diagnostics::{Diagnostics, Tracked};
 pub use scrollback::{Origin, Scrollback, TextLine};
-pub use stream::{Channel, Fault, Sample, Stream};
+pub use stream::{Channel, Fault, Mark, Sample, Stream};
 
 use crate::device::Product;
 use crate::session::Event;

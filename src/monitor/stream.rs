@@ -47,8 +47,17 @@ pub struct Stream {
     interrupted: bool,
     /// No row for longer than the stream's period explains.
     pub late: bool,
-    /// Moments the user has marked.
-    pub marks: VecDeque<Instant>,
+    /// Moments the user has marked, oldest first.
+    pub marks: VecDeque<Mark>,
+}
+
+/// A moment that somebody wants to find again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// Counted from 1 on each link.
+    pub number: u64,
+    /// Which moment.
+    pub at: Instant,
 }
 
 /// One channel of the stream.
@@ -174,9 +183,17 @@ impl Stream {
         Some(newest + (self.slowest().unwrap_or_default() * LATE_PERIODS).max(LATE_AT_LEAST))
     }
 
-    /// Marks a moment.
-    pub fn mark(&mut self, at: Instant) {
-        self.marks.push_back(at);
+    /// Marks a moment, behind the marks so far.
+    pub fn mark(&mut self, at: Instant) -> Mark {
+        let number = self.marks.back().map_or(1, |last| last.number + 1);
+        let mark = Mark { number, at };
+        self.set_mark(mark);
+        mark
+    }
+
+    /// Takes over a mark that has its number already: one in a recording.
+    pub fn set_mark(&mut self, mark: Mark) {
+        self.marks.push_back(mark);
         if self.marks.len() > KEPT_MARKS {
             self.marks.pop_front();
         }
@@ -377,6 +394,14 @@ mod tests {
             row(&mut monitor, millis, with_first(Reading::Value(20.0)));
         }
         assert_eq!(monitor.stream.period(), Some(Duration::from_millis(1)), "as set, not as the line carries it");
+    }
+
+    #[test]
+    fn marks_keep_their_numbers_when_the_oldest_are_forgotten() {
+        let mut stream = Stream::default();
+        let last = (0..=KEPT_MARKS as u64).map(|second| stream.mark(Instant::from_millis(second * 1000))).last();
+        assert_eq!(last.map(|mark| mark.number), Some(KEPT_MARKS as u64 + 1));
+        assert_eq!((stream.marks.len(), stream.marks[0].number), (KEPT_MARKS, 2));
     }
 
     #[test]

@@ -89,15 +89,11 @@ pictures! {
         stage.press(KeyCode::Down).press(KeyCode::Down).press(KeyCode::Down);
         stage
     };
-    overview_of_eight_channels: |size| {
-        let mut stage = Stage::with_ports(size);
-        stage.press(KeyCode::Enter).opened("/dev/ttyUSB0");
-        for second in 0..40 {
-            let broken = |channel| channel == 2 && second > 9 || channel == 5 && (second / 4) % 3 == 1;
-            let value = |channel| if broken(channel) { "Open  ".into() } else { format!("{:6.1}", 20.0 + f64::from(channel)) };
-            let row = (0..8).map(value).collect::<Vec<_>>().join(";") + "\r\n";
-            stage.wait(if second == 30 { 20_000 } else { 1000 }).bytes(row.as_bytes());
-        }
+    overview_of_eight_channels: Stage::eight_channels;
+    overview_diagnosed: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("s").wait(2000).bytes(b" CJ 24.50 C\r\n TC1 100.0 C raw 3991 uV\r\n TC2 open\r\n Active Errors: 0\r\n");
+        stage.wait(47_000).keys("2");
         stage
     };
     overview_late: |size| {
@@ -388,6 +384,24 @@ pictures! {
         stage.keys("6k").press(KeyCode::Down).press(KeyCode::Down).press(KeyCode::Down);
         (0..36).for_each(|_| {
             stage.press(KeyCode::Left);
+        });
+        stage
+    };
+    stream_of_eight_channels: |size| {
+        let mut stage = Stage::eight_channels(size);
+        stage.keys("6").press(KeyCode::Down).press(KeyCode::Down);
+        stage
+    };
+    stream_of_one_curve: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6zk").press(KeyCode::Down).press(KeyCode::Enter);
+        stage
+    };
+    stream_of_a_disabled_channel: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.keys("6").press(KeyCode::End);
+        (0..4).for_each(|_| {
+            stage.press(KeyCode::Down);
         });
         stage
     };

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use super::input::{Failure, Noted, Playing};
+use super::widgets::format;
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::dump::Dump;
-use crate::monitor::Monitor;
+use crate::monitor::{Mark, Monitor};
 use crate::session::{DictionaryReading, Event, Facts, Job, LoadReport, Origin, Outcome, Progress, UnitState};
 use crate::time::{Duration, Instant};
 
@@ -35,6 +36,10 @@ pub struct View {
     pub wanted_period: Option<Duration>,
     /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
     pub viewing: bool,
+    /// When the unit said last which CANopen state it is in: it says so on request, and changes it without a word.
+    pub nmt_heard: Option<Instant>,
+    /// When that has become old enough for another word.
+    ages_at: Option<Instant>,
     /// The latest word to the user.
     pub notice: Option<Notice>,
 }
@@ -131,6 +136,9 @@ const AVERAGES: u16 = 0x2100;
 /// They are in tenths of a degree.
 const LIMIT_STEPS: f64 = 10.0;
 
+/// How a recording says that a moment was marked; the mark's number follows.
+pub const MARK: &str = "mark ";
+
 /// A file that rows are written to as they come.
 #[derive(Debug)]
 pub struct Export {
@@ -173,7 +181,7 @@ impl View {
                 let product = self.product();
                 self.monitor.fold(event, product);
             }
-            Event::FactsChanged => self.facts_changed(facts),
+            Event::FactsChanged => self.facts_changed(now, facts),
             Event::Held(true) => self.load.held_since = Some(now),
             Event::Held(false) => self.load.held_since = None,
             Event::Progress(progress) => {
@@ -196,14 +204,30 @@ impl View {
         late
     }
 
+    /// Whether something that is known for a while is to be called older.
+    pub fn aged(&mut self, now: Instant) -> bool {
+        let aged = self.ages_at.is_some_and(|due| due <= now);
+        if aged {
+            self.ages_at = self.nmt_heard.map(|heard| format::ages_at(heard, now));
+        }
+        aged
+    }
+
+    /// When what is known for a while is to be called older: only for a screen that says so, and while it is about a unit.
+    pub fn ages_at(&self) -> Option<Instant> {
+        self.ages_at.filter(|_| self.can_send())
+    }
+
     /// Starts minimum, maximum and mean of every channel anew.
     pub fn restart_extremes(&mut self) {
         self.monitor.stream.restart_extremes();
     }
 
-    /// Marks a moment of the stream.
-    pub fn mark(&mut self, at: Instant) {
-        self.monitor.stream.mark(at);
+    /// A remark in a recording: where it is a mark, it is one again.
+    pub fn remarked(&mut self, at: Instant, text: &str) {
+        if let Some(number) = text.strip_prefix(MARK).and_then(|number| number.parse().ok()) {
+            self.monitor.stream.set_mark(Mark { number, at });
+        }
     }
 
     /// A new link: what was known of the unit before says nothing about the one at its end.
@@ -276,7 +300,12 @@ impl View {
         self.notice = Some(Notice { tone, text: text.into() });
     }
 
-    fn facts_changed(&mut self, facts: &Facts) {
+    fn facts_changed(&mut self, now: Instant, facts: &Facts) {
+        let said = |facts: &Facts| facts.nmt_state.as_ref().map(|known| known.span);
+        if said(facts) != said(&self.facts) {
+            self.nmt_heard = said(facts).map(|_| now);
+            self.ages_at = self.nmt_heard.map(|heard| format::ages_at(heard, now));
+        }
         if facts.stream.is_none() {
             self.monitor.stream.late = false;
         }
@@ -412,6 +441,7 @@ fn done(job: Job) -> &'static str {
 mod tests {
     use super::*;
     use crate::record::Span;
+    use crate::session::Known;
     use crate::wire::stream::{Reading, Row, Source};
 
     fn row(view: &mut View, millis: u64, readings: [Reading; 5]) {
@@ -439,5 +469,26 @@ mod tests {
         assert_eq!(view.poll_timeout(), None, "it cannot get later than late");
         row(&mut view, 61_000, with_first(Reading::Value(20.0)));
         assert!(!view.monitor.stream.late);
+    }
+
+    #[test]
+    fn a_state_that_was_heard_ages_until_it_is_heard_again() {
+        let mut view = View::default();
+        view.link.state = LinkState::Open { read_only: false };
+        let said = |start| {
+            let known = Known { value: "stopped".into(), origin: Origin::Menu, span: Span { start, end: start + 9 } };
+            Facts { nmt_state: Some(known), ..Facts::default() }
+        };
+        view.fold(Instant::from_millis(5000), &Event::FactsChanged, &said(0));
+        assert_eq!(view.ages_at(), Some(Instant::from_millis(15_000)));
+        assert!(!view.aged(Instant::from_millis(14_999)));
+        assert!(view.aged(Instant::from_millis(15_000)));
+        assert_eq!(view.ages_at(), Some(Instant::from_millis(25_000)));
+        view.fold(Instant::from_millis(20_000), &Event::FactsChanged, &said(50));
+        assert_eq!(view.nmt_heard, Some(Instant::from_millis(20_000)), "the same word anew");
+        view.fold(Instant::from_millis(21_000), &Event::FactsChanged, &said(50));
+        assert_eq!(view.nmt_heard, Some(Instant::from_millis(20_000)), "something else has changed");
+        view.link.state = LinkState::Open { read_only: true };
+        assert_eq!(view.ages_at(), None, "a recording does not age");
     }
 }

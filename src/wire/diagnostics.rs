@@ -10,6 +10,8 @@ pub struct Quantity {
     pub label: String,
     /// The number.
     pub value: f64,
+    /// Digits behind its point, as printed: `70.0` says more than `70`.
+    pub decimals: usize,
     /// The unit behind it, as printed, if the word behind it is one.
     pub unit: Option<String>,
 }
@@ -29,7 +31,7 @@ pub fn quantities(line: &str) -> Vec<Quantity> {
     let mut label: Vec<&str> = Vec::new();
     let mut words = line.split([' ', '\t', '=', '|', ';', ',']).map(bare).filter(|word| !word.is_empty()).peekable();
     while let Some(word) = words.next() {
-        let Some((value, glued)) = number(word) else {
+        let Some((value, decimals, glued)) = number(word) else {
             label.push(word);
             continue;
         };
@@ -44,7 +46,7 @@ pub fn quantities(line: &str) -> Vec<Quantity> {
         }
         let first = found.first().map(|quantity| quantity.label.as_str());
         let label: Vec<&str> = first.into_iter().chain(std::mem::take(&mut label)).collect();
-        found.push(Quantity { label: label.join(" "), value, unit });
+        found.push(Quantity { label: label.join(" "), value, decimals, unit });
         if found.len() == MOST_QUANTITIES {
             break;
         }
@@ -58,17 +60,18 @@ fn bare(word: &str) -> &str {
     word.trim_end_matches([':', '.']).trim_start_matches([':', '.'])
 }
 
-/// A decimal number, and a unit that is glued to it: `24.1V`.
-fn number(word: &str) -> Option<(f64, Option<&str>)> {
+/// A decimal number, the digits behind its point, and a unit that is glued to it: `24.1V`.
+fn number(word: &str) -> Option<(f64, usize, Option<&str>)> {
     let end = word.find(|c: char| !matches!(c, '0'..='9' | '.' | '+' | '-')).unwrap_or(word.len());
     let (digits, rest) = word.split_at(end);
     if !digits.contains(|c: char| c.is_ascii_digit()) {
         return None;
     }
     let value: f64 = digits.parse().ok()?;
+    let decimals = digits.split_once('.').map_or(0, |(_, behind)| behind.len());
     match rest {
-        "" => Some((value, None)),
-        unit if is_unit(unit) => Some((value, Some(unit))),
+        "" => Some((value, decimals, None)),
+        unit if is_unit(unit) => Some((value, decimals, Some(unit))),
         _ => None,
     }
 }
@@ -112,6 +115,12 @@ mod tests {
         for (line, expected) in table {
             assert_eq!(read(line), expected, "{line:?}");
         }
+    }
+
+    #[test]
+    fn digits_behind_the_point_are_counted_as_printed() {
+        let decimals = |line| quantities(line).iter().map(|quantity| quantity.decimals).collect::<Vec<_>>();
+        assert_eq!(decimals("RTD1 70.0 C raw 4000 uV 24.125V"), [1, 0, 3]);
     }
 
     proptest! {

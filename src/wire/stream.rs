@@ -208,6 +208,11 @@ impl Row {
         line.push('\n');
         line
     }
+
+    /// A mark among such rows: `2026-01-31T12:00:00.123Z,mark 1,,,,,`, as many fields as rows of so many channels have.
+    pub fn csv_mark(time: &str, number: u64, channels: usize) -> String {
+        format!("{time},mark {number}{}\n", ",".repeat(channels))
+    }
 }
 
 impl FieldFormat {

@@ -6,17 +6,23 @@ use super::App;
 use crate::dump::{self, Dump};
 use crate::time::Instant;
 use crate::tui::input::Effect;
-use crate::tui::view::{Export, Tone};
+use crate::tui::view::{Export, MARK, Tone};
 use crate::tui::widgets::format;
 use crate::wire::stream::Row;
 
 impl App {
     pub(super) fn mark(&mut self, effects: &mut Vec<Effect>) {
-        self.view.mark(self.now);
-        let text = format!("mark {}", self.view.monitor.stream.marks.len());
+        let mark = self.view.monitor.stream.mark(self.now);
+        let text = format!("{MARK}{}", mark.number);
         self.scrollback.note(self.now, text.clone());
-        self.view.tell(Tone::Quiet, format!("{text} is set, in the chart and in the recording."));
+        let places = if self.view.export.is_some() { "chart, recording and file" } else { "chart and recording" };
+        self.view.tell(Tone::Quiet, format!("{text} is set, in {places}."));
         effects.push(Effect::Mark(text));
+        let time = format::utc(self.view.link.start_millis, mark.at);
+        if let Some(export) = &self.view.export {
+            let bytes = Row::csv_mark(&time, mark.number, export.channels.len()).into_bytes();
+            effects.push(Effect::AppendFile { path: export.path.clone(), bytes });
+        }
     }
 
     pub(super) fn export_stream(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
@@ -27,10 +33,22 @@ impl App {
         }
         let mut text = Row::csv_heading(&channels);
         let mut rows = 0;
+        let mut marks = stream.marks.iter().peekable();
+        let mut marks_before = |at: Instant, text: &mut String| {
+            while let Some(mark) = marks.next_if(|mark| mark.at < at) {
+                text.push_str(&Row::csv_mark(&format::utc(start, mark.at), mark.number, channels.len()));
+            }
+        };
         for (at, row) in stream.kept_rows() {
+            // A mark stands between rows. What was marked before the rows that are kept stands among none.
+            match rows {
+                0 => marks_before(at, &mut String::new()),
+                _ => marks_before(at, &mut text),
+            }
             text.push_str(&row.csv(&format::utc(start, at)));
             rows += 1;
         }
+        marks_before(Instant::NEVER, &mut text);
         effects.push(Effect::CreateFile { path: path.clone(), bytes: text.into_bytes() });
         self.view.export = Some(Export { path, rows, channels });
     }

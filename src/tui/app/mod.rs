@@ -158,7 +158,10 @@ impl App {
                     session.handle_sent(now, &bytes);
                 }
             }
-            Input::Mark(text) => self.scrollback.note(now, super::visible::text(&text)),
+            Input::Mark(text) => {
+                self.view.remarked(now, &text);
+                self.scrollback.note(now, super::visible::text(&text));
+            }
             Input::Unrecorded(why) => self.unrecorded(now, why),
             Input::RecordingOver(failure) => self.recording_over(now, failure),
             Input::FilesListed { directory, entries } => {
@@ -205,7 +208,9 @@ impl App {
         let tick = (self.view.job == Some(Job::Load)).then(|| self.now + UPLOAD_TICK);
         let late = self.view.poll_timeout().filter(|_| is_open);
         let leaving = self.leaving.as_ref().map(|(_, until)| *until);
-        [session, tick, late, leaving].into_iter().flatten().min()
+        // No other screen says how old anything is.
+        let ages = self.view.ages_at().filter(|_| self.front == ScreenId::Overview);
+        [session, tick, late, ages, leaving].into_iter().flatten().min()
     }
 
     /// Whether the picture has changed since it was last drawn.
@@ -478,6 +483,7 @@ impl App {
             session.handle_timeout(now);
         }
         self.dirty |= self.view.timeout(now) || self.view.job == Some(Job::Load);
+        self.dirty |= self.view.aged(now) && self.front == ScreenId::Overview;
     }
 
     /// Everything the session has to say and to send.

@@ -569,6 +569,15 @@ fn nothing_a_unit_sends_reaches_the_screen_as_a_control_code() {
 fn an_idle_console_wants_nothing_and_draws_nothing() {
     let mut stage = Stage::connected(SMALL);
     stage.wait(60_000);
+    // The overview says how old the CANopen state is: now once a minute.
+    let due = stage.app.poll_timeout().expect("an age");
+    stage.app.drawn();
+    stage.wait(due.since(stage.now).as_millis() as u64);
+    assert!(stage.app.is_dirty() && stage.shows("pre-operational, 2 min ago"), "{}", stage.picture());
+    assert!(stage.app.poll_timeout().is_some_and(|next| next == due + Duration::from_secs(60)));
+    // Nothing else ages.
+    stage.keys("4");
+    stage.wait(60_000);
     stage.app.drawn();
     assert_eq!(stage.app.poll_timeout(), None);
     stage.input(Input::Timeout);

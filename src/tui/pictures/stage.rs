@@ -82,6 +82,20 @@ impl Stage {
         Stage::connected(size).with_rows()
     }
 
+    /// Connected to a unit with eight channels that has said no more than its rows: wires break, and once it was away.
+    pub(super) fn eight_channels(size: (u16, u16)) -> Self {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("/dev/ttyUSB0");
+        for second in 0..40 {
+            let broken = |channel| channel == 2 && second > 9 || channel == 5 && (second / 4) % 3 == 1;
+            let value =
+                |channel| if broken(channel) { "Open  ".into() } else { format!("{:6.1}", 20.0 + f64::from(channel)) };
+            let row = (0..8).map(value).collect::<Vec<_>>().join(";") + "\r\n";
+            stage.wait(if second == 30 { 20_000 } else { 1000 }).bytes(row.as_bytes());
+        }
+        stage
+    }
+
     pub(super) fn with_rows(self) -> Self {
         let mut stage = self;
         for second in 0..90u32 {

@@ -92,7 +92,9 @@ impl Diagnostics {
         };
         let (heading, body) = lines::split(left, 1);
         lines::draw(frame, heading, [lines::rule(theme, left.width, "As the unit prints it", &remark)]);
-        lines::draw(frame, body, page.into_iter().skip(self.scrolled));
+        // The longer half sets how far it goes; the other one stops at its end.
+        let first = self.scrolled.min(page.len().saturating_sub(usize::from(body.height)));
+        lines::draw(frame, body, page.into_iter().skip(first));
         self.draw_found(scene, right, frame);
     }
 
@@ -107,11 +109,8 @@ impl Diagnostics {
             let (head, body) = lines::split(body, 1);
             let heads = format!("{}{:>12}{:>10}{:>10}", format::left(" ", label), "Now", "Min", "Max");
             lines::draw(frame, head, [Line::styled(heads, theme.quiet())]);
-            return lines::draw(
-                frame,
-                body,
-                found.iter().skip(self.scrolled).map(|tracked| row(scene, tracked, label, true)),
-            );
+            let first = self.scrolled.min(found.len().saturating_sub(usize::from(body.height)));
+            return lines::draw(frame, body, found.iter().skip(first).map(|tracked| row(scene, tracked, label, true)));
         }
         let half = body.width / 2;
         let label = usize::from(half).saturating_sub(14);
@@ -126,19 +125,15 @@ impl Diagnostics {
 
 fn row(scene: Scene, tracked: &Tracked, label: usize, with_extremes: bool) -> Line<'static> {
     let theme = scene.theme;
-    let number = |value: f64| {
-        let text = format!("{value:.3}");
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    };
     let unit = tracked.unit.as_deref().map(visible::text).unwrap_or_default();
     let now = match tracked.value {
-        Some(value) => Span::styled(format!("{:>12}", format!("{} {unit}", number(value))), theme.strong()),
+        Some(value) => Span::styled(format!("{:>12}", format!("{} {unit}", tracked.text(value))), theme.strong()),
         None => Span::styled(format!("{:>12}", "gone"), theme.quiet()),
     };
     let name = format::left(&visible::text(&tracked.label), label.saturating_sub(3));
     let mut line = Line::from(vec![Span::raw(format!("  {name} ")), now]);
     if with_extremes {
-        line.push_span(Span::raw(format!("{:>10}{:>10}", number(tracked.min), number(tracked.max))));
+        line.push_span(Span::raw(format!("{:>10}{:>10}", tracked.text(tracked.min), tracked.text(tracked.max))));
     }
     line
 }

@@ -12,7 +12,7 @@ use super::Scene;
 use crate::canopen::ObjectAddress;
 use crate::device::Product;
 use crate::device::dictionary::{Access, Bound, Entry, Limits, Object};
-use crate::dump::{self, Difference, Dump, DumpEntry};
+use crate::dump::{self, Difference, Dump, DumpEntry, Measure};
 use crate::session::Job;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
@@ -65,8 +65,12 @@ const DETAIL_ROWS: u16 = 8;
 const BESIDE_AT: u16 = 150;
 /// ... and takes so many columns.
 const DETAIL_COLUMNS: u16 = 64;
-/// Columns of everything but the name: cursor and mark, address, value, factory's value.
-const FIXED_COLUMNS: usize = 4 + 9 + 16 + 16;
+/// Columns of cursor, mark and address.
+const FIXED_COLUMNS: usize = 4 + 9;
+/// Columns at most of the value and of the factory's: on a narrow screen they leave room for the longest name.
+const MOST_COLUMNS: [(usize, usize); 2] = [(14, 10), (22, 16)];
+/// From this width on there is room for the wider ones.
+const WIDE_AT: usize = 100;
 /// From this width on the meaning of the value has a column.
 const MEANING_AT: usize = 120;
 /// Columns of it.
@@ -227,17 +231,17 @@ impl Dictionary {
         let (head, table) = lines::split(upper, 2);
         let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len(), total))];
         let columns = usize::from(upper.width);
-        let name_columns = name_columns(columns);
         let factory = match &self.other {
             Some(other) => format!("in {}", visible::text(&other.name)),
             None => "Factory".into(),
         };
+        let widths = Widths::of(&rows, &factory, self.other.is_some(), columns);
         let mut heads = format!(
-            "    {}{}{}{}",
+            "    {}{} {} {} ",
             format::left("Address", 9),
-            format::left("Name", name_columns),
-            format::left("Value", 16),
-            format::left(&factory, 16)
+            format::left("Name", widths.name),
+            format::left("Value", widths.value),
+            format::left(&factory, widths.factory)
         );
         if columns >= MEANING_AT {
             heads.push_str("Meaning");
@@ -266,7 +270,7 @@ impl Dictionary {
         let cursor = self.cursor.min(rows.len() - 1);
         let first = lines::first_visible(cursor, rows.len(), usize::from(table.height));
         let shown = rows.iter().enumerate().skip(first).take(usize::from(table.height));
-        lines::draw(frame, table, shown.map(|(number, row)| row.line(scene, number == cursor, columns)));
+        lines::draw(frame, table, shown.map(|(number, row)| row.line(scene, number == cursor, &widths)));
         lines::draw(frame, detail, rows[cursor].detail(scene, detail.width, detail.height > DETAIL_ROWS));
     }
 
@@ -337,9 +341,28 @@ fn manual<'a>(product: Option<&'static Product>) -> impl Iterator<Item = Row<'a>
     })
 }
 
-fn name_columns(columns: usize) -> usize {
-    let meaning = if columns >= MEANING_AT { MEANING_COLUMNS } else { 0 };
-    columns.saturating_sub(FIXED_COLUMNS + meaning)
+/// How wide the columns are.
+struct Widths {
+    name: usize,
+    value: usize,
+    factory: usize,
+    /// The meaning of the value has a column.
+    meaning: bool,
+}
+
+impl Widths {
+    /// As wide as what is in them, within limits; the names have the rest.
+    fn of(rows: &[Row], factory: &str, compares: bool, columns: usize) -> Self {
+        let (most_value, most_factory) = MOST_COLUMNS[usize::from(columns >= WIDE_AT || compares)];
+        let widest = |head: &str, cells: &mut dyn Iterator<Item = String>| {
+            cells.map(|cell| format::width(&cell)).max().unwrap_or_default().max(format::width(head))
+        };
+        let value = widest("Value", &mut rows.iter().map(|row| row.cell(most_value))).min(most_value);
+        let factory = widest(factory, &mut rows.iter().map(Row::other)).min(most_factory);
+        let meaning = columns >= MEANING_AT;
+        let taken = FIXED_COLUMNS + value + factory + 3 + if meaning { MEANING_COLUMNS } else { 0 };
+        Widths { name: columns.saturating_sub(taken), value, factory, meaning }
+    }
 }
 
 impl Row<'_> {
@@ -350,22 +373,56 @@ impl Row<'_> {
         }
     }
 
-    fn value(&self) -> String {
+    /// How its numbers stand for a quantity, where they do.
+    fn measure(&self) -> Option<Measure> {
+        let of_manual = self.known.and_then(|(_, entry)| entry.unit.as_deref());
+        self.read.and_then(|read| read.unit.as_deref()).or(of_manual).map(Measure::of)
+    }
+
+    /// A number as people read it, without its unit.
+    fn number(&self, raw: String) -> String {
+        match (self.measure(), raw.parse()) {
+            (Some(measure), Ok(value)) => measure.number(value, &raw),
+            _ => raw,
+        }
+    }
+
+    /// The value without its unit.
+    fn bare_value(&self) -> String {
         match self.read {
             Some(read) if read.value.is_none() => visible::text(&read.text),
-            Some(read) => match &read.unit {
-                Some(unit) => format!("{} {unit}", read.shown()),
-                None => read.shown(),
-            },
+            Some(read) => self.number(read.shown()),
             None => "-".into(),
         }
     }
 
+    fn value(&self) -> String {
+        match (self.read.is_some_and(|read| read.value.is_some()), self.measure()) {
+            (true, Some(measure)) => format!("{} {}", self.bare_value(), measure.unit),
+            _ => self.bare_value(),
+        }
+    }
+
+    /// The value in so many columns: rather the whole number without its unit, which is told below, than half of both.
+    fn cell(&self, columns: usize) -> String {
+        let value = self.value();
+        if format::width(&value) <= columns { value } else { self.bare_value() }
+    }
+
+    /// The factory's value, without its unit.
     fn default(&self) -> String {
         let manual = || self.known.and_then(|(_, entry)| Some(dump::shown(entry, entry.default?.value)));
         match self.read {
-            Some(read) => read.shown_default(),
-            None => manual().unwrap_or_else(|| "-".into()),
+            Some(read) => self.number(read.shown_default()),
+            None => manual().map_or_else(|| "-".into(), |raw| self.number(raw)),
+        }
+    }
+
+    /// What the value is compared with.
+    fn other(&self) -> String {
+        match &self.difference {
+            Some(difference) => difference.left.clone().map_or_else(|| "not there".into(), |raw| self.number(raw)),
+            None => self.default(),
         }
     }
 
@@ -376,12 +433,14 @@ impl Row<'_> {
     /// What is searched, in lower case.
     fn text(&self) -> String {
         let description = self.known.and_then(|(_, entry)| entry.description.as_deref()).unwrap_or_default();
-        let text =
-            format!("{} {} {} {} {description}", self.at, self.name(), self.value(), self.meaning().unwrap_or(""));
+        // Also as the unit keeps it: that is what other tools show.
+        let raw = self.read.map(DumpEntry::shown).unwrap_or_default();
+        let (value, meaning) = (self.value(), self.meaning().unwrap_or(""));
+        let text = format!("{} {} {value} {raw} {meaning} {description}", self.at, self.name());
         text.to_lowercase()
     }
 
-    fn line(&self, scene: Scene, is_chosen: bool, columns: usize) -> Line<'static> {
+    fn line(&self, scene: Scene, is_chosen: bool, widths: &Widths) -> Line<'static> {
         let theme = scene.theme;
         let deviates = self.read.is_some_and(|read| read.deviates);
         let was_read = scene.view.dictionary.is_some();
@@ -391,23 +450,20 @@ impl Row<'_> {
             (None, None) if was_read => "?",
             _ => " ",
         };
-        let other = match &self.difference {
-            Some(difference) => difference.left.clone().unwrap_or_else(|| "not there".into()),
-            None => self.default(),
-        };
-        let room = name_columns(columns).saturating_sub(1);
+        let value = self.cell(widths.value);
         let value_style = if deviates || self.difference.is_some() { theme.warning() } else { theme.strong() };
         let mut line = Line::from(vec![
             Span::raw(if is_chosen { "› " } else { "  " }),
             Span::styled(format!("{mark} "), theme.warning()),
             Span::raw(format::left(&self.at.to_string(), 9)),
-            Span::raw(format::left(&format::keep_ends(&self.name(), room), room)),
+            Span::raw(format::left(&format::keep_ends(&self.name(), widths.name), widths.name)),
             Span::raw(" "),
-            Span::styled(format::left(&self.value(), 15), value_style),
+            Span::styled(format::left(&value, widths.value), value_style),
             Span::raw(" "),
-            Span::styled(format::left(&other, 16), theme.quiet()),
+            Span::styled(format::left(&self.other(), widths.factory), theme.quiet()),
+            Span::raw(" "),
         ]);
-        if columns >= MEANING_AT {
+        if widths.meaning {
             line.push_span(Span::raw(format::left(self.meaning().unwrap_or_default(), MEANING_COLUMNS)));
         }
         if is_chosen { line.style(theme.bar()) } else { line }
@@ -418,7 +474,9 @@ impl Row<'_> {
         let theme = scene.theme;
         let room = usize::from(columns).saturating_sub(2 + lines::LABEL_COLUMNS);
         let section = self.known.map(|(object, _)| format!("manual, section {}", object.section)).unwrap_or_default();
-        let mut rows = vec![lines::rule(theme, columns, &format!("{} {}", self.at, self.name()), &section)];
+        // Beside the table there are rows for it, and no columns.
+        let remark = if has_room { "" } else { &section };
+        let mut rows = vec![lines::rule(theme, columns, &format!("{} {}", self.at, self.name()), remark)];
         let mut labelled = |label: &str, text: String, most: usize| {
             let most = if has_room { usize::MAX } else { most };
             for (number, line) in format::wrap(&text, room).into_iter().take(most).enumerate() {
@@ -427,6 +485,9 @@ impl Row<'_> {
             }
         };
         let mut value = self.value();
+        if let Some(read) = self.read.filter(|_| self.measure().is_some_and(|measure| measure.is_scaled())) {
+            value.push_str(&format!(" (raw {})", read.number()));
+        }
         if let Some(meaning) = self.meaning() {
             value.push_str(&format!(": {meaning}"));
         }
@@ -447,7 +508,12 @@ impl Row<'_> {
             |default| {
                 let meaning = entry.meaning(default.value).map(|text| format!(": {text}")).unwrap_or_default();
                 let node = if default.plus_node_id { " + node-ID" } else { "" };
-                format!("{}{node}{meaning}", dump::shown(entry, default.value))
+                let raw = dump::shown(entry, default.value);
+                let value = match self.measure() {
+                    Some(measure) => measure.quantity(default.value.as_f64(), &raw),
+                    None => raw,
+                };
+                format!("{value}{node}{meaning}")
             },
         );
         labelled("Factory", factory, 1);
@@ -469,19 +535,31 @@ impl Row<'_> {
         if let Some(read) = self.read.filter(|read| !read.text.is_empty()) {
             labelled("Printed", visible::text(&read.text), 1);
         }
+        if has_room {
+            labelled("Described", section, 1);
+        }
         rows
     }
 }
 
 /// `, 0 to 100 °C`.
 fn range(limits: &Limits, entry: &Entry) -> String {
-    let bound = |bound: &Bound| match bound {
-        Bound::Value(value) => value.to_string(),
-        Bound::Entry { at, offset: 0 } => format!("{at}"),
-        Bound::Entry { at, offset } => format!("{at}{offset:+}"),
+    let measure = entry.unit.as_deref().map(Measure::of);
+    let number = |value: f64, raw: String| match &measure {
+        Some(measure) => measure.number(value, &raw),
+        None => raw,
     };
-    let unit = entry.unit.as_deref().map(|unit| format!(" {unit}")).unwrap_or_default();
-    let values: Vec<String> = limits.values.iter().map(ToString::to_string).collect();
+    let bound = |bound: &Bound| match bound {
+        Bound::Value(value) => number(value.as_f64(), value.to_string()),
+        Bound::Entry { at, offset: 0 } => format!("{at}"),
+        Bound::Entry { at, offset } => {
+            let sign = if *offset < 0 { '-' } else { '+' };
+            let size = offset.unsigned_abs();
+            format!("{at} {sign} {}", number(size as f64, size.to_string()))
+        }
+    };
+    let unit = measure.as_ref().map(|measure| format!(" {}", measure.unit)).unwrap_or_default();
+    let values: Vec<String> = limits.values.iter().map(|value| number(value.as_f64(), value.to_string())).collect();
     let span = match (&limits.low, &limits.high) {
         (Some(low), Some(high)) => Some(format!("{} to {}{unit}", bound(low), bound(high))),
         (Some(low), None) => Some(format!("from {}{unit}", bound(low))),

@@ -6,14 +6,15 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::{Scene, terminal};
-use crate::monitor::{Channel, Fault};
+use crate::device::Product;
+use crate::monitor::{Channel, Fault, Tracked};
 use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::view::View;
 use crate::tui::visible;
-use crate::tui::widgets::chart::{self, Curve};
+use crate::tui::widgets::chart::{self, Curve, Quantity};
 use crate::tui::widgets::spark::sparkline;
 use crate::tui::widgets::{format, lines};
 use crate::wire::stream::Source;
@@ -142,6 +143,7 @@ impl Overview {
             let room = usize::from(columns).saturating_sub(4);
             let broken = without_values(scene).into_iter().flat_map(|text| format::wrap(text, room));
             shown.extend(broken.map(|line| Line::raw(format!("  {line}"))));
+            shown.extend(diagnosed_values(scene));
             shown.push(Line::default());
             return shown;
         };
@@ -233,9 +235,13 @@ fn averages(scene: Scene) -> Option<Line<'static>> {
     (!said.is_empty()).then(|| Line::styled(text, scene.theme.quiet()))
 }
 
-/// Digits behind the point, as the product prints them.
+/// Digits behind the point, as the product prints them; before it has said its name, as the one with such channels does.
 pub fn decimals(view: &View, source: Source) -> usize {
-    view.product().map_or_else(
+    let channels = &view.monitor.stream.channels;
+    let has_these =
+        |product: &&Product| product.stream.channels.iter().eq(channels.iter().map(|channel| &channel.name));
+    let product = view.product().or_else(|| Product::all().iter().find(has_these));
+    product.map_or_else(
         || if source == Source::FieldValue { 3 } else { 0 },
         |product| product.stream.format(source).decimals,
     )
@@ -270,6 +276,7 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         1 => "1 line, see the terminal".into(),
         count => format!("{} lines, see the terminal", format::grouped(count)),
     };
+    let half = usize::from(columns) / 2 - 2;
     let left = [
         ("Product", known(&facts.product, |product| visible::text(product))),
         ("Version", known(&facts.version, |version| version.to_string())),
@@ -278,11 +285,10 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     ];
     let right = [
         ("State", state),
-        ("CANopen", known(&facts.nmt_state, |state| visible::text(state))),
+        ("CANopen", canopen_state(scene, usize::from(columns).saturating_sub(half + 2 + lines::LABEL_COLUMNS))),
         ("Stream", Span::raw(stream)),
         ("Other text", Span::raw(other_text)),
     ];
-    let half = usize::from(columns) / 2 - 2;
     let mut shown = vec![lines::rule(theme, columns, "Unit", &title)];
     for ((left_label, left_value), (right_label, right_value)) in left.into_iter().zip(right) {
         let mut line = lines::labelled(theme, left_label, left_value);
@@ -294,6 +300,24 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     shown.extend(diagnosed(scene, columns));
     shown.push(Line::default());
     shown
+}
+
+/// The channels' temperatures on the newest page of diagnostics: without a stream they are all there is to know.
+fn diagnosed_values(scene: Scene) -> Vec<Line<'static>> {
+    let diagnostics = &scene.view.monitor.diagnostics;
+    let (Some(at), Some(product)) = (diagnostics.at, scene.view.product()) else { return Vec::new() };
+    let time = format::time_of_day(scene.start_of_day, at);
+    let is_celsius = |found: &&Tracked| found.unit.as_deref().is_some_and(|unit| matches!(unit, "C" | "°C" | "degC"));
+    let row = |name: &String| {
+        let found = diagnostics.found.iter().filter(is_celsius).find(|found| found.label == *name)?;
+        let value = format!("{} °C", found.text(found.value?));
+        Some(Line::from(vec![
+            Span::raw(format!("    {name:<8}")),
+            Span::styled(format!("{value:>13}"), scene.theme.quiet()),
+            Span::styled(format!("   on the diagnostics' last page, {time}"), scene.theme.quiet()),
+        ]))
+    };
+    product.stream.channels.iter().filter_map(row).collect()
 }
 
 /// What the unit's diagnostics say beside the channels: supply, cold junction, active errors.
@@ -309,7 +333,7 @@ fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
         });
     let said = said.filter_map(|found| {
         let unit = found.unit.as_deref().map(|unit| format!(" {}", visible::text(unit))).unwrap_or_default();
-        Some(format!("{} {}{unit}", visible::text(&found.label), found.value?))
+        Some(format!("{} {}{unit}", visible::text(&found.label), found.text(found.value?)))
     });
     let mut said: Vec<String> = said.collect();
     // What does not fit is cut off, and that must not be the errors.
@@ -318,6 +342,18 @@ fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
     let text = format::keep_start(&said.join(", "), room);
     let time = format::time_of_day(scene.start_of_day, at);
     (!said.is_empty()).then(|| lines::labelled(scene.theme, "Diagnosed", Span::raw(format!("{text} ({time})"))))
+}
+
+/// The CANopen state, in `room` columns. Any master on the bus changes it without the unit saying so here: what was
+/// heard a while ago is told with its age, and does not look like what is.
+fn canopen_state(scene: Scene, room: usize) -> Span<'static> {
+    let state = &scene.view.facts.nmt_state;
+    let now = known(state, |state| visible::text(state));
+    let age = scene.view.nmt_heard.and_then(|heard| format::ago(heard, scene.now));
+    let (Some(state), Some(age)) = (state, age) else { return now };
+    let full = format!("{}, {age}", now.content);
+    let text = if format::width(&full) <= room { full } else { format!("{}, {age}", visible::text(&state.value)) };
+    Span::styled(text, scene.theme.quiet())
 }
 
 /// A fact and where it comes from: `127 (menu)`.
@@ -497,10 +533,20 @@ fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
 
 fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
     let (heading, canvas) = lines::split(area, 1);
-    let theme = scene.theme;
+    let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
     lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Trend of {}", channel.name), "")]);
-    let samples = channel.newest(usize::MAX).collect();
-    let curve = Curve { samples, window: None, cursor: None, marks: Vec::new() };
+    let source = stream.source.unwrap_or(Source::FieldValue);
+    let samples: Vec<_> = channel.newest(usize::MAX).collect();
+    let ends = samples.first().zip(samples.last());
+    let curve = Curve {
+        window: ends.map(|(first, last)| (first.0, last.0)).unwrap_or_default(),
+        quantity: Quantity::of(source, decimals(scene.view, source)),
+        cursor: None,
+        marks: stream.marks.iter().copied().collect(),
+        without: super::stream::without_value(channel),
+        label_columns: 0,
+        samples,
+    };
     let (canvas, _) = lines::split(canvas, canvas.height.saturating_sub(1));
     chart::draw(theme, scene.start_of_day, &curve, canvas, frame);
 }

@@ -15,7 +15,7 @@ use crate::tui::popup::{Purpose, Question};
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
 use crate::tui::visible;
-use crate::tui::widgets::chart::{self, Curve};
+use crate::tui::widgets::chart::{self, Curve, Quantity};
 use crate::tui::widgets::spark::sparkline;
 use crate::tui::widgets::{format, lines};
 use crate::wire::stream::{Reading, Source};
@@ -27,6 +27,12 @@ pub const TITLE: &str = "Stream";
 pub const BINDINGS: &[Binding] = &[
     Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "channel above" },
     Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "channel", long: "channel below" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Enter)],
+        cmd: Cmd::Accept,
+        short: "",
+        long: "the chosen channel's curve alone, or all that have room",
+    },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('z'))],
         cmd: Cmd::Zoom,
@@ -51,7 +57,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('k'))],
         cmd: Cmd::Mark,
         short: "mark",
-        long: "mark this moment in chart and recording",
+        long: "mark this moment in chart, recording and CSV file",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
@@ -81,6 +87,10 @@ const CURSOR_STEPS: u32 = 60;
 const LEAST_SPAN: f64 = 1.0;
 /// Columns of the table before the trend begins.
 const TABLE_COLUMNS: usize = 77;
+/// A chart of fewer columns or rows, its heading and its axis among them, says little: then fewer are shown.
+const LEAST_CHART: (u16, u16) = (60, 9);
+/// Charts as high as this stand one below the other, so that the same moment is in the same column of all.
+const HIGH_CHART: u16 = 11;
 
 /// The page.
 #[derive(Debug, Default)]
@@ -88,6 +98,8 @@ pub struct Stream {
     channel: usize,
     window: usize,
     held: Option<Held>,
+    /// The chosen channel's curve has all the room.
+    alone: bool,
 }
 
 /// The picture is held.
@@ -102,7 +114,7 @@ struct Held {
 impl Stream {
     /// Another link: nothing is held any more.
     pub fn begin_link(&mut self) {
-        *self = Stream { window: self.window, ..Stream::default() };
+        *self = Stream { window: self.window, alone: self.alone, ..Stream::default() };
     }
 
     /// What a command does here.
@@ -118,6 +130,7 @@ impl Stream {
             Cmd::Pause => self.held = values.newest.map(|at| Held { end: at, cursor: at }),
             Cmd::Left | Cmd::Right => self.move_cursor(values, cmd == Cmd::Left),
             Cmd::Last => self.held = None,
+            Cmd::Accept => self.alone = !self.alone,
             Cmd::Restart => return Some(Action::RestartExtremes),
             Cmd::Mark => return Some(Action::Mark),
             Cmd::Export if view.export.is_some() => return Some(Action::EndExport),
@@ -163,22 +176,97 @@ impl Stream {
         let table = self.table(scene, area.width);
         let (upper, rest) = lines::split(area, table.len() as u16);
         lines::draw(frame, upper, table);
-        let Some(channel) = values.channels.get(self.channel.min(values.channels.len().saturating_sub(1))) else {
-            return;
-        };
         let (from, to) = self.times(values, self.held.map_or(newest, |held| held.end));
-        let (name, _) = WINDOWS[self.window];
-        let state = if self.held.is_some() { "held, End follows again" } else { "follows" };
-        let remark = format!("{name}, {state}");
-        let (heading, canvas) = lines::split(rest, 1);
-        lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Curve of {}", channel.name), &remark)]);
-        let curve = Curve {
-            samples: channel.samples(from, to),
-            window: Some((from, to)),
+        let charts = self.charts(values, rest, (from, to));
+        let curves: Vec<_> = charts
+            .iter()
+            .filter_map(|&(number, area)| Some((number, self.curve(scene, number, (from, to))?, area)))
+            .collect();
+        // Charts that stand one below the other have their times in the same columns.
+        let needed = curves.iter().map(|(_, curve, area)| curve.needed_columns(area.height.saturating_sub(1))).max();
+        for (number, mut curve, area) in curves {
+            curve.label_columns = needed.unwrap_or_default();
+            let heading = lines::rule(
+                theme,
+                area.width,
+                &self.title(values, number, &charts),
+                &self.remark(scene, &curve, number, &charts),
+            );
+            let (above, canvas) = lines::split(area, 1);
+            lines::draw(frame, above, [heading]);
+            chart::draw(theme, scene.start_of_day, &curve, canvas, frame);
+        }
+    }
+
+    /// Which channels get a chart, by their number, and where: as many as have room, the chosen one among them.
+    fn charts(&self, values: &Values, area: Rect, (from, to): (Instant, Instant)) -> Vec<(usize, Rect)> {
+        let Some(last) = values.channels.len().checked_sub(1) else { return Vec::new() };
+        let chosen = self.channel.min(last);
+        let (columns, rows) = (area.width / LEAST_CHART.0, area.height / LEAST_CHART.1);
+        if self.alone || columns * rows < 2 {
+            return vec![(chosen, area)];
+        }
+        // A channel that is switched off or open all the time has nothing to draw.
+        let draws = |channel: &Channel| channel.samples(from, to).iter().any(|(_, value)| value.is_some());
+        let all: Vec<usize> =
+            (0..=last).filter(|&number| number == chosen || draws(&values.channels[number])).collect();
+        let place = all.iter().position(|&number| number == chosen).unwrap_or_default();
+        let room = usize::from(columns) * usize::from(rows);
+        let first = place.saturating_sub(room - 1);
+        let shown: Vec<usize> = all.into_iter().skip(first).take(room).collect();
+        let lines_of = |columns: u16| shown.len().div_ceil(usize::from(columns)).max(1) as u16;
+        let columns = (1..columns).find(|&columns| area.height / lines_of(columns) >= HIGH_CHART).unwrap_or(columns);
+        let count = lines_of(columns);
+        let places = shown.chunks(usize::from(columns)).enumerate().flat_map(|(line, channels)| {
+            let (top, bottom) = (share(area.height, count, line), share(area.height, count, line + 1));
+            // What stands alone in the last line has all of it.
+            let count = channels.len() as u16;
+            channels.iter().enumerate().map(move |(place, &channel)| {
+                let (left, right) = (share(area.width, count, place), share(area.width, count, place + 1));
+                let width = (right - left).saturating_sub(if right < area.width { 2 } else { 0 });
+                (channel, Rect { x: area.x + left, y: area.y + top, width, height: bottom - top })
+            })
+        });
+        places.collect()
+    }
+
+    fn curve(&self, scene: Scene, number: usize, window: (Instant, Instant)) -> Option<Curve> {
+        let values = &scene.view.monitor.stream;
+        let channel = values.channels.get(number)?;
+        let source = values.source.unwrap_or(Source::FieldValue);
+        Some(Curve {
+            samples: channel.samples(window.0, window.1),
+            window,
+            quantity: Quantity::of(source, super::overview::decimals(scene.view, source)),
             cursor: self.held.map(|held| held.cursor),
             marks: values.marks.iter().copied().collect(),
-        };
-        chart::draw(theme, scene.start_of_day, &curve, canvas, frame);
+            without: without_value(channel),
+            label_columns: 0,
+        })
+    }
+
+    fn is_chosen(&self, values: &Values, number: usize) -> bool {
+        number == self.channel.min(values.channels.len().saturating_sub(1))
+    }
+
+    fn title(&self, values: &Values, number: usize, charts: &[(usize, Rect)]) -> String {
+        let pointer = if self.is_chosen(values, number) && charts.len() > 1 { "› " } else { "" };
+        let name = values.channels.get(number).map_or("", |channel| channel.name.as_str());
+        format!("{pointer}Curve of {name}")
+    }
+
+    /// What its values span, where that is not all that is on the screen, and which time it shows.
+    fn remark(&self, scene: Scene, curve: &Curve, number: usize, charts: &[(usize, Rect)]) -> String {
+        let values = &scene.view.monitor.stream;
+        let decimals = super::overview::decimals(scene.view, values.source.unwrap_or(Source::FieldValue));
+        let known = curve.samples.iter().filter_map(|&(_, value)| value);
+        let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        let span = format!("{low:.decimals$} to {high:.decimals$} {}", curve.quantity.unit);
+        let state = if self.held.is_some() { "held, End follows again" } else { "follows" };
+        let window = format!("{}, {state}", WINDOWS[self.window].0);
+        let parts = [(charts.len() > 1 && low <= high, span), (self.is_chosen(values, number), window)];
+        let parts: Vec<String> = parts.into_iter().filter_map(|(is_wanted, text)| is_wanted.then_some(text)).collect();
+        parts.join(", ")
     }
 
     fn table(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
@@ -215,13 +303,15 @@ impl Stream {
         let is_old = stream.late || scene.view.facts.stream.is_none() || self.held.is_some();
         let (state, style) = state(theme, reading);
         let unit = if source == Source::FieldValue { " °C" } else { "   " };
+        // Where there is no value its state says why; a unit behind nothing would look like a value.
+        let value = match reading.and_then(Reading::value) {
+            Some(value) => format!("{value:.decimals$}{unit}"),
+            None => "-   ".into(),
+        };
         let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, channel.name);
         let mut line = Line::from(vec![
             Span::styled(name, if is_chosen { theme.strong() } else { Style::new() }),
-            Span::styled(
-                format!("{:>13}", format!("{}{unit}", show(reading.and_then(Reading::value)))),
-                if is_old { theme.quiet() } else { theme.strong() },
-            ),
+            Span::styled(format!("{value:>13}"), if is_old { theme.quiet() } else { theme.strong() }),
             Span::raw("   "),
             Span::styled(format!("{state:<15}"), style),
             Span::raw(format!("{:>11}{:>11}{:>11}", show(channel.min), show(channel.max), show(channel.mean()))),
@@ -232,6 +322,19 @@ impl Stream {
             line.push_span(Span::styled(format!("  {}", sparkline(&values, room, LEAST_SPAN)), theme.curve()));
         }
         line
+    }
+}
+
+/// Where the part number `place` of `count` equal parts begins.
+fn share(length: u16, count: u16, place: usize) -> u16 {
+    (usize::from(length) * place / usize::from(count.max(1))) as u16
+}
+
+/// Why there is no curve.
+pub fn without_value(channel: &Channel) -> String {
+    match channel.reading {
+        Reading::Value(_) => format!("{} had no value in this time.", channel.name),
+        reading => format!("{}: {}, no value in this time.", channel.name, reading.words()),
     }
 }
 

@@ -46,6 +46,35 @@ pub fn period(duration: Duration) -> String {
     }
 }
 
+/// What was heard less long ago is as good as what is heard now ...
+const FRESH: Duration = Duration::from_secs(10);
+/// ... and what is older than a minute, or an hour, is told in whole ones.
+const COARSER: [Duration; 2] = [Duration::from_secs(60), Duration::from_secs(3600)];
+
+/// How long ago something was, `40 s ago`; nothing for what has just been.
+pub fn ago(then: Instant, now: Instant) -> Option<String> {
+    let age = now.since(then);
+    let [minute, hour] = COARSER;
+    match age {
+        age if age < FRESH => None,
+        age if age < minute => Some(format!("{} s ago", age.as_secs() / 10 * 10)),
+        age if age < hour => Some(format!("{} min ago", age.as_secs() / 60)),
+        age => Some(format!("{} h ago", age.as_secs() / 3600)),
+    }
+}
+
+/// When [`ago`] says something else than it does now.
+pub fn ages_at(then: Instant, now: Instant) -> Instant {
+    let age = now.since(then);
+    let [minute, hour] = COARSER;
+    let step = match age {
+        age if age < minute => FRESH,
+        age if age < hour => minute,
+        _ => hour,
+    };
+    then + Duration::from_secs((age.as_secs() / step.as_secs() + 1) * step.as_secs())
+}
+
 /// The time of day, `start` being that of [`Instant::ZERO`].
 pub fn time_of_day(start: Duration, at: Instant) -> String {
     let seconds = (start + at.since_start()).as_secs() % 86_400;
@@ -186,6 +215,31 @@ mod tests {
         );
         let late = Duration::from_secs(86_399);
         assert_eq!(time_of_day_millis(late, Instant::from_millis(1_250)), "00:00:00.250");
+    }
+
+    #[test]
+    fn an_age_is_told_in_what_people_count_in_and_changes_when_it_says_so() {
+        let then = Instant::from_millis(500);
+        let after = |seconds: u64| then + Duration::from_secs(seconds);
+        let said: Vec<_> = [9, 10, 47, 60, 119, 3599, 7300].map(|age| ago(then, after(age))).into_iter().collect();
+        let expected = [
+            None,
+            Some("10 s ago"),
+            Some("40 s ago"),
+            Some("1 min ago"),
+            Some("1 min ago"),
+            Some("59 min ago"),
+            Some("2 h ago"),
+        ];
+        assert_eq!(said, expected.map(|text| text.map(str::to_owned)));
+        let mut now = then;
+        for _ in 0..200 {
+            let next = ages_at(then, now);
+            let before = Instant::from_nanos(next.as_nanos() - 1);
+            assert!(next > now && ago(then, before) == ago(then, now), "{now:?}");
+            assert_ne!(ago(then, next), ago(then, now), "{now:?}");
+            now = next;
+        }
     }
 
     #[test]
