@@ -6,7 +6,6 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::{Scene, terminal};
-use crate::device::Product;
 use crate::monitor::{Channel, Fault, Tracked};
 use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
@@ -235,13 +234,9 @@ fn averages(scene: Scene) -> Option<Line<'static>> {
     (!said.is_empty()).then(|| Line::styled(text, scene.theme.quiet()))
 }
 
-/// Digits behind the point, as the product prints them; before it has said its name, as the one with such channels does.
+/// Digits behind the point, as the product prints them.
 pub fn decimals(view: &View, source: Source) -> usize {
-    let channels = &view.monitor.stream.channels;
-    let has_these =
-        |product: &&Product| product.stream.channels.iter().eq(channels.iter().map(|channel| &channel.name));
-    let product = view.product().or_else(|| Product::all().iter().find(has_these));
-    product.map_or_else(
+    view.product().map_or_else(
         || if source == Source::FieldValue { 3 } else { 0 },
         |product| product.stream.format(source).decimals,
     )
