@@ -22,15 +22,13 @@ fn main() {
         _ => {
             story::a_panic_of_the_loop();
             story::a_panic_of_a_worker();
-            println!("a console that panics gives its terminal back: ok");
         }
     }
 }
 
+/// There are no pseudo-terminals to try it on.
 #[cfg(not(unix))]
-fn main() {
-    println!("skipped: there are no pseudo-terminals here");
-}
+fn main() {}
 
 #[cfg(unix)]
 mod child {

@@ -82,15 +82,12 @@ fn lay_out(popup: &Popup, view: &View, theme: Theme, area: Rect) -> Laid {
     let mut choices: Vec<(usize, Target)> = Vec::new();
     let (title, mut rows, hints) = match popup {
         Popup::Asking(question) => {
-            match question {
-                Question::Stream { .. } => {
-                    choices.extend([(0, Target::Key(letter('f'))), (1, Target::Key(letter('p')))]);
-                }
-                Question::Choose { picker, .. } => {
-                    let entry = |row| Some((LIST_ROW + row, Target::Entry(picker.entry_at(row, room)?)));
-                    choices.extend((0..room).filter_map(entry));
-                }
-                _ => {}
+            if let Question::Stream { .. } = question {
+                choices.extend([(0, Target::Key(letter('f'))), (1, Target::Key(letter('p')))]);
+            }
+            if let Question::Choose { picker, .. } = question {
+                let entry = |row| Some((LIST_ROW + row, Target::Entry(picker.entry_at(row, room)?)));
+                choices.extend((0..room).filter_map(entry));
             }
             ask(question, view, theme, (inner, room))
         }
