@@ -6,6 +6,7 @@ use std::sync::mpsc::SyncSender;
 
 use super::error::{CliError, Kind};
 use super::{Global, image as image_cli, link};
+use crate::device::LoaderKind;
 use crate::host::Input;
 use crate::host::clock::Clock;
 use crate::host::journal::{Journal, Note};
@@ -75,8 +76,8 @@ fn failure(error: &CliError) -> Failure {
     Failure { text: error.to_string(), hints: error.hints.clone() }
 }
 
-fn check(path: PathBuf, allow: &[DefectId]) -> ImageFacts {
-    match image_cli::read(&path, None, allow) {
+fn check(path: PathBuf, loader: Option<LoaderKind>, allow: &[DefectId]) -> ImageFacts {
+    match image_cli::read_for(&path, &image_cli::targets_with(loader), None, allow) {
         Ok(report) => ImageFacts::of_report(path, &report, allow),
         Err(error) => ImageFacts::unreadable(path, error.to_string()),
     }

@@ -20,7 +20,7 @@ use crate::host::replay::Recording;
 use crate::host::signal::Signals;
 use crate::host::{self, Input};
 use crate::record::{Ending, Span};
-use crate::session::{Command, Event, Outcome, Session, UnitState};
+use crate::session::{Command, Event, FileEnd, Outcome, Session, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::visible;
 
@@ -399,6 +399,11 @@ impl Talk {
             }
             Outcome::Cancelled(_) => return Err(CliError::message(Kind::Interrupted, "interrupted")),
             Outcome::Loaded(report) => return Err(CliError::message(Kind::Failed, report.what)),
+            Outcome::FileSent { end: FileEnd::Whole, .. } => return Ok(()),
+            Outcome::FileSent { sent, total, end: FileEnd::Cancelled | FileEnd::LinkLost } => {
+                let message = format!("{sent} of the file's {total} bytes have left");
+                return Err(CliError::message(Kind::Interrupted, message));
+            }
             Outcome::Refused { reason, heard, .. } => (CliError::message(Kind::UnitRefused, reason), heard),
             Outcome::NoAnswer { awaited, heard, .. } if self.is_recorded() => {
                 let message = format!("the recording does not show what was looked for: {awaited}");

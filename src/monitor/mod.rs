@@ -38,6 +38,7 @@ impl Monitor {
             | Event::FactsChanged
             | Event::Held(_)
             | Event::Progress(_)
+            | Event::FileProgress { .. }
             | Event::Finished(_) => {}
         }
     }

@@ -22,6 +22,8 @@ pub enum Command {
     Keys(Vec<u8>),
     /// Bytes of a file for the unit, as they are: no keys, among which a password may be.
     Bytes(Vec<u8>),
+    /// Send a file as it is, as if it were typed, with news of how far it has come: [`Event::FileProgress`].
+    SendFile(Vec<u8>),
     /// Find out what is at the other end.
     Identify,
     /// Switch the data stream on, or change what it sends.
@@ -123,6 +125,8 @@ pub enum Job {
     Overhear,
     /// [`Command::Load`].
     Load,
+    /// [`Command::SendFile`].
+    SendFile,
 }
 
 /// Why a command was not taken. Nothing has been sent.
@@ -143,6 +147,9 @@ pub enum Refusal {
     /// The session listens to a recording.
     #[error("this is a recording: nothing can be sent to the unit")]
     ReadOnly,
+    /// The unit asks for the password, and a file is none.
+    #[error("the unit asks for a password: answer that first, or leave it with Enter")]
+    PasswordOpen,
     /// The unit holds us by XOFF, and too much waits already.
     #[error("the unit does not take what has been typed so far (held by XOFF)")]
     Held,
@@ -186,6 +193,13 @@ pub enum Event {
     Held(bool),
     /// The upload has moved on.
     Progress(Progress),
+    /// A file that is sent as it is has come further.
+    FileProgress {
+        /// Bytes that have left.
+        sent: usize,
+        /// Bytes of the file.
+        total: usize,
+    },
     /// A job has ended.
     Finished(Outcome),
 }
@@ -226,6 +240,26 @@ pub enum Outcome {
     Cancelled(Job),
     /// An upload has ended, well or not.
     Loaded(Box<LoadReport>),
+    /// A file has been sent as it is, as far as it came; what the unit has made of it nobody knows.
+    FileSent {
+        /// Bytes that have left.
+        sent: usize,
+        /// Bytes of the file.
+        total: usize,
+        /// Why it ended.
+        end: FileEnd,
+    },
+}
+
+/// Why the sending of a file has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileEnd {
+    /// All of it has left.
+    Whole,
+    /// The user has had enough; nothing of it leaves any more.
+    Cancelled,
+    /// The link is gone. Of what had left for it last, some may not have reached the unit.
+    LinkLost,
 }
 
 /// What the unit showed of its object dictionary.

@@ -46,6 +46,8 @@ pub(super) struct Desk<'a> {
     pub(super) received: u64,
     /// Set when secret bytes have been queued: what comes back until the next line end may echo them.
     pub(super) echo_is_secret: &'a mut bool,
+    /// What a job puts here goes out as if it were typed: a password among it is known by where it is asked for.
+    pub(super) typed: Vec<u8>,
 }
 
 impl Desk<'_> {

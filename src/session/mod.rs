@@ -15,6 +15,7 @@ mod identify;
 mod job;
 mod overheard;
 mod redactor;
+mod sending;
 mod transmitter;
 mod upload;
 
@@ -198,6 +199,7 @@ impl Session {
             Command::Overhear => return Err(Refusal::Live),
             Command::Keys(_)
             | Command::Bytes(_)
+            | Command::SendFile(_)
             | Command::Identify
             | Command::StreamOn { .. }
             | Command::StreamOff
@@ -209,6 +211,9 @@ impl Session {
             }
             Command::Keys(keys) => return self.keys(&keys),
             Command::Bytes(bytes) => return self.bytes(&bytes),
+            Command::SendFile(_) if self.password_open() => return Err(Refusal::PasswordOpen),
+            Command::SendFile(_) if self.held_since().is_some() && self.waiting() > 0 => return Err(Refusal::Held),
+            Command::SendFile(bytes) => (Job::SendFile, Box::new(sending::SendFile::new(bytes))),
             Command::Identify => (Job::Identify, Box::new(identify::Identify::default())),
             Command::StreamOn { source, period } => {
                 if !(Duration::from_millis(1)..=Duration::from_secs(60)).contains(&period) {
@@ -265,6 +270,13 @@ impl Session {
         (self.password_asked, self.echo_is_secret) = (false, false);
         (self.load_key, self.typing_text) = (false, false);
         self.cut_line();
+    }
+
+    /// Forgets who is there: what was known may be true of another unit only.
+    pub fn forget_unit(&mut self) {
+        self.facts = Facts { unrecognised_lines: self.facts.unrecognised_lines, ..Facts::default() };
+        self.source = None;
+        self.events.push_back(Event::FactsChanged);
     }
 
     /// In a recording: these bytes were sent then.
@@ -339,6 +351,11 @@ impl Session {
         if let Some(running) = self.running.as_ref().filter(|running| running.job != Job::Identify) {
             return Err(Refusal::Busy(running.job));
         }
+        self.type_in(keys)
+    }
+
+    /// Queues keys; what is typed where the password is asked for is secret.
+    fn type_in(&mut self, keys: &[u8]) -> Result<(), Refusal> {
         for piece in keys.split_inclusive(|key| matches!(key, b'\r' | b'l' | b'L')) {
             let secret = self.password_open() || self.load_key;
             let (typed, enter) =
@@ -636,9 +653,10 @@ impl Session {
             understood: false,
             received: self.record.received(),
             echo_is_secret: &mut self.echo_is_secret,
+            typed: Vec::new(),
         };
         let outcome = running.work.handle(signal, &mut desk);
-        let cut = desk.cut;
+        let (cut, typed) = (desk.cut, std::mem::take(&mut desk.typed));
         if desk.understood && self.counted && matches!(signal, Signal::Heard(_, Message::Text)) {
             self.counted = false;
             self.facts.unrecognised_lines = self.facts.unrecognised_lines.saturating_sub(1);
@@ -646,6 +664,8 @@ impl Session {
         if self.facts != before {
             self.events.push_back(Event::FactsChanged);
         }
+        // A job types no more than the queue has room for.
+        let _ = self.type_in(&typed);
         match outcome {
             Some(outcome) => {
                 self.events.push_back(Event::Finished(outcome));

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::input::Playback;
-use super::popup::Question;
+use super::popup::{Question, Wanted};
 use super::screens::ScreenId;
 use crate::image::DefectId;
 use crate::secret::Secret;
@@ -60,6 +60,17 @@ pub enum Action {
     ExportDictionary(PathBuf),
     /// Compare the object dictionary with a saved dump.
     Compare(PathBuf),
+    /// Ask for a file that is there.
+    Choose(Wanted),
+    /// Read a file that the unit shall get as it is.
+    ReadToSend(PathBuf),
+    /// Send it.
+    SendFile {
+        /// Its name.
+        name: String,
+        /// What is in it.
+        bytes: Vec<u8>,
+    },
     /// List the recordings.
     ListRecordings,
     /// Play a recording differently.

@@ -25,6 +25,8 @@ const MOST_NOTICE_ROWS: usize = 2;
 const RECORDING: &str = "rec ";
 /// What stands before the unit's menu.
 const UNIT: &str = " Unit  ";
+/// What stands before the keys of the screen.
+const KEYS: &str = " axcon ";
 /// What is being done takes no more than this.
 const ACTIVITY_COLUMNS: usize = 24;
 /// With fewer columns than this the recording's name says nothing.
@@ -152,6 +154,17 @@ pub fn menu_at(column: usize) -> Option<Cmd> {
     })
 }
 
+/// The command that the line of the screen's keys shows at a column.
+pub fn key_at(theme: Theme, bindings: &[Binding], column: usize) -> Option<Cmd> {
+    let mut end = format::width(KEYS);
+    [bindings, EVERYWHERE].into_iter().flatten().filter(|binding| !binding.short.is_empty()).find_map(|binding| {
+        let begin = end;
+        end += hint(theme, binding).iter().map(Span::width).sum::<usize>();
+        // The blanks behind it are nobody's.
+        (begin..end.saturating_sub(2)).contains(&column).then_some(binding.cmd)
+    })
+}
+
 /// What is being done.
 fn activity(view: &View) -> &'static str {
     match view.job {
@@ -163,11 +176,23 @@ fn activity(view: &View) -> &'static str {
         Some(Job::ReadDictionary) => "reading the dictionary",
         Some(Job::Diagnostics) => "reading diagnostics",
         Some(Job::Load) => "loading",
+        Some(Job::SendFile) => "sending a file",
     }
 }
 
-/// The lost link, for the top of every screen.
+/// The lost link, or whose unit is not known yet, for the top of every screen.
 pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
+    if view.returning.is_some() && view.can_send() {
+        let text = match view.job {
+            Some(Job::Identify) => " The link is back. The unit is being asked who it is.",
+            _ => " The link is back, but nobody has answered yet: M asks again.",
+        };
+        let then = " Below is history, of the unit that was there before.";
+        return vec![
+            Line::styled(format::left(text, columns), theme.warning()),
+            Line::styled(format::left(then, columns), theme.warning()),
+        ];
+    }
     let LinkState::Lost(failure) = &view.link.state else { return Vec::new() };
     let text = format!("Link lost: {}", visible::text(&failure.text));
     let mut rows = vec![Line::styled(format::left(&format!(" {text}"), columns), theme.alarm())];
@@ -226,7 +251,7 @@ pub fn menu(theme: Theme) -> Line<'static> {
 
 /// The screen's keys and those that work everywhere.
 pub fn keys(theme: Theme, bindings: &[Binding]) -> Line<'static> {
-    let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
+    let mut line = Line::from(Span::styled(KEYS, theme.quiet()));
     line.spans.extend(hints(theme, &[bindings, EVERYWHERE]));
     line
 }

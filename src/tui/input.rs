@@ -6,16 +6,20 @@ use std::path::PathBuf;
 
 use ratatui::crossterm::event::Event as TerminalEvent;
 
-use crate::device;
+use crate::device::{self, LoaderKind};
 use crate::endpoint::{Arrived, Transmit};
 use crate::image::{CheckedImage, DefectId, Report, Severity};
 use crate::time::Duration;
 use crate::version::Version;
 
-/// How much of a file tells whether it may be an image: a record's type and length, behind a byte order mark.
-pub const FIRST_BYTES: usize = 16;
+/// How much of a file tells what it may be: an image's first record, type and length, behind a byte order mark; the
+/// schema of a saved object dictionary.
+pub const FIRST_BYTES: usize = 64;
 /// Largest text file that is read: a dump of the largest product has a tenth of it.
 pub const LARGEST_TEXT: u64 = 4 << 20;
+
+/// Largest file that is sent as it is: it takes 24 minutes.
+pub const LARGEST_SENT: u64 = 16 << 20;
 
 /// What can happen.
 #[derive(Debug)]
@@ -69,6 +73,13 @@ pub enum Input {
         /// What is in it, or why it cannot be read.
         text: Result<String, String>,
     },
+    /// Answer to [`Effect::ReadBytes`].
+    BytesRead {
+        /// Which file.
+        path: PathBuf,
+        /// What is in it, or why it cannot be read.
+        bytes: Result<Vec<u8>, String>,
+    },
     /// Answer to [`Effect::ListRecordings`]: newest first.
     RecordingsListed(Result<Vec<RecordingEntry>, String>),
     /// How the recording is played now.
@@ -106,10 +117,13 @@ pub enum Effect {
     ListPorts,
     /// List a folder. Answered by [`Input::FilesListed`].
     ListFiles(PathBuf),
-    /// Read and check an image file. Answered by [`Input::ImageChecked`], also when the file cannot be read.
+    /// Read and check an image file. Answered by [`Input::ImageChecked`], also when the file cannot be read, or by
+    /// [`Input::FilesListed`] when it is a folder.
     CheckImage {
         /// Which.
         path: PathBuf,
+        /// The loader it is for, if not the product's own.
+        loader: Option<LoaderKind>,
         /// Errors in spite of which it may be sent.
         allow: Vec<DefectId>,
     },
@@ -130,6 +144,8 @@ pub enum Effect {
     },
     /// Read a text file of at most [`LARGEST_TEXT`] bytes. Answered by [`Input::FileRead`].
     ReadFile(PathBuf),
+    /// Read a file of at most [`LARGEST_SENT`] bytes, as it is. Answered by [`Input::BytesRead`].
+    ReadBytes(PathBuf),
     /// Put a remark in the recording.
     Mark(String),
     /// List the recordings. Answered by [`Input::RecordingsListed`].

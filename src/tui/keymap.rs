@@ -80,6 +80,10 @@ pub enum Cmd {
     Pack,
     /// Send in spite of an error.
     Allow,
+    /// Another kind of loader.
+    Loader,
+    /// Send a file as it is.
+    SendFile,
     /// Hold the line low for a moment.
     Break,
     /// Play faster.
@@ -235,6 +239,14 @@ impl Press {
             (Press::Ctrl(']'), KeyCode::Char('5')) => with_ctrl,
             (Press::Ctrl(wanted), KeyCode::Char(pressed)) => with_ctrl && wanted.eq_ignore_ascii_case(&pressed),
             (Press::Ctrl(_), _) => false,
+        }
+    }
+
+    /// The event of pressing it.
+    pub fn event(self) -> KeyEvent {
+        match self {
+            Press::Plain(code) => KeyEvent::new(code, KeyModifiers::NONE),
+            Press::Ctrl(character) => KeyEvent::new(KeyCode::Char(character), KeyModifiers::CONTROL),
         }
     }
 

@@ -10,7 +10,9 @@ mod app;
 mod frame;
 mod input;
 mod keymap;
+mod picker;
 mod popup;
+mod returning;
 pub mod run;
 mod screens;
 mod theme;
@@ -20,8 +22,8 @@ mod widgets;
 
 pub use app::{App, Options};
 pub use input::{
-    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_TEXT, LinkInfo, Noted, Pace,
-    Playback, Playing, PortEntry, RecordingEntry,
+    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_SENT, LARGEST_TEXT, LinkInfo, Noted,
+    Pace, Playback, Playing, PortEntry, RecordingEntry,
 };
 pub use theme::Palette;
 

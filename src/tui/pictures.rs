@@ -3,6 +3,7 @@
 //! What a person reads is held in snapshots, at the smallest size and at a large one; what keys do is said in
 //! sentences. The unit is played by the bytes it would send.
 
+mod choices;
 mod keys;
 mod stage;
 
@@ -34,6 +35,38 @@ macro_rules! pictures {
 }
 
 pictures! {
+    overview_link_back_asking: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.lost().wait(20_000).input(Input::LinkBack("/dev/ttyUSB0".into()));
+        stage
+    };
+    overview_another_unit: |size| {
+        let mut stage = Stage::streaming(size);
+        stage.lost().wait(20_000).input(Input::LinkBack("/dev/ttyUSB0".into()));
+        let menu = String::from_utf8_lossy(MENU).replace("AXTC4CO V1.1.0", "AXRTD8CO V1.0.3");
+        stage.bytes(menu.as_bytes()).wait(8000);
+        stage
+    };
+    load_report_other_loader: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.keys("gg").input(Input::ImageChecked(Box::new(good_image()))).keys("g");
+        stage.input(Input::ImageChecked(Box::new(good_image())));
+        stage
+    };
+    terminal_file_to_send: to_send;
+    terminal_asked_to_send_an_image: |size| asked_to_send(size, "AXTC4CO_V1.2.0.elf.S");
+    terminal_asked_to_send_a_file: |size| asked_to_send(size, "notes.txt");
+    terminal_sending_held: |size| {
+        let mut stage = asked_to_send(size, "notes.txt");
+        stage.keys("y").wait(9000).bytes(b"\x13").wait(4000);
+        stage
+    };
+    dictionary_dump_to_choose: |size| {
+        let mut stage = Stage::with_dictionary(size);
+        stage.keys("w");
+        stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(files()) });
+        stage
+    };
     connect_while_listing: Stage::new;
     connect_without_ports: |size| {
         let mut stage = Stage::new(size);
@@ -569,10 +602,27 @@ fn every_screen_survives_every_size() {
     }
 }
 
+/// On the terminal, asked for a file to send.
+fn to_send(size: (u16, u16)) -> Stage {
+    let mut stage = Stage::connected(size);
+    stage.keys("3").prefix().keys("f");
+    stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(files()) });
+    stage
+}
+
+/// A file is chosen and read; it is asked once more.
+fn asked_to_send(size: (u16, u16), name: &str) -> Stage {
+    let mut stage = to_send(size);
+    stage.keys(name).press(KeyCode::Enter);
+    let path = format!("/home/service/images/{name}").into();
+    stage.input(Input::BytesRead { path, bytes: Ok(vec![b'S'; 242_742]) });
+    stage
+}
+
 #[test]
 fn every_question_survives_every_size_it_is_drawn_at() {
     type Maker = fn() -> Stage;
-    let questions: [(&str, Maker); 15] = [
+    let questions: [(&str, Maker); 17] = [
         ("Switch the data stream on", || typed(Stage::connected(SMALL), "t")),
         ("Type Yes", || typed(Stage::connected(SMALL), "d")),
         ("View the object", || typed(Stage::connected(SMALL), "v")),
@@ -585,6 +635,8 @@ fn every_question_survives_every_size_it_is_drawn_at() {
         ("CSV", || typed(Stage::streaming(SMALL), "6e")),
         ("Write the object", || typed(Stage::with_dictionary(SMALL), "e")),
         ("Compare with", || typed(Stage::with_dictionary(SMALL), "w")),
+        ("Send a file as it is", || to_send(SMALL)),
+        ("software image", || asked_to_send(SMALL, "new.S")),
         ("Cancel the upload", || pressed(Stage::loading(SMALL), KeyCode::Esc)),
         ("being loaded", || typed(Stage::loading(SMALL), "q")),
         ("Close the link", || typed(Stage::loading(SMALL), "1x")),

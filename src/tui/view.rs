@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use super::input::{Failure, Noted, Playing};
+use super::returning::Returning;
 use super::widgets::format;
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::monitor::{Mark, Monitor};
-use crate::session::{DictionaryReading, Event, Facts, Job, LoadReport, Origin, Outcome, Progress, UnitState};
+use crate::session::{DictionaryReading, Event, Facts, FileEnd, Job, LoadReport, Origin, Outcome, Progress, UnitState};
 use crate::time::{Duration, Instant};
 
 /// Everything a screen may read.
@@ -28,8 +29,14 @@ pub struct View {
     pub dictionary: Option<DictionaryRead>,
     /// Entries read so far while it is being read.
     pub entries_read: usize,
+    /// After a lost link has come back: the unit of before, until it is known who is there now.
+    pub returning: Option<Returning>,
+    /// The serial number of the unit (1018h:4), as its object dictionary had it when that was read last.
+    pub serial: Option<u32>,
     /// The upload.
     pub load: Load,
+    /// The file that is being sent as it is.
+    pub sending: Option<Sending>,
     /// How a recording is played, where the link is one.
     pub playing: Option<Playing>,
     /// The repetition time that the stream was asked for and has not confirmed yet.
@@ -93,6 +100,17 @@ pub struct Load {
     pub product_unknown: bool,
 }
 
+/// A file that is being sent as it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sending {
+    /// Its name.
+    pub name: String,
+    /// Bytes that have left.
+    pub sent: usize,
+    /// Bytes of it.
+    pub total: usize,
+}
+
 /// The object dictionary as the unit showed it.
 #[derive(Debug)]
 pub struct DictionaryRead {
@@ -133,6 +151,8 @@ const HIGH_WARNING: u16 = 0x4010;
 const HIGH_SHUTDOWN: u16 = 0x4020;
 /// Means of the valid channels, by bank and of all (manuals, section 3.4.3).
 const AVERAGES: u16 = 0x2100;
+/// Serial number of the identity object (CiA 301; both manuals, section 3.3).
+const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
 /// They are in tenths of a degree.
 const LIMIT_STEPS: f64 = 10.0;
 
@@ -177,6 +197,11 @@ impl View {
             Event::Heard { .. } => {}
             Event::Overheard(reading) => self.dictionary_read(now, reading),
             Event::EntriesRead(count) => self.entries_read = *count,
+            Event::Row { .. } | Event::Page { .. } if self.returning.is_some() => {
+                if let Some(returning) = &mut self.returning {
+                    returning.wait(event.clone());
+                }
+            }
             Event::Row { .. } | Event::Page { .. } => {
                 let product = self.product();
                 self.monitor.fold(event, product);
@@ -187,6 +212,11 @@ impl View {
             Event::Progress(progress) => {
                 self.job = Some(Job::Load);
                 self.load.progress = Some(*progress);
+            }
+            Event::FileProgress { sent, .. } => {
+                if let Some(sending) = &mut self.sending {
+                    sending.sent = *sent;
+                }
             }
             Event::Finished(outcome) => self.finished(now, outcome),
         }
@@ -233,6 +263,24 @@ impl View {
     /// A new link: what was known of the unit before says nothing about the one at its end.
     pub fn begin_link(&mut self, link: Link) {
         *self = View { link, ..View::default() };
+    }
+
+    /// The lost link is there again; whether the unit is the one from before is not known yet.
+    pub fn link_back(&mut self) {
+        // A link that is lost again meanwhile changes nothing: the unit of before is still the one that was known.
+        if self.returning.is_none() {
+            self.returning = Some(Returning::new(self.facts.clone()));
+        }
+        self.viewing = false;
+        self.monitor.stream.interrupt();
+    }
+
+    /// The unit on the cable is not the one from before, or may not be: nothing of that one is shown as its own.
+    pub fn begin_unit(&mut self) {
+        self.monitor = Monitor::default();
+        (self.dictionary, self.entries_read, self.serial) = (None, 0, None);
+        (self.wanted_period, self.viewing) = (None, false);
+        self.load.product_unknown = false;
     }
 
     /// Whether keys and commands can reach a unit.
@@ -324,7 +372,9 @@ impl View {
         let product_before = self.product();
         self.facts = facts.clone();
         let product = self.product();
+        // While it is asked who is there, the dictionary is history and stays as it was.
         if product_before != product
+            && self.returning.is_none()
             && let Some(read) = &mut self.dictionary
         {
             // What was read gets its names, and something to be compared with.
@@ -364,12 +414,28 @@ impl View {
             }
             Outcome::Cancelled(Job::Diagnostics) => self.tell(Tone::Quiet, done(Job::Diagnostics)),
             Outcome::Cancelled(job) => self.tell(Tone::Quiet, format!("Cancelled, {}.", doing(*job))),
+            Outcome::FileSent { sent, total, end } => self.file_sent(*sent, *total, *end),
             Outcome::Loaded(report) => {
                 self.load.progress = None;
                 self.load.held_since = None;
                 self.load.product_unknown =
                     report.verdict == crate::session::Verdict::Refused && report.product.is_none();
                 self.load.report = Some((**report).clone());
+            }
+        }
+    }
+
+    fn file_sent(&mut self, sent: usize, total: usize, end: FileEnd) {
+        let name = self.sending.take().map_or_else(|| "the file".to_owned(), |sending| sending.name);
+        let (sent, total) = (format::grouped(sent), format::grouped(total));
+        match end {
+            FileEnd::Whole => self.tell(Tone::Good, format!("Sent: all {total} bytes of {name} have left.")),
+            FileEnd::Cancelled => {
+                self.tell(Tone::Bad, format!("Cancelled after {sent} of the {total} bytes of {name}."));
+            }
+            FileEnd::LinkLost => {
+                let text = format!("The link was lost when about {sent} of the {total} bytes of {name} had left.");
+                self.tell(Tone::Bad, text);
             }
         }
     }
@@ -387,6 +453,8 @@ impl View {
             let text = format!("Not all of the object dictionary was shown: {entries} entries were read.");
             self.tell(Tone::Bad, text);
         }
+        let serial = reading.entries.iter().find(|read| read.at == SERIAL_NUMBER).and_then(|read| read.value);
+        self.serial = serial.and_then(Value::as_integer).and_then(|number| u32::try_from(number).ok());
         self.dictionary = Some(DictionaryRead { dump, reading: reading.clone(), at: now });
     }
 
@@ -421,6 +489,7 @@ pub fn doing(job: Job) -> &'static str {
         Job::Diagnostics => "reading the diagnostics",
         Job::Overhear => "listening",
         Job::Load => "loading new software",
+        Job::SendFile => "sending a file",
     }
 }
 
@@ -434,6 +503,7 @@ fn done(job: Job) -> &'static str {
         Job::Diagnostics => "The diagnostics are off.",
         Job::Overhear => "This is the end of the recording. 3 shows all of it.",
         Job::Load => "The upload has ended.",
+        Job::SendFile => "The file has been sent.",
     }
 }
 

@@ -10,7 +10,10 @@ use axcon::emulator::knob::Knob;
 use axcon::emulator::{NmtCommand, Setup, Unit};
 use axcon::image::make;
 use axcon::time::{Duration, Instant, character_time};
-use axcon::tui::{App, Effect, Failure, ImageFacts, Input, LinkInfo, Noted, Options, Palette, RecordingEntry};
+use axcon::tui::{
+    App, Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Noted, Options, Palette,
+    RecordingEntry,
+};
 use axcon::version::Version;
 use insta::assert_snapshot;
 use ratatui::Terminal;
@@ -101,10 +104,23 @@ impl Desk {
                     bytes: 123_456,
                 }]))),
                 Effect::ListFiles(directory) => {
-                    self.input(Input::FilesListed { directory, entries: Ok(Vec::new()) });
+                    let entry = |(path, bytes): (&PathBuf, &Vec<u8>)| FileEntry {
+                        name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+                        kind: FileKind::File,
+                        bytes: bytes.len() as u64,
+                        begins: bytes.iter().copied().take(FIRST_BYTES).collect(),
+                        modified: Some("2026-01-31 12:00".into()),
+                    };
+                    let entries = self.files.iter().map(entry).collect();
+                    self.input(Input::FilesListed { directory, entries: Ok(entries) });
                 }
-                Effect::CheckImage { path, allow } => {
-                    let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
+                Effect::ReadBytes(path) => {
+                    let bytes = self.file(&path).ok_or_else(|| "there is no such file".to_owned());
+                    self.input(Input::BytesRead { path, bytes });
+                }
+                Effect::CheckImage { path, loader, allow } => {
+                    let target = |it: &Product| it.target_with(loader.unwrap_or(it.loader.kind));
+                    let targets: Vec<_> = Product::all().iter().map(target).collect();
                     let file = new_image();
                     let report = axcon::image::check(file.as_slice(), None, &targets, None, &allow).expect("a slice");
                     self.input(Input::ImageChecked(Box::new(ImageFacts::of_report(path, &report, &allow))));
@@ -119,7 +135,7 @@ impl Desk {
                     self.files.get_mut(&path).expect("created before").extend(bytes);
                 }
                 Effect::ReadFile(path) => {
-                    let text = self.files.get(&path).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+                    let text = self.file(&path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
                     self.input(Input::FileRead { path, text: text.ok_or_else(|| "no such file".to_owned()) });
                 }
                 Effect::Mark(text) => self.marks.push(text),
@@ -132,6 +148,11 @@ impl Desk {
                 | Effect::Order(_) => {}
             }
         }
+    }
+
+    /// A file by its name, wherever it is looked for.
+    fn file(&self, path: &Path) -> Option<Vec<u8>> {
+        self.files.iter().find(|(known, _)| known.file_name() == path.file_name()).map(|(_, bytes)| bytes.clone())
     }
 
     fn run(&mut self, span: Duration) -> &mut Self {
@@ -297,7 +318,10 @@ fn the_dictionary_is_read_searched_compared_and_written_down() {
     let picture = desk.picture();
     assert!(picture.contains("only those") && picture.contains("* 6112:02"), "{picture}");
     assert!(picture.contains("not as the factory made it"), "the pane explains it: {picture}");
-    desk.keys("wbefore.json").press(KeyCode::Enter);
+    desk.keys("w");
+    let choice = desk.picture();
+    assert!(choice.contains("› before.json") && choice.contains("/images"), "the dump is found: {choice}");
+    desk.press(KeyCode::Enter);
     let picture = desk.picture();
     assert!(picture.contains("in before.json") && picture.contains("≠ 6112:02"), "{picture}");
     desk.press(KeyCode::Esc).keys("/operating mode");
@@ -683,11 +707,177 @@ fn whoever_leaves_in_the_middle_leaves_a_unit_that_measures() {
     }
 }
 
+/// A unit in the place of the one on the cable, just powered on.
+fn swapped(desk: &mut Desk, product: &str, seed: u64) {
+    let product = Product::named(product).expect("built in");
+    let mut unit = Unit::new(axcon::host::unit::factory_setup(product, seed));
+    unit.power_on(desk.now);
+    desk.unit = Plugged::new(unit, Line::new(character_time(BAUD), Duration::from_millis(1)));
+}
+
+/// Streaming, with a fault, the object dictionary read, on the overview.
+fn much_known() -> Desk {
+    let mut desk = Desk::new();
+    swapped(&mut desk, "AXTC4CO", 1);
+    desk.run(Duration::from_secs(5)).keys("mv").press(KeyCode::Enter);
+    desk.wait_for("0 not as factory");
+    desk.keys("2t500").press(KeyCode::Enter);
+    desk.wait_for("every 500 ms");
+    let now = desk.now;
+    desk.unit.unit_mut().turn(now, Knob::Open(1, None)).expect("TC1");
+    desk.wait_for("check sensor, wire and connector");
+    desk
+}
+
+#[test]
+fn the_same_unit_behind_a_cable_plugged_in_again_goes_on() {
+    let mut desk = much_known();
+    desk.pull().input(Input::LinkBack("/dev/ttyUSB0".into()));
+    let asked = desk.picture();
+    assert!(asked.contains("The unit is being asked who it is.") && asked.contains("Below is history"), "{asked}");
+    let told = desk.wait_for("The link is back, and the AXTC4CO answers as before.");
+    assert!(told.contains("1 now, 1 since connecting") && !told.contains("Below is history"), "{told}");
+    desk.keys("5");
+    assert!(desk.picture().contains("0 not as factory"), "{}", desk.picture());
+    assert_eq!(desk.marks, [""; 0]);
+}
+
+#[test]
+fn another_product_behind_a_cable_plugged_in_again_is_named_and_inherits_nothing() {
+    let mut desk = much_known();
+    desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL);
+    desk.press(KeyCode::Esc).pull();
+    swapped(&mut desk, "AXRTD8CO", 7);
+    desk.plug_in();
+    let told = desk.picture();
+    let words = "Another unit is on the cable now: AXRTD8CO";
+    assert!(told.contains(words) && told.contains("before it was AXTC4CO 1.1.0"), "{told}");
+    assert!(!told.contains("TC1") && told.contains("None"), "neither values nor faults: {told}");
+    assert!(desk.marks.iter().any(|mark| mark.contains(words)), "the recording says so, too: {:?}", desk.marks);
+    desk.keys("5");
+    let dictionary = desk.picture();
+    assert!(dictionary.contains("the manual's; V reads the unit's"), "{dictionary}");
+}
+
+#[test]
+fn another_unit_of_the_same_kind_is_known_by_its_serial_number() {
+    let mut desk = much_known();
+    desk.pull();
+    swapped(&mut desk, "AXTC4CO", 99);
+    desk.plug_in();
+    assert!(desk.picture().contains("answers as before"), "they say the same: {}", desk.picture());
+    desk.keys("v").press(KeyCode::Enter);
+    let told = desk.wait_for("Another unit is on the cable: its serial number is");
+    assert!(told.contains("0 not as factory"), "what was read is its own: {told}");
+    desk.keys("2");
+    assert!(!desk.picture().contains("since connecting"), "the fault was the other's: {}", desk.picture());
+}
+
+#[test]
+fn nobody_behind_a_cable_plugged_in_again_leaves_history_until_somebody_answers() {
+    let mut desk = much_known();
+    desk.pull();
+    let now = desk.now;
+    desk.unit.unit_mut().power_off(now);
+    desk.plug_in();
+    let silent = desk.picture();
+    assert!(
+        silent.contains("nobody has answered yet: M asks again") && silent.contains("Below is history"),
+        "{silent}"
+    );
+    let now = desk.now;
+    desk.unit.unit_mut().power_on(now);
+    desk.wait_for("answers as before");
+}
+
+/// Asked to send a file of this content from the terminal screen, the question answered with `answer`.
+fn send_file<'a>(desk: &'a mut Desk, name: &str, bytes: &[u8], answer: &str) -> &'a mut Desk {
+    desk.files.clear();
+    desk.files.insert(name.into(), bytes.to_vec());
+    desk.sent.clear();
+    desk.keys("3").key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("f").press(KeyCode::Enter);
+    desk.keys(answer)
+}
+
+#[test]
+fn a_file_goes_from_the_terminal_to_the_unit_as_it_is() {
+    let mut desk = Desk::new();
+    send_file(&mut desk, "keys.txt", b"mm\n\xff", "");
+    let question = desk.picture();
+    assert!(question.contains("keys.txt, 4 bytes, goes to the unit as if typed."), "{question}");
+    assert!(desk.sent.is_empty(), "nothing leaves before the answer");
+    desk.keys("y");
+    let told = desk.wait_for("Sent: all 4 bytes of keys.txt have left.");
+    assert!(told.contains("the file keys.txt is sent, 4 bytes"), "{told}");
+    assert_eq!(desk.sent, b"mm\n\xff");
+    assert_eq!(desk.marks, ["the file keys.txt is sent, 4 bytes"], "in the recording, too");
+}
+
+#[test]
+fn an_image_sent_by_hand_is_warned_of_held_stopped_and_counted_truly() {
+    let mut desk = Desk::new();
+    let image = new_image();
+    send_file(&mut desk, "new.S", &image, "l");
+    assert!(desk.picture().contains("Choose a file"), "the load screen does it safely: {}", desk.picture());
+    send_file(&mut desk, "new.S", &image, "");
+    assert!(desk.picture().contains("It is a software image."), "{}", desk.picture());
+    desk.keys("y").run(Duration::from_millis(500));
+    // Some 11,520 bytes a second, whatever the unit says to them.
+    assert!((4_000..7_000).contains(&desk.sent.len()), "{}", desk.sent.len());
+    assert!(desk.picture().contains("Sending a file") && desk.picture().contains("Esc stops it"), "{}", desk.picture());
+    desk.keys("m");
+    assert!(desk.picture().contains("Not sent: axcon is still sending a file."), "{}", desk.picture());
+    desk.keys("2v");
+    assert!(desk.picture().contains("Not sent: "), "{}", desk.picture());
+    // The unit stops us ...
+    desk.input(Input::Bytes(vec![0x13]));
+    let held = desk.sent.len();
+    desk.run(Duration::from_secs(5));
+    assert_eq!(desk.sent.len(), held, "nothing leaves while the unit holds us");
+    desk.keys("3");
+    assert!(desk.picture().contains("held by XOFF since"), "{}", desk.picture());
+    // ... and lets us go on.
+    desk.input(Input::Bytes(vec![0x11]));
+    desk.run(Duration::from_millis(500)).press(KeyCode::Esc);
+    let sent = desk.sent.len();
+    assert!(sent > held && image.starts_with(&desk.sent), "{sent}");
+    let told = desk.picture();
+    let grouped = format!("{},{:03} of the 24", sent / 1000, sent % 1000);
+    assert!(told.contains(&format!("Cancelled after {grouped}")), "{sent}: {told}");
+    desk.run(Duration::from_secs(5));
+    assert_eq!(desk.sent.len(), sent, "nothing more leaves");
+}
+
+#[test]
+fn a_file_goes_alone_and_not_over_a_link_that_is_gone() {
+    let mut desk = Desk::new();
+    desk.keys("s");
+    desk.wait_for("page 1");
+    send_file(&mut desk, "keys.txt", b"m", "");
+    assert!(desk.picture().contains("Not sent: axcon is still reading the diagnostics."), "{}", desk.picture());
+    assert!(desk.sent.is_empty());
+    desk.key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("2s").run(Duration::from_secs(3));
+    send_file(&mut desk, "long.txt", &[b'x'; 100_000], "y").run(Duration::from_secs(1)).pull();
+    let told = desk.picture();
+    assert!(told.contains("The link was lost when about") && told.contains("of the 100,000 bytes"), "{told}");
+}
+
+#[test]
+fn a_password_in_a_file_is_recorded_by_its_number_only() {
+    let mut desk = Desk::new();
+    send_file(&mut desk, "load.txt", b"lAXIO-2010\r", "y").run(Duration::from_secs(3));
+    assert_eq!(desk.sent, b"lAXIO-2010\r");
+    let record = desk.app.record();
+    let all: Vec<u8> = record.entries().flat_map(|entry| entry.bytes.to_vec()).collect();
+    assert!(!String::from_utf8_lossy(&all).contains("AXIO"), "{}", String::from_utf8_lossy(&all));
+}
+
 /// A console that opens the unit's link.
 fn console() -> App {
     App::new(Options {
         link: Some("emu:axtc4co".into()),
         directory: PathBuf::from("/images"),
+        home: None,
         palette: Palette::Mono,
         size: (100, 30),
     })

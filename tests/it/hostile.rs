@@ -117,6 +117,7 @@ fn no_picture_of_the_console_holds_what_a_terminal_obeys() {
         let mut app = App::new(Options {
             link: Some("/dev/ttyUSB0".into()),
             directory: PathBuf::from("/images"),
+            home: None,
             palette: axcon::tui::Palette::Dark,
             size: (columns, rows),
         });

@@ -4,13 +4,72 @@ use std::path::{Path, PathBuf};
 
 use super::App;
 use crate::dump::{self, Dump};
+use crate::session::{Command, Job};
 use crate::time::Instant;
-use crate::tui::input::Effect;
-use crate::tui::view::{Export, MARK, Tone};
+use crate::tui::input::{Effect, FIRST_BYTES, FileEntry};
+use crate::tui::picker::{begins_like_an_image, is_image_name};
+use crate::tui::popup::{Popup, Question};
+use crate::tui::view::{Export, MARK, Sending, Tone, doing};
+use crate::tui::visible;
 use crate::tui::widgets::format;
 use crate::wire::stream::Row;
 
 impl App {
+    /// A folder has been read: for whoever has asked last.
+    pub(super) fn files_listed(&mut self, directory: PathBuf, entries: Result<Vec<FileEntry>, String>) {
+        self.dirty = true;
+        match &mut self.popup {
+            Some(Popup::Asking(Question::Choose { picker, .. })) => {
+                picker.listed(directory, entries);
+                self.folder = picker.directory().to_path_buf();
+            }
+            _ => self.load.listed(directory, entries),
+        }
+    }
+
+    /// Whether a file can be sent now; if not, the user is told why.
+    pub(super) fn may_send_file(&mut self) -> bool {
+        if !self.can_send() {
+            return false;
+        }
+        match self.view.job.filter(|job| *job != Job::Identify) {
+            Some(job) => {
+                self.view.tell(Tone::Bad, format!("Not sent: axcon is still {}. A file goes alone.", doing(job)));
+                false
+            }
+            None => true,
+        }
+    }
+
+    /// A file that the unit shall get has been read: that is asked once more, since nothing of it can be taken back.
+    pub(super) fn bytes_read(&mut self, path: &Path, bytes: Result<Vec<u8>, String>) {
+        self.dirty = true;
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        match bytes {
+            Err(why) => self.view.tell(Tone::Bad, format!("Not sent: {}: {why}.", path.display())),
+            Ok(bytes) if bytes.is_empty() => self.view.tell(Tone::Bad, format!("Not sent: {name} is empty.")),
+            // Meanwhile something else may have begun.
+            Ok(_) if self.popup.is_some() || !self.may_send_file() => {}
+            Ok(bytes) => {
+                let is_image = is_image_name(&name) || begins_like_an_image(&bytes[..bytes.len().min(FIRST_BYTES)]);
+                self.ask(Question::SendFile { name, bytes, is_image });
+            }
+        }
+    }
+
+    /// Begins to send a file as it is.
+    pub(super) fn send_file(&mut self, name: String, bytes: Vec<u8>, effects: &mut Vec<Effect>) {
+        let name = visible::text(&name);
+        let total = bytes.len();
+        if self.can_send() && self.command(Command::SendFile(bytes)) {
+            self.view.sending = Some(Sending { name: name.clone(), sent: 0, total });
+            let text = format!("the file {name} is sent, {}", format::counted(total as u64, "byte"));
+            self.scrollback.note(self.now, text.clone());
+            effects.push(Effect::Mark(text));
+            self.terminal.follow();
+        }
+    }
+
     pub(super) fn mark(&mut self, effects: &mut Vec<Effect>) {
         let mark = self.view.monitor.stream.mark(self.now);
         let text = format!("{MARK}{}", mark.number);

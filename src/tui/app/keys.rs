@@ -3,7 +3,7 @@
 use ratatui::crossterm::event::{
     Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
 };
-use ratatui::layout::Rect;
+use ratatui::layout::{Position, Rect};
 
 use super::App;
 use crate::session::{Command, Job, Session, UnitState};
@@ -11,7 +11,7 @@ use crate::tui::action::Action;
 use crate::tui::frame;
 use crate::tui::input::Effect;
 use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd, Press};
-use crate::tui::popup::{Answer, Popup, Question};
+use crate::tui::popup::{self, Answer, Popup, Question, Target};
 use crate::tui::screens::ScreenId;
 use crate::tui::screens::help::Help;
 use crate::tui::screens::terminal::Meaning;
@@ -50,21 +50,55 @@ impl App {
             self.dirty = true;
             return self.key(KeyEvent::new(code, KeyModifiers::NONE), effects);
         }
-        if mouse.kind != MouseEventKind::Down(MouseButton::Left) || self.popup.is_some() {
+        if let (Some(code), Some(Popup::Asking(Question::Choose { .. }))) = (step, &self.popup) {
+            self.dirty = true;
+            return self.key(KeyEvent::new(code, KeyModifiers::NONE), effects);
+        }
+        if mouse.kind != MouseEventKind::Down(MouseButton::Left) {
             return;
         }
         let (columns, rows) = self.size;
+        if let Some(popup) = &self.popup {
+            let body = frame::body(Rect::new(0, 0, columns, rows), &self.view);
+            let place = Position { x: mouse.column, y: mouse.row };
+            if let Some(target) = popup::target_at(popup, &self.view, self.theme, body, place) {
+                self.dirty = true;
+                self.click(target, effects);
+            }
+            return;
+        }
         let column = usize::from(mouse.column);
         let front = self.help.is_none().then_some(self.front);
         let cmd = match mouse.row {
             1 => frame::tab_at(&self.view, front, usize::from(columns), column).map(Cmd::Go),
             row if row + 2 == rows => frame::menu_at(column),
+            row if row + 1 == rows && self.help.is_some() => {
+                self.dirty = true;
+                // The keys of the page scroll it, or leave it.
+                self.help = None;
+                None
+            }
+            row if row + 1 == rows => frame::key_at(self.theme, self.footer(), column),
             row => self.choose_at(columns, rows, row),
         };
         if let Some(cmd) = cmd {
             self.dirty = true;
             self.help = None;
             self.on(cmd, effects);
+        }
+    }
+
+    /// A click on a popup.
+    fn click(&mut self, target: Target, effects: &mut Vec<Effect>) {
+        match target {
+            Target::Key(press) => self.key(press.event(), effects),
+            Target::Entry(number) => {
+                let Some(Popup::Asking(Question::Choose { picker, typed, .. })) = &mut self.popup else { return };
+                typed.clear();
+                if picker.choose(number) {
+                    self.key(Press::Plain(KeyCode::Enter).event(), effects);
+                }
+            }
         }
     }
 
@@ -149,6 +183,9 @@ impl App {
             }
         }
         if self.front == ScreenId::Terminal {
+            if self.view.job == Some(Job::SendFile) && key.code == KeyCode::Esc && !self.terminal.is_after_prefix() {
+                return self.perform(Action::Command(Command::Cancel), effects);
+            }
             match self.terminal.meaning(key) {
                 Meaning::Keys(bytes) => return self.perform(Action::Command(Command::Keys(bytes)), effects),
                 Meaning::Nothing => return,
@@ -225,7 +262,9 @@ impl App {
             | Cmd::Compare
             | Cmd::Pack
             | Cmd::Allow
+            | Cmd::Loader
             | Cmd::Break
+            | Cmd::SendFile
             | Cmd::Faster
             | Cmd::Slower
             | Cmd::OpenWire
@@ -275,6 +314,7 @@ impl App {
         // What cannot be done now is said before anything is asked.
         let why_not = match (menu, self.view.job, self.view.facts.state) {
             (MenuCmd::Diagnostics, Some(Job::Diagnostics), _) | (_, Some(Job::Identify), _) => None,
+            (_, Some(Job::SendFile), _) => Some("a file is being sent: Esc on the terminal screen stops it"),
             (_, Some(Job::Diagnostics), _) => Some("the unit prints its diagnostics: S stops them first"),
             (_, Some(_), _) => Some("a job runs: wait for its end, or cancel it with Esc on its screen"),
             (MenuCmd::Menu, ..) => None,

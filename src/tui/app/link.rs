@@ -1,10 +1,14 @@
 //! The link: how it opens and closes, is lost and comes back, and how the unit behind it is left.
 
+use ratatui::crossterm::event::KeyCode;
+
 use super::App;
-use crate::session::{Command, Session};
+use crate::session::{Command, Event, Session, UnitState};
 use crate::time::{Duration, Instant};
 use crate::tui::input::{Effect, Failure, LinkInfo};
+use crate::tui::keymap::Press;
 use crate::tui::popup::Popup;
+use crate::tui::returning::{Returning, Who};
 use crate::tui::screens::ScreenId;
 use crate::tui::view::{Link, LinkState, Tone};
 use crate::tui::visible;
@@ -49,7 +53,7 @@ impl App {
             self.begin_link(Link { name: Some(link.clone()), state: LinkState::Opening, ..Link::default() });
         }
         let what = format!("Opening {}.", visible::text(&link));
-        self.popup = Some(Popup::Waiting { what, hint: ("Esc", "do not wait") });
+        self.popup = Some(Popup::Waiting { what, hint: (Press::Plain(KeyCode::Esc), "do not wait") });
         self.opening = Some(link.clone());
         effects.push(Effect::OpenLink(link));
     }
@@ -80,7 +84,7 @@ impl App {
         }
         self.dirty = true;
         let what = "Leaving the unit in order, which takes 2 seconds at most.".into();
-        self.popup = Some(Popup::Waiting { what, hint: ("Q", "leave at once") });
+        self.popup = Some(Popup::Waiting { what, hint: (Press::Plain(KeyCode::Char('q')), "leave at once") });
         self.leaving = Some((next, self.now + WINDING_UP));
     }
 
@@ -133,6 +137,9 @@ impl App {
         }
         self.popup = None;
         let read_only = info.read_only;
+        if !read_only {
+            self.connect.opened(&info.link);
+        }
         self.scrollback.begin(now, format!("connected to {}", visible::text(&info.link)));
         self.begin_session(info);
         // Who has chosen a recording wants to steer it.
@@ -159,6 +166,7 @@ impl App {
         self.dictionary.begin_link();
         self.stream.begin_link();
         self.bench.begin_link();
+        self.load.begin_unit();
         if info.read_only {
             // What goes by in a recording is understood as it goes by; nothing is sent for it.
             self.command(Command::Overhear);
@@ -209,13 +217,75 @@ impl App {
         if matches!(self.view.link.state, LinkState::Lost(_)) {
             self.scrollback.note(now, format!("link back as {}", visible::text(name)));
             self.view.link.state = LinkState::Open { read_only: false };
-            self.view.tell(Tone::Good, "The link is back.");
-            self.view.monitor.stream.interrupt();
+            self.view.link_back();
             if let Some(session) = &mut self.session {
                 session.link_back(now);
+                session.forget_unit();
             }
             self.command(Command::Identify);
         }
+    }
+
+    /// The unit behind a link that came back has said something of itself, or has had its chance: whether what was shown
+    /// before is its own is decided now.
+    pub(super) fn decide_who_returned(&mut self, effects: &mut Vec<Effect>) {
+        let Some(who) = self.view.returning.as_ref().and_then(|returning| returning.who(&self.view.facts)) else {
+            return;
+        };
+        let waiting = self.view.returning.take().map(Returning::release).unwrap_or_default();
+        match who {
+            Who::Same => {
+                let unit = self.view.product().map_or("unit", |product| product.name.as_str());
+                self.view.tell(Tone::Good, format!("The link is back, and the {unit} answers as before."));
+            }
+            Who::Other { now, before } => {
+                let text = format!("Another unit is on the cable now: {now}; before it was {before}.");
+                self.begin_unit(visible::text(&text), effects);
+            }
+            Who::Unknown if self.view.facts.state == UnitState::Loader => {
+                let text =
+                    "The link is back. The unit waits in its loader, where it cannot say which it is: L loads a file.";
+                self.begin_unit(text.to_owned(), effects);
+            }
+            Who::Unknown => {
+                let text = "The link is back. Whether the unit is the one from before it has not said, so the screens \
+                            begin anew.";
+                self.begin_unit(text.to_owned(), effects);
+            }
+        }
+        for event in waiting {
+            let facts = self.session.as_ref().map_or(&self.no_facts, Session::facts);
+            self.view.fold(self.now, &event, facts);
+            if let Event::Row { at, row, .. } = &event {
+                self.export_row(*at, row, effects);
+            }
+        }
+    }
+
+    /// Two units of one product and version differ in their serial numbers only, which the object dictionary alone has.
+    pub(super) fn compare_serial(&mut self, before: Option<u32>, effects: &mut Vec<Effect>) {
+        let (Some(before), Some(now)) = (before, self.view.serial) else { return };
+        if before != now {
+            let read = self.view.dictionary.take();
+            let text = format!("Another unit is on the cable: its serial number is {now}, before it was {before}.");
+            self.begin_unit(text, effects);
+            (self.view.dictionary, self.view.serial) = (read, Some(now));
+        }
+    }
+
+    /// Another unit, or one that may be another: nothing that was shown is its own. What it says itself comes anew.
+    pub(super) fn begin_unit(&mut self, text: String, effects: &mut Vec<Effect>) {
+        if self.view.export.is_some() {
+            self.end_export(Some("another unit may be on the cable"));
+        }
+        self.view.begin_unit();
+        self.dictionary.begin_link();
+        self.stream.begin_link();
+        self.bench.begin_link();
+        self.load.begin_unit();
+        self.scrollback.note(self.now, text.clone());
+        effects.push(Effect::Mark(text.clone()));
+        self.view.tell(Tone::Bad, text);
     }
 
     /// What happens from now on is not in the recording. That stays in sight: who has to prove something later must know.

@@ -17,7 +17,9 @@ use link::Next;
 use super::action::Action;
 use super::frame;
 use super::input::{Effect, Input, Noted};
-use super::popup::{self, Popup, Question};
+use super::keymap::Binding;
+use super::picker::expanded;
+use super::popup::{self, Popup, Question, Wanted};
 use super::screens::bench::{self, Bench};
 use super::screens::connect::Connect;
 use super::screens::diagnostics::Diagnostics;
@@ -41,6 +43,9 @@ use crate::time::{Duration, Instant};
 /// How often the picture moves while an upload runs, so that its times go on when the unit is silent.
 const UPLOAD_TICK: Duration = Duration::from_millis(500);
 
+/// Begins the name of a recording as a link.
+const REPLAY: &str = "replay:";
+
 /// What the console is started with.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -48,6 +53,8 @@ pub struct Options {
     pub link: Option<String>,
     /// Where the file picker starts.
     pub directory: PathBuf,
+    /// What `~` means in a path; nothing where the system does not say.
+    pub home: Option<PathBuf>,
     /// Which colours to begin with (`NO_COLOR`, `AXCON_THEME`).
     pub palette: Palette,
     /// Columns and rows of the terminal at the start.
@@ -80,6 +87,8 @@ pub struct App {
     overview: Overview,
     terminal: Terminal,
     load: Load,
+    /// Where the last file that is there was chosen.
+    folder: PathBuf,
     dictionary: Dictionary,
     stream: Stream,
     diagnostics: Diagnostics,
@@ -110,6 +119,7 @@ impl App {
             overview: Overview::default(),
             terminal: Terminal::default(),
             load: Load::new(options.directory.clone()),
+            folder: options.directory.clone(),
             dictionary: Dictionary::default(),
             stream: Stream::default(),
             diagnostics: Diagnostics::default(),
@@ -164,10 +174,8 @@ impl App {
             }
             Input::Unrecorded(why) => self.unrecorded(now, why),
             Input::RecordingOver(failure) => self.recording_over(now, failure),
-            Input::FilesListed { directory, entries } => {
-                self.load.listed(directory, entries);
-                self.dirty = true;
-            }
+            Input::FilesListed { directory, entries } => self.files_listed(directory, entries),
+            Input::BytesRead { path, bytes } => self.bytes_read(&path, bytes),
             Input::ImageChecked(facts) => {
                 self.load.checked(facts);
                 self.dirty = true;
@@ -269,18 +277,19 @@ impl App {
         let keys = match self.front {
             _ if self.help.is_some() => frame::help_keys(theme),
             ScreenId::Terminal => frame::terminal_keys(theme, self.front.bindings(), self.terminal.is_after_prefix()),
-            ScreenId::Load => frame::keys(theme, self.load.footer(&self.view)),
-            ScreenId::Connect
-            | ScreenId::Overview
-            | ScreenId::Dictionary
-            | ScreenId::Stream
-            | ScreenId::Diagnostics
-            | ScreenId::Recordings
-            | ScreenId::Bench => frame::keys(theme, self.front.bindings()),
+            _ => frame::keys(theme, self.footer()),
         };
         lines::draw(frame, row(area.height - 1), [keys]);
         if let Some(popup) = &self.popup {
             popup::draw(popup, &self.view, theme, frame::body(area, &self.view), frame);
+        }
+    }
+
+    /// The bindings of the screen in front that mean something now.
+    fn footer(&self) -> &'static [Binding] {
+        match self.front {
+            ScreenId::Load => self.load.footer(&self.view),
+            screen => screen.bindings(),
         }
     }
 
@@ -339,8 +348,13 @@ impl App {
                 }
             }
             // A recording can be opened again as it was; whoever has a unit at the line is asked.
-            Action::Open(link) if self.view.can_send() => self.ask(Question::Disconnect { then: Some(link) }),
-            Action::Open(link) => self.open(link, effects),
+            Action::Open(link) => {
+                let link = self.link_named(link);
+                match self.view.can_send() {
+                    true => self.ask(Question::Disconnect { then: Some(link) }),
+                    false => self.open(link, effects),
+                }
+            }
             Action::Reconnect => {
                 if let Some(link) = self.view.link.name.clone() {
                     self.open(link, effects);
@@ -353,8 +367,10 @@ impl App {
             }
             Action::ListFiles(directory) => effects.push(Effect::ListFiles(directory)),
             Action::CheckImage(path) => {
+                let path = self.expanded(path);
                 self.load.check(path.clone());
-                effects.push(Effect::CheckImage { path, allow: self.load.allowed().to_vec() });
+                let (loader, allow) = (self.load.loader(), self.load.allowed().to_vec());
+                effects.push(Effect::CheckImage { path, loader, allow });
             }
             Action::Allow(error) => {
                 if let Some(action) = self.load.allow(error) {
@@ -386,7 +402,8 @@ impl App {
                 let product = product.or_else(|| self.view.noted().map(|noted| noted.product.clone()));
                 let known = said.or(product.clone());
                 let packed = self.load.is_packed();
-                let order = LoadOrder { product, packed, ..LoadOrder::new(image, password) };
+                let (loader, allowed) = (self.load.loader(), self.load.allowed().to_vec());
+                let order = LoadOrder { product, packed, loader, allowed, ..LoadOrder::new(image, password) };
                 if self.command(Command::Load(Box::new(order)))
                     && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
                 {
@@ -402,10 +419,17 @@ impl App {
                 ScreenId::Terminal => self.terminal.find(words, &self.scrollback),
                 _ => self.dictionary.find(&words),
             },
-            Action::ExportStream(path) => self.export_stream(path, effects),
+            Action::ExportStream(path) => self.export_stream(self.expanded(path), effects),
             Action::EndExport => self.end_export(None),
-            Action::ExportDictionary(path) => self.export_dictionary(path, effects),
-            Action::Compare(path) => effects.push(Effect::ReadFile(path)),
+            Action::ExportDictionary(path) => self.export_dictionary(self.expanded(path), effects),
+            Action::Compare(path) => effects.push(Effect::ReadFile(self.expanded(path))),
+            Action::Choose(Wanted::ToSend) if !self.may_send_file() => {}
+            Action::Choose(wanted) => {
+                self.ask(Question::choose(wanted, &self.folder));
+                effects.push(Effect::ListFiles(self.folder.clone()));
+            }
+            Action::ReadToSend(path) => effects.push(Effect::ReadBytes(self.expanded(path))),
+            Action::SendFile { name, bytes } => self.send_file(name, bytes, effects),
             Action::Break if self.can_send() => effects.push(Effect::Break),
             Action::Break => {}
             Action::ListRecordings => effects.push(Effect::ListRecordings),
@@ -432,6 +456,7 @@ impl App {
             Command::Diagnostics { .. } => Some(Job::Diagnostics),
             Command::Overhear => Some(Job::Overhear),
             Command::Load(_) => Some(Job::Load),
+            Command::SendFile(_) => Some(Job::SendFile),
         };
         let period = match &command {
             Command::StreamOn { period, .. } => Some(*period),
@@ -474,6 +499,23 @@ impl App {
         }
     }
 
+    /// A path with the user's home folder in place of `~`.
+    fn expanded(&self, path: PathBuf) -> PathBuf {
+        expanded(path, self.options.home.as_deref())
+    }
+
+    /// The same for a link: the path of a port, or of a recording.
+    fn link_named(&self, name: String) -> String {
+        let (kind, path) = match name.strip_prefix(REPLAY) {
+            Some(path) => (REPLAY, path),
+            None => ("", name.as_str()),
+        };
+        match path.starts_with('~') {
+            true => format!("{kind}{}", self.expanded(path.into()).display()),
+            false => name,
+        }
+    }
+
     fn ask(&mut self, question: Question) {
         self.popup = Some(Popup::Asking(question));
     }
@@ -495,12 +537,22 @@ impl App {
             }
         }
         while let Some(event) = self.session.as_mut().and_then(Session::poll_event) {
+            let serial = self.view.serial;
             let facts = self.session.as_ref().map_or(&self.no_facts, Session::facts);
             self.view.fold(self.now, &event, facts);
             self.dirty = true;
-            if let Event::Row { at, row, .. } = &event {
-                self.export_row(*at, row, effects);
+            match &event {
+                // Whose it is is not known yet: it waits.
+                Event::Row { .. } if self.view.returning.is_some() => {}
+                Event::Row { at, row, .. } => self.export_row(*at, row, effects),
+                // The answer to the question who is there; before it, only a name is one.
+                Event::Finished(_) => self.decide_who_returned(effects),
+                Event::FactsChanged if self.view.facts.product.is_some() && self.view.job.is_none() => {
+                    self.decide_who_returned(effects);
+                }
+                _ => {}
             }
+            self.compare_serial(serial, effects);
             if let (Event::Finished(Outcome::Loaded(report)), Some(link)) = (&event, self.view.link.name.clone())
                 && report.unit == UnitNow::Application
             {

@@ -34,6 +34,7 @@ fn the_link_given_at_the_start_is_opened_at_once() {
     let mut app = App::new(Options {
         link: Some("emu:axtc4co".into()),
         directory: "/".into(),
+        home: None,
         palette: Palette::Dark,
         size: SMALL,
     });
@@ -712,9 +713,9 @@ fn an_error_is_allowed_by_its_name_in_one_file_only_and_the_plan_says_so() {
     assert!(stage.shows("waits in its loader") && stage.shows("identity-crc"), "{}", stage.picture());
     stage.keys("identity-crc").press(KeyCode::Enter);
     let allow = vec![DefectId::IdentityCrc];
-    assert_eq!(stage.asked(), [Effect::CheckImage { path: path.clone(), allow: allow.clone() }]);
+    assert_eq!(stage.asked(), [Effect::CheckImage { path: path.clone(), loader: None, allow: allow.clone() }]);
     stage.input(Input::ImageChecked(Box::new(ImageFacts { allowed: allow, ..good_image() })));
     assert!(stage.shows("passed in spite of identity-crc"), "{}", stage.picture());
     stage.keys("p/other.S").press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::CheckImage { path: "/other.S".into(), allow: Vec::new() }]);
+    assert_eq!(stage.asked(), [Effect::CheckImage { path: "/other.S".into(), loader: None, allow: Vec::new() }]);
 }

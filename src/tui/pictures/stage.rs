@@ -45,8 +45,13 @@ pub(super) struct Stage {
 
 impl Stage {
     pub(super) fn new(size: (u16, u16)) -> Self {
-        let options =
-            Options { link: None, directory: PathBuf::from("/home/service/images"), palette: Palette::Mono, size };
+        let options = Options {
+            link: None,
+            directory: PathBuf::from("/home/service/images"),
+            home: Some("/home/service".into()),
+            palette: Palette::Mono,
+            size,
+        };
         let mut app = App::new(options);
         let effects = app.start();
         Stage { app, size, now: Instant::ZERO, effects }
@@ -164,27 +169,7 @@ impl Stage {
     /// On the load screen, the folder read.
     pub(super) fn picking(mut self) -> Self {
         self.keys("l");
-        let file = |name: &str, bytes| FileEntry {
-            name: name.into(),
-            kind: FileKind::File,
-            bytes,
-            begins: Vec::new(),
-            modified: Some("2026-01-31 12:00".into()),
-        };
-        let folder = |name: &str| FileEntry {
-            name: name.into(),
-            kind: FileKind::Folder,
-            bytes: 0,
-            begins: Vec::new(),
-            modified: None,
-        };
-        let entries = vec![
-            file("AXTC4CO_V1.2.0.elf.S", 242_846),
-            folder("bad"),
-            file("AXTC4CO_V1.1.0.elf.S", 242_846),
-            file("readme.txt", 99),
-        ];
-        self.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(entries) });
+        self.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(files()) });
         self
     }
 
@@ -306,6 +291,25 @@ impl Stage {
     pub(super) fn shows(&self, text: &str) -> bool {
         self.picture().contains(text)
     }
+}
+
+/// What is in the folder of images.
+pub(super) fn files() -> Vec<FileEntry> {
+    let file = |name: &str, bytes, begins: &str| FileEntry {
+        name: name.into(),
+        kind: FileKind::File,
+        bytes,
+        begins: begins.as_bytes().to_vec(),
+        modified: Some("2026-01-31 12:00".into()),
+    };
+    let folder = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, begins: Vec::new(), modified: None };
+    vec![
+        file("AXTC4CO_V1.2.0.elf.S", 242_846, ""),
+        folder,
+        file("AXTC4CO_V1.1.0.elf.S", 242_846, ""),
+        file("readme.txt", 99, ""),
+        file("before.json", 31_250, r#"{"schema":"axcon.dictionary/1","product":"AXTC4CO""#),
+    ]
 }
 
 pub(super) fn link_info(link: &str) -> LinkInfo {

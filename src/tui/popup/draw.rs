@@ -1,13 +1,16 @@
 //! Pictures of the popups.
 
 use ratatui::Frame;
-use ratatui::layout::Rect;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Clear};
 
-use super::{Popup, Purpose, Question, consequence};
+use super::{Popup, Purpose, Question, Wanted, consequence};
 use crate::session::Job;
-use crate::time::BITS_PER_CHARACTER;
+use crate::time::{BITS_PER_CHARACTER, Duration};
+use crate::tui::keymap::Press;
+use crate::tui::picker::Picker;
 use crate::tui::screens::bench::emulated;
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
@@ -18,12 +21,76 @@ use crate::wire::stream::Source;
 /// Columns of a popup, borders included.
 const COLUMNS: u16 = 66;
 
+/// Columns of a popup with a list of files.
+const LIST_COLUMNS: u16 = 78;
+/// Rows of a list of files at most.
+const MOST_LIST_ROWS: usize = 24;
+/// The row of its content in which the list begins.
+const LIST_ROW: usize = 3;
+/// Rows of a popup with a list of files that are not the list.
+const AROUND_LIST: u16 = 12;
+
+/// A popup with its place, and what can be clicked on it.
+struct Laid {
+    window: Rect,
+    inside: Rect,
+    title: Span<'static>,
+    rows: Vec<Line<'static>>,
+    targets: Vec<(Rect, Target)>,
+}
+
+/// What a click on a popup means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// The same as this key.
+    Key(Press),
+    /// An entry of the list of files.
+    Entry(usize),
+}
+
+/// A key and what it does here.
+type Hint = (Press, &'static str);
+
+const ENTER: Press = Press::Plain(KeyCode::Enter);
+const ESC: Press = Press::Plain(KeyCode::Esc);
+const CLEAR: Press = Press::Ctrl('u');
+
+const fn letter(letter: char) -> Press {
+    Press::Plain(KeyCode::Char(letter))
+}
+
 /// Draws a popup in the middle of an area.
 pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Frame) {
-    let columns = COLUMNS.min(area.width);
+    let laid = lay_out(popup, view, theme, area);
+    let block = Block::bordered().border_type(BorderType::Rounded).border_style(theme.quiet()).title(laid.title);
+    frame.render_widget(Clear, laid.window);
+    frame.render_widget(block, laid.window);
+    lines::draw(frame, laid.inside, laid.rows);
+}
+
+/// What a click at this place of the screen means to the popup.
+pub fn target_at(popup: &Popup, view: &View, theme: Theme, area: Rect, place: Position) -> Option<Target> {
+    let targets = lay_out(popup, view, theme, area).targets;
+    targets.into_iter().find_map(|(rect, target)| rect.contains(place).then_some(target))
+}
+
+fn lay_out(popup: &Popup, view: &View, theme: Theme, area: Rect) -> Laid {
+    let is_list = matches!(popup, Popup::Asking(Question::Choose { .. }));
+    let columns = if is_list { LIST_COLUMNS } else { COLUMNS }.min(area.width);
     let inner = usize::from(columns).saturating_sub(4);
+    let room = usize::from(area.height.saturating_sub(AROUND_LIST)).clamp(1, MOST_LIST_ROWS);
+    let mut choices: Vec<(usize, Target)> = Vec::new();
     let (title, mut rows, hints) = match popup {
-        Popup::Asking(question) => ask(question, view, theme, inner),
+        Popup::Asking(question) => {
+            if let Question::Stream { .. } = question {
+                choices.extend([(0, Target::Key(letter('f'))), (1, Target::Key(letter('p')))]);
+            }
+            if let Question::Choose { picker, .. } = question {
+                let entry = |row| Some((LIST_ROW + row, Target::Entry(picker.entry_at(row, room)?)));
+                choices.extend((0..room).filter_map(entry));
+            }
+            ask(question, view, theme, (inner, room))
+        }
         Popup::Waiting { what, hint } => ("One moment".to_owned(), paragraphs(&[what], inner), vec![*hint]),
         Popup::Failed { title, failure } => {
             let mut rows = paragraphs(&[&visible::sentence(&failure.text)], inner);
@@ -37,18 +104,20 @@ pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Fr
                         .map(|(number, line)| Line::raw(format!("{} {line}", if number == 0 { "·" } else { " " }))),
                 );
             }
-            ((*title).to_owned(), rows, vec![("Enter", "close")])
+            ((*title).to_owned(), rows, vec![(ENTER, "close")])
         }
     };
-    if !hints.is_empty() {
-        rows.push(Line::default());
-        let mut line = Line::default();
-        for (key, meaning) in hints {
-            line.push_span(Span::styled(key, theme.key()));
-            line.push_span(Span::raw(format!(" {meaning}   ")));
-        }
-        rows.push(line);
+    let hints_row = rows.len() + 1;
+    let mut line = Line::default();
+    let mut keys: Vec<(u16, u16, Target)> = Vec::new();
+    for (press, meaning) in hints {
+        let begin = line.width() as u16;
+        line.push_span(Span::styled(press.name(), theme.key()));
+        line.push_span(Span::raw(format!(" {meaning}")));
+        keys.push((begin, line.width() as u16 - begin, Target::Key(press)));
+        line.push_span(Span::raw("   "));
     }
+    rows.extend([Line::default(), line]);
     let height = (rows.len() as u16 + 4).min(area.height);
     let y = match popup {
         // What is found has to stay in sight.
@@ -60,24 +129,45 @@ pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Fr
         Popup::Failed { .. } => theme.bad(),
         Popup::Asking(_) | Popup::Waiting { .. } => theme.heading(),
     };
-    let block = Block::bordered()
-        .border_type(BorderType::Rounded)
-        .border_style(theme.quiet())
-        .title(Span::styled(format!(" {title} "), style));
-    frame.render_widget(Clear, window);
-    frame.render_widget(block, window);
     let inside = Rect {
         x: window.x + 2.min(window.width),
         y: window.y + 2.min(window.height),
         width: window.width.saturating_sub(4),
         height: window.height.saturating_sub(3),
     };
-    lines::draw(frame, inside, rows);
+    let place = |row: usize, x: u16, width: u16| {
+        let rect = Rect { x: inside.x + x, y: inside.y + row as u16, width, height: 1 };
+        rect.intersection(inside)
+    };
+    let mut targets: Vec<(Rect, Target)> =
+        choices.into_iter().map(|(row, target)| (place(row, 0, inside.width), target)).collect();
+    targets.extend(keys.into_iter().map(|(x, width, target)| (place(hints_row, x, width), target)));
+    Laid { window, inside, title: Span::styled(format!(" {title} "), style), rows, targets }
 }
 
-type Content = (String, Vec<Line<'static>>, Vec<(&'static str, &'static str)>);
+type Content = (String, Vec<Line<'static>>, Vec<Hint>);
 
-fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Content {
+/// A file that is there, chosen in `room` rows.
+fn choose(wanted: Wanted, picker: &Picker, text: &str, theme: Theme, (columns, room): (usize, usize)) -> Content {
+    let (title, explained, key) = match wanted {
+        Wanted::Dump => {
+            ("Compare with a saved dictionary", "As E here or 'axcon dictionary dump' writes it, as JSON.", "compare")
+        }
+        Wanted::ToSend => ("Send a file as it is", "Byte for byte, as if typed. Software goes by screen 4.", "choose"),
+    };
+    let directory = visible::text(&picker.directory().to_string_lossy());
+    let above: [Line; LIST_ROW] =
+        [Line::raw(explained), Line::styled(format::keep_end(&directory, columns), theme.quiet()), Line::default()];
+    let mut rows = above.to_vec();
+    let mut shown = picker.rows(theme, columns, room, "Type a path.");
+    // The popup keeps its height from folder to folder.
+    shown.resize(room, Line::default());
+    rows.extend(shown);
+    rows.extend([Line::default(), typed(theme, "or a path ", text, columns)]);
+    (title.to_owned(), rows, vec![(ENTER, key), (CLEAR, "clear"), (ESC, "back")])
+}
+
+fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, usize)) -> Content {
     let (title, mut rows, hints) = match question {
         Question::Link(field) => (
             "Connect to",
@@ -91,7 +181,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 rows.push(typed(theme, "", field.text(), columns));
                 rows
             },
-            vec![("Enter", "connect"), ("Esc", "back")],
+            vec![(ENTER, "connect"), (ESC, "back")],
         ),
         Question::File { purpose, typed: field, directory } => {
             let (title, text, key) = match purpose {
@@ -106,11 +196,6 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                     "A new file. Its ending says how: .json (to compare with later), .csv, .dcf, .txt.",
                     "write",
                 ),
-                Purpose::Compare => (
-                    "Compare with a dump",
-                    "A dump as JSON, as E here or 'axcon dictionary dump --format json' writes it.",
-                    "compare",
-                ),
             };
             let mut rows = paragraphs(&[text], columns);
             if *purpose == Purpose::Image {
@@ -119,10 +204,10 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
             }
             rows.push(Line::default());
             rows.push(typed(theme, "", field.text(), columns));
-            (title, rows, vec![("Enter", key), ("Ctrl-U", "clear"), ("Esc", "back")])
+            (title, rows, vec![(ENTER, key), (CLEAR, "clear"), (ESC, "back")])
         }
         Question::Find(field) => {
-            ("Find", vec![typed(theme, "", field.text(), columns)], vec![("Enter", "keep"), ("Esc", "show everything")])
+            ("Find", vec![typed(theme, "", field.text(), columns)], vec![(ENTER, "keep"), (ESC, "show everything")])
         }
         Question::Temperature { input, typed: field, complaint } => (
             "Temperature of the sensor",
@@ -134,7 +219,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 rows.extend(complain(theme, *complaint, columns));
                 rows
             },
-            vec![("Enter", "set"), ("Esc", "back")],
+            vec![(ENTER, "set"), (ESC, "back")],
         ),
         Question::Order(field) => (
             "Order to the emulated unit",
@@ -146,7 +231,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 rows.push(typed(theme, "", field.text(), columns));
                 rows
             },
-            vec![("Enter", "do it"), ("Esc", "back")],
+            vec![(ENTER, "do it"), (ESC, "back")],
         ),
         Question::Stream { source, millis, complaint, .. } => (
             "Switch the data stream on",
@@ -173,7 +258,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 rows.extend(complain(theme, *complaint, columns));
                 rows
             },
-            vec![("F P", "choose"), ("Enter", "switch on"), ("Esc", "back")],
+            vec![(letter('f'), "field"), (letter('p'), "process"), (ENTER, "switch on"), (ESC, "back")],
         ),
         Question::View => (
             "View the object dictionary",
@@ -186,7 +271,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 ],
                 columns,
             ),
-            vec![("Enter", "read all of it"), ("T", "on the terminal"), ("Esc", "back")],
+            vec![(ENTER, "read all of it"), (letter('t'), "on the terminal"), (ESC, "back")],
         ),
         Question::Defaults { typed: field, complaint } => (
             "Restore the default object dictionary",
@@ -204,7 +289,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 rows.extend(complain(theme, *complaint, columns));
                 rows
             },
-            vec![("Enter", "restore"), ("Esc", "back")],
+            vec![(ENTER, "restore"), (ESC, "back")],
         ),
         Question::Allow { typed: field, errors, complaint } => (
             "Send in spite of an error?",
@@ -219,7 +304,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 rows.extend(complain(theme, *complaint, columns));
                 rows
             },
-            vec![("Enter", "allow it and check again"), ("Esc", "back")],
+            vec![(ENTER, "allow it and check again"), (ESC, "back")],
         ),
         Question::Label { typed: field, image, complaint, .. } => (
             "Which product is the unit?",
@@ -238,7 +323,7 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 rows.extend(complain(theme, *complaint, columns));
                 rows
             },
-            vec![("Enter", "go on"), ("Esc", "back")],
+            vec![(ENTER, "go on"), (ESC, "back")],
         ),
         Question::Password { field, complaint, .. } => (
             "Password for loading software",
@@ -254,12 +339,12 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 rows.extend(complain(theme, *complaint, columns));
                 rows
             },
-            vec![("Enter", "start the upload"), ("Esc", "back")],
+            vec![(ENTER, "start the upload"), (ESC, "back")],
         ),
         Question::CancelLoad => (
             "Cancel the upload?",
             paragraphs(&[consequence(view.load.progress.map(|progress| progress.phase))], columns),
-            vec![("Y", "cancel the upload"), ("N", "go on loading")],
+            vec![(letter('y'), "cancel the upload"), (letter('n'), "go on loading")],
         ),
         Question::Paste(bytes) => (
             "Send the pasted text?",
@@ -274,7 +359,40 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                     columns,
                 )
             },
-            vec![("Y", "send"), ("N", "do not send")],
+            vec![(letter('y'), "send"), (letter('n'), "do not send")],
+        ),
+        Question::Choose { wanted, picker, typed } => {
+            return choose(*wanted, picker, typed.text(), theme, (columns, room));
+        }
+        Question::SendFile { name, bytes, is_image } => (
+            "Send this file as it is?",
+            {
+                let name = visible::text(name);
+                let size = format::grouped(bytes.len());
+                let mut texts = vec![format!("{name}, {size} bytes, goes to the unit as if typed.")];
+                texts.push(match is_image {
+                    true => {
+                        "It is a software image. The load screen (4) checks it first, waits where the unit needs time, \
+                             notices every error and proves the result; here nobody does. A unit in its loader may be \
+                             left without software, one in its menu takes every S and D for a key."
+                            .to_owned()
+                    }
+                    false => "Every M, V, D, T, S and L in it is a key of the unit's menu.".to_owned(),
+                });
+                let time = bytes.len() as f64 * f64::from(BITS_PER_CHARACTER) / f64::from(view.link.baud.max(1));
+                texts.push(format!(
+                    "It takes {} or more. Esc stops it.",
+                    format::minutes(Duration::from_secs_f64(time.ceil()))
+                ));
+                let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
+                paragraphs(&texts, columns)
+            },
+            match is_image {
+                true => {
+                    vec![(letter('l'), "load screen"), (letter('y'), "send all the same"), (letter('n'), "do not send")]
+                }
+                false => vec![(letter('y'), "send"), (letter('n'), "do not send")],
+            },
         ),
         Question::Disconnect { then } => (
             "Close the link?",
@@ -296,11 +414,13 @@ fn ask(question: &Question, view: &View, theme: Theme, columns: usize) -> Conten
                 let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
                 paragraphs(&texts, columns)
             },
-            vec![("Y", "close the link"), ("N", "stay connected")],
+            vec![(letter('y'), "close the link"), (letter('n'), "stay connected")],
         ),
-        Question::Quit => {
-            ("Leave axcon?", paragraphs(&in_the_middle(view), columns), vec![("Y", "leave"), ("N", "stay")])
-        }
+        Question::Quit => (
+            "Leave axcon?",
+            paragraphs(&in_the_middle(view), columns),
+            vec![(letter('y'), "leave"), (letter('n'), "stay")],
+        ),
     };
     if rows.is_empty() {
         rows.push(Line::default());
@@ -332,6 +452,10 @@ fn in_the_middle(view: &View) -> [&'static str; 2] {
             "axcon leaves the view first (X), so that they go on.",
         ],
         Some(Job::Diagnostics) => ["The unit prints its diagnostics.", "axcon stops them first (S)."],
+        Some(Job::SendFile) => [
+            "A file is being sent to the unit.",
+            "What of it has not left yet stays here: the unit has part of it then.",
+        ],
         Some(Job::StreamOn | Job::StreamOff | Job::RestoreDefaults) => {
             ["The unit is at one of its prompts.", "axcon answers it first, so that the next key is none."]
         }

@@ -10,6 +10,9 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::action::Action;
 use super::input::{Failure, ImageFacts};
+use super::keymap::{Cmd, Press};
+use super::picker::{Offers, Picked, Picker, placed};
+use super::screens::ScreenId;
 use super::view::View;
 use super::widgets::field::{PasswordField, TextField};
 use super::widgets::format;
@@ -18,7 +21,7 @@ use crate::session::{Command, Phase, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
 
-pub use draw::draw;
+pub use draw::{Target, draw, target_at};
 
 /// What stands in front of the screen.
 #[derive(Debug)]
@@ -30,7 +33,7 @@ pub enum Popup {
         /// What for.
         what: String,
         /// The key that does not wait, and what it does.
-        hint: (&'static str, &'static str),
+        hint: (Press, &'static str),
     },
     /// Something has failed; what, and what to try.
     Failed {
@@ -54,6 +57,24 @@ pub enum Question {
         typed: TextField,
         /// The folder; empty for the one the program was started in.
         directory: PathBuf,
+    },
+    /// A file that is there: chosen from its folder, or its path typed.
+    Choose {
+        /// What it is for.
+        wanted: Wanted,
+        /// The folder.
+        picker: Picker,
+        /// What has been typed; where something has, it is what Enter takes.
+        typed: TextField,
+    },
+    /// Shall this file go to the unit as it is?
+    SendFile {
+        /// Its name.
+        name: String,
+        /// What is in it.
+        bytes: Vec<u8>,
+        /// It is a software image, which the load screen sends safely.
+        is_image: bool,
     },
     /// Words to look for; every letter looks.
     Find(TextField),
@@ -139,8 +160,15 @@ pub enum Purpose {
     ExportStream,
     /// The object dictionary goes there.
     ExportDictionary,
-    /// A dump to compare with.
-    Compare,
+}
+
+/// What a file that is there is wanted for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// To compare the object dictionary with.
+    Dump,
+    /// To be sent to the unit as it is.
+    ToSend,
 }
 
 /// What a key did to a popup.
@@ -156,6 +184,8 @@ pub enum Answer {
     Meanwhile(Action),
 }
 
+/// Rows that a page key moves in a list of files.
+const PAGE: usize = 8;
 /// Shortest repetition time of the stream (errata E-105).
 const SHORTEST_PERIOD_MS: u64 = 1;
 /// Longest repetition time of the stream (errata E-105).
@@ -187,6 +217,16 @@ impl Popup {
     }
 }
 
+impl Wanted {
+    /// What is to be done with the file.
+    fn action(self, path: PathBuf) -> Action {
+        match self {
+            Wanted::Dump => Action::Compare(path),
+            Wanted::ToSend => Action::ReadToSend(path),
+        }
+    }
+}
+
 impl Question {
     /// Asks for a link.
     pub fn link() -> Question {
@@ -201,7 +241,7 @@ impl Question {
     /// Asks for another file, and suggests a name for a new one.
     pub fn file(purpose: Purpose, view: &View) -> Question {
         let typed = match purpose {
-            Purpose::Image | Purpose::Compare => TextField::default(),
+            Purpose::Image => TextField::default(),
             Purpose::ExportStream => TextField::new(suggested(view, "stream", view.monitor.stream.newest, "csv")),
             Purpose::ExportDictionary => {
                 let at = view.dictionary.as_ref().map(|read| read.at);
@@ -209,6 +249,17 @@ impl Question {
             }
         };
         Question::File { purpose, typed, directory: PathBuf::new() }
+    }
+
+    /// Asks for a file that is there, beginning in a folder that has to be read.
+    pub fn choose(wanted: Wanted, directory: &Path) -> Question {
+        let offers = match wanted {
+            Wanted::Dump => Offers::Dumps,
+            Wanted::ToSend => Offers::Anything,
+        };
+        let mut picker = Picker::new(offers, directory.to_path_buf());
+        picker.list(directory.to_path_buf());
+        Question::Choose { wanted, picker, typed: TextField::default() }
     }
 
     /// Asks for words to look for, those of the last time given.
@@ -269,6 +320,14 @@ impl Question {
                 self.changed()
             }
             KeyCode::Enter => self.accept(),
+            // Nothing is left of what was typed: as in the list of the load screen.
+            KeyCode::Backspace if self.is_untyped_choice() => self.move_in_list(Cmd::Back),
+            KeyCode::Up => self.move_in_list(Cmd::Up),
+            KeyCode::Down => self.move_in_list(Cmd::Down),
+            KeyCode::PageUp => self.move_in_list(Cmd::PageUp),
+            KeyCode::PageDown => self.move_in_list(Cmd::PageDown),
+            KeyCode::Home => self.move_in_list(Cmd::First),
+            KeyCode::End => self.move_in_list(Cmd::Last),
             KeyCode::Backspace => {
                 self.pop();
                 self.changed()
@@ -276,6 +335,25 @@ impl Question {
             KeyCode::Char(character) if !with_ctrl && !key.modifiers.contains(KeyModifiers::ALT) => {
                 self.typed(character)
             }
+            _ => Answer::Stay,
+        }
+    }
+
+    fn is_untyped_choice(&self) -> bool {
+        matches!(self, Question::Choose { typed, .. } if typed.text().is_empty())
+    }
+
+    /// Moves in the list of files, where there is one.
+    fn move_in_list(&mut self, cmd: Cmd) -> Answer {
+        let Question::Choose { picker, .. } = self else { return Answer::Stay };
+        let picked = picker.on(cmd, PAGE);
+        self.picked(picked)
+    }
+
+    fn picked(&self, picked: Option<Picked>) -> Answer {
+        match (picked, self) {
+            (Some(Picked::Folder(directory)), _) => Answer::Meanwhile(Action::ListFiles(directory)),
+            (Some(Picked::File(path)), Question::Choose { wanted, .. }) => Answer::Act(wanted.action(path)),
             _ => Answer::Stay,
         }
     }
@@ -303,13 +381,19 @@ impl Question {
             Question::Link(field) => Answer::Act(Action::Open(field.text().trim().to_owned())),
             Question::File { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
             Question::File { purpose, typed, directory } => {
-                let path = directory.join(typed.text().trim());
+                let path = placed(directory, typed.text());
                 Answer::Act(match purpose {
                     Purpose::Image => Action::CheckImage(path),
                     Purpose::ExportStream => Action::ExportStream(path),
                     Purpose::ExportDictionary => Action::ExportDictionary(path),
-                    Purpose::Compare => Action::Compare(path),
                 })
+            }
+            Question::Choose { picker, typed, .. } if typed.text().trim().is_empty() => {
+                let picked = picker.on(Cmd::Accept, PAGE);
+                self.picked(picked)
+            }
+            Question::Choose { wanted, picker, typed } => {
+                Answer::Act(wanted.action(placed(picker.directory(), typed.text())))
             }
             Question::Find(_) => Answer::Close,
             Question::Temperature { input, typed, complaint } => match typed.text().trim().parse::<f64>() {
@@ -372,6 +456,9 @@ impl Question {
             }
             Question::CancelLoad => Answer::Act(Action::Command(Command::Cancel)),
             Question::Paste(bytes) => Answer::Act(Action::Command(Command::Keys(std::mem::take(bytes)))),
+            Question::SendFile { name, bytes, .. } => {
+                Answer::Act(Action::SendFile { name: std::mem::take(name), bytes: std::mem::take(bytes) })
+            }
             Question::Disconnect { then } => Answer::Act(Action::Disconnect { then: then.take() }),
             Question::Quit => Answer::Act(Action::Quit),
         }
@@ -379,7 +466,10 @@ impl Question {
 
     fn typed(&mut self, character: char) -> Answer {
         match self {
-            Question::Link(field) | Question::File { typed: field, .. } | Question::Order(field) => {
+            Question::Link(field)
+            | Question::File { typed: field, .. }
+            | Question::Choose { typed: field, .. }
+            | Question::Order(field) => {
                 field.push(character);
             }
             Question::Find(field) => {
@@ -408,9 +498,13 @@ impl Question {
                 field.push(character);
             }
             Question::View if character.eq_ignore_ascii_case(&'t') => return Answer::Act(Action::ViewDictionary),
+            Question::SendFile { is_image: true, .. } if character.eq_ignore_ascii_case(&'l') => {
+                return Answer::Act(Action::Go(ScreenId::Load));
+            }
             Question::View
             | Question::CancelLoad
             | Question::Paste(_)
+            | Question::SendFile { .. }
             | Question::Disconnect { .. }
             | Question::Quit => match character.to_ascii_lowercase() {
                 'y' => return self.accept(),
@@ -452,6 +546,7 @@ impl Question {
             }
             Question::Link(field)
             | Question::File { typed: field, .. }
+            | Question::Choose { typed: field, .. }
             | Question::Find(field)
             | Question::Order(field)
             | Question::Temperature { typed: field, .. }
@@ -462,6 +557,7 @@ impl Question {
             | Question::View
             | Question::CancelLoad
             | Question::Paste(_)
+            | Question::SendFile { .. }
             | Question::Disconnect { .. }
             | Question::Quit => None,
         }

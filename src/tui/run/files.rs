@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use super::super::screens::load;
+use super::super::picker::is_image_name;
 use super::super::{FIRST_BYTES, FileEntry, FileKind, Input, LARGEST_TEXT, PortEntry, RecordingEntry};
 use crate::host::save::{SaveError, save};
 use crate::host::{self, library, ports, recorder};
@@ -55,7 +55,7 @@ pub(super) fn folder(directory: &Path) -> Input {
                 let kind = if metadata.is_dir() { FileKind::Folder } else { FileKind::File };
                 let name = entry.file_name().to_string_lossy().into_owned();
                 // Only plain files: to open another may wait for ever.
-                let is_asked = metadata.is_file() && !load::is_image_name(&name);
+                let is_asked = metadata.is_file() && !is_image_name(&name);
                 let begins = if is_asked { first_bytes(&entry.path()).unwrap_or_default() } else { Vec::new() };
                 Some(FileEntry {
                     name,
@@ -107,13 +107,32 @@ pub(super) fn append(path: &Path, bytes: &[u8]) -> Result<(), String> {
 
 /// A text file that is not too large.
 pub(super) fn text(path: &Path) -> Result<String, String> {
-    let said = |error: io::Error| error.to_string();
-    let file = File::open(path).map_err(said)?;
-    let mut text = String::new();
-    // One byte more than allowed shows that there is more.
-    file.take(LARGEST_TEXT + 1).read_to_string(&mut text).map_err(said)?;
-    if text.len() as u64 > LARGEST_TEXT {
-        return Err(format!("it has more than {LARGEST_TEXT} bytes"));
+    let bytes = bytes(path, LARGEST_TEXT)?;
+    String::from_utf8(bytes).map_err(|_| "it is no text in UTF-8".to_owned())
+}
+
+/// A file that has not more bytes than this.
+pub(super) fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+    // To open anything else, a pipe without a writer for example, may wait for ever.
+    let metadata = fs::metadata(path).map_err(|error| said(&error))?;
+    if !metadata.is_file() {
+        return Err(if metadata.is_dir() { "it is a folder" } else { "it is no plain file" }.to_owned());
     }
-    Ok(text)
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|error| said(&error))?;
+    // One byte more than allowed shows that there is more.
+    file.take(most + 1).read_to_end(&mut bytes).map_err(|error| said(&error))?;
+    if bytes.len() as u64 > most {
+        return Err(format!("it has more than {most} bytes"));
+    }
+    Ok(bytes)
+}
+
+/// What the system says, without the number that it adds.
+fn said(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        io::ErrorKind::PermissionDenied => "it may not be read".to_owned(),
+        _ => error.to_string(),
+    }
 }

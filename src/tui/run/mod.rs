@@ -22,7 +22,8 @@ use ratatui::crossterm::event::Event as TerminalEvent;
 use connecting::DialResult;
 use player::{Player, Step};
 
-use super::{App, Effect, Failure, ImageFacts, Input, Options, Palette, Playback};
+use super::{App, Effect, Failure, ImageFacts, Input, LARGEST_SENT, Options, Palette, Playback};
+use crate::device::LoaderKind;
 use crate::endpoint::Arrived;
 use crate::host;
 use crate::host::Inbox;
@@ -62,8 +63,8 @@ pub struct World {
     pub explain: fn(LinkError) -> Failure,
     /// Says why a recording cannot be read.
     pub unreadable: fn(RecordingError) -> Failure,
-    /// Reads and checks an image file, and allows these errors.
-    pub check: fn(PathBuf, &[DefectId]) -> ImageFacts,
+    /// Reads and checks an image file, for a loader if not each product's own, and allows these errors.
+    pub check: fn(PathBuf, Option<LoaderKind>, &[DefectId]) -> ImageFacts,
     /// Notes that an upload of this product begins on this link, or (`None`) that the unit on it runs.
     pub note: fn(&str, Option<(&str, &str)>),
     /// What is noted of an upload on this link that has not ended well: the unit's product, and the image's file.
@@ -93,6 +94,7 @@ pub fn run(world: World) -> io::Result<End> {
     let app = App::new(Options {
         link: world.link.clone(),
         directory: std::env::current_dir().unwrap_or_else(|_| PathBuf::from(".")),
+        home: std::env::home_dir(),
         palette: world.palette,
         size: (size.width, size.height),
     });
@@ -358,6 +360,10 @@ impl Console {
                     let text = files::text(&path);
                     Input::FileRead { path, text }
                 }),
+                Effect::ReadBytes(path) => self.ask(move || {
+                    let bytes = files::bytes(&path, LARGEST_SENT);
+                    Input::BytesRead { path, bytes }
+                }),
                 Effect::CreateFile { path, bytes } => {
                     let result = files::create(&path, &bytes);
                     leaves |= self.handle(Input::FileWritten { path, result });
@@ -375,9 +381,12 @@ impl Console {
                     let sent = sent.unwrap_or(Ok(())).map_err(|error| error.to_string());
                     leaves |= self.handle(Input::BreakSent(sent));
                 }
-                Effect::CheckImage { path, allow } => {
+                Effect::CheckImage { path, loader, allow } => {
                     let check = self.world.check;
-                    self.ask(move || Input::ImageChecked(Box::new(check(path, &allow))));
+                    self.ask(move || match path.is_dir() {
+                        true => files::folder(&path),
+                        false => Input::ImageChecked(Box::new(check(path, loader, &allow))),
+                    });
                 }
                 Effect::UploadBegins { link, product, image } => (self.world.note)(&link, Some((&product, &image))),
                 Effect::UploadEnds { link } => (self.world.note)(&link, None),

@@ -26,11 +26,12 @@ fn console() -> Console {
         },
         explain: |error| Failure { text: error.to_string(), hints: Vec::new() },
         unreadable: |error| Failure { text: error.to_string(), hints: Vec::new() },
-        check: |path, _| ImageFacts::unreadable(path, "nobody asks for it here".into()),
+        check: |path, _, _| ImageFacts::unreadable(path, "nobody asks for it here".into()),
         note: |_, _| {},
         noted: |_| None,
     };
-    let app = App::new(Options { link: None, directory: PathBuf::new(), palette: Palette::Mono, size: (80, 24) });
+    let app =
+        App::new(Options { link: None, directory: PathBuf::new(), home: None, palette: Palette::Mono, size: (80, 24) });
     let (sender, inputs) = host::channel();
     let (_, keys) = sync_channel(1);
     Console::new(app, world, Clock::start(), sender, inputs, keys)

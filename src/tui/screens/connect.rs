@@ -53,6 +53,8 @@ pub struct Connect {
     ports: Ports,
     /// Links that were used before, newest first.
     recent: Vec<String>,
+    /// The link that was opened last.
+    current: Option<String>,
     /// Recordings that are there.
     recordings: usize,
     cursor: usize,
@@ -93,13 +95,27 @@ impl Connect {
 
     /// The recordings have been listed, newest first: they tell what was connected before.
     pub fn recorded(&mut self, recordings: &[RecordingEntry]) {
-        let mut recent: Vec<String> = Vec::new();
+        // What is open may not be recorded.
+        let mut recent: Vec<String> = self.current.iter().cloned().collect();
         for entry in recordings {
             if recent.len() < MOST_RECENT && !recent.contains(&entry.port) {
                 recent.push(entry.port.clone());
             }
         }
         self.change(true, |connect| (connect.recent, connect.recordings) = (recent, recordings.len()));
+    }
+
+    /// A link is open: it is in the list, whatever it is, and the cursor is on it.
+    pub fn opened(&mut self, link: &str) {
+        self.change(true, |connect| {
+            connect.current = Some(link.to_owned());
+            connect.recent.retain(|known| known != link);
+            connect.recent.insert(0, link.to_owned());
+            connect.recent.truncate(MOST_RECENT);
+        });
+        let entries = self.entries();
+        let place = entries.iter().position(|entry| entry.name().eq_ignore_ascii_case(link));
+        self.cursor = place.unwrap_or(self.cursor);
     }
 
     /// Changes the list; the cursor stays on the entry it was on, wherever that is then.
@@ -148,8 +164,15 @@ impl Connect {
         let (list, detail) = lines::split(area, area.height.saturating_sub(DETAIL_ROWS));
         let (rows, places) = self.rows(scene, list.width);
         let first = self.first_row(&places, rows.len(), list);
+        let below = rows.len().saturating_sub(first + usize::from(list.height));
+        let more = match (first > 0, below > 0) {
+            (true, true) => "more above ↑ and below ↓",
+            (true, false) => "more above ↑",
+            (false, true) => "more below ↓",
+            (false, false) => "",
+        };
         lines::draw(frame, list, rows.into_iter().skip(first));
-        lines::draw(frame, detail, self.detail(scene, detail.width));
+        lines::draw(frame, detail, self.detail(scene, detail.width, more));
     }
 
     /// The entry that is drawn in row `y` of the screen.
@@ -210,7 +233,7 @@ impl Connect {
         (rows, places)
     }
 
-    fn detail(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
+    fn detail(&self, scene: Scene, columns: u16, more: &str) -> Vec<Line<'static>> {
         let theme = scene.theme;
         let text = |line: String| Line::raw(format!("  {line}"));
         let entries = self.entries();
@@ -222,7 +245,7 @@ impl Connect {
             Entry::Other => "Another port".into(),
             Entry::Recordings => "Recordings".into(),
         };
-        let mut shown = vec![Line::default(), lines::rule(theme, columns, &heading, "")];
+        let mut shown = vec![Line::default(), lines::rule(theme, columns, &heading, more)];
         match entry {
             Entry::Port(port) => {
                 match &port.busy_by {
@@ -252,8 +275,11 @@ impl Connect {
                 shown.push(text(format!("{}, hosted in this program on a real pseudo-terminal.", product.title)));
                 shown.push(text("Behaves as the manual says. Its password for loading software is AXIO-2010.".into()));
             }
-            Entry::Recent(_) => {
-                shown.push(text("Was connected before, as the recordings say.".into()));
+            Entry::Recent(name) => {
+                shown.push(text(match scene.view.link.name.as_deref() == Some(*name) {
+                    true => "Connected now, or last.".into(),
+                    false => "Was connected before, as the recordings say.".into(),
+                }));
             }
             Entry::Recordings => {
                 shown

@@ -16,7 +16,7 @@ use crate::dump::{self, Difference, Dump, DumpEntry, Measure};
 use crate::session::Job;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::popup::{Purpose, Question};
+use crate::tui::popup::{Purpose, Question, Wanted};
 use crate::tui::view::View;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
@@ -159,7 +159,7 @@ impl Dictionary {
                 (self.only, self.other, self.cursor) = (Only::Everything, None, 0);
                 self.words.clear();
             }
-            Cmd::Compare => return Some(Action::Ask(Question::file(Purpose::Compare, view))),
+            Cmd::Compare => return Some(Action::Choose(Wanted::Dump)),
             Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportDictionary, view))),
             _ => {}
         }

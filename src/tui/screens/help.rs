@@ -85,7 +85,7 @@ const NOTES: [&str; 6] = [
     "On the terminal screen every character goes straight to the unit. Ctrl-] gives the next key to axcon: Ctrl-] 2 \
      shows the overview, Ctrl-] Q leaves. Arrows and page keys scroll and are never sent.",
     "V halts temperature scanning and CAN while the object dictionary is read, or until X leaves the unit's sub-menu.",
-    "A click chooses a tab or a key of the unit's menu, the wheel moves. On the terminal screen the mouse selects text; \
+    "A click on a tab, a key or an answer does it, the wheel moves. On the terminal screen the mouse selects text; \
      elsewhere Shift and the mouse do.",
     "T is stored in the unit: a stream that is on comes back after every power cycle.",
     "D restores the object dictionary and restarts the unit. Node-ID and bit rate stay as LSS has set them.",

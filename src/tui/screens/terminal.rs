@@ -14,8 +14,9 @@ use crate::monitor::{Origin, Scrollback, TextLine};
 use crate::record::{Direction, Record};
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::popup::Question;
+use crate::tui::popup::{Question, Wanted};
 use crate::tui::theme::Theme;
+use crate::tui::view::Sending;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
@@ -41,6 +42,12 @@ pub const BINDINGS: &[Binding] = &[
         short: "follow",
         long: "to the newest line, and follow",
     },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('f'))],
+        cmd: Cmd::SendFile,
+        short: "file",
+        long: "send a file as it is, byte for byte",
+    },
     Binding { keys: &[Press::Plain(KeyCode::Char('h'))], cmd: Cmd::Hex, short: "hex", long: "text or hexadecimal" },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('w'))],
@@ -57,7 +64,7 @@ pub const BINDINGS: &[Binding] = &[
     Binding {
         keys: &[Press::Plain(KeyCode::Char('n'))],
         cmd: Cmd::FindNext,
-        short: "next",
+        short: "",
         long: "the next place further up that has them",
     },
     Binding {
@@ -68,6 +75,8 @@ pub const BINDINGS: &[Binding] = &[
     },
 ];
 
+/// Rows that tell of a file being sent.
+const SENDING_ROWS: u16 = 3;
 /// Bytes in a row of the hex view.
 const HEX_BYTES: u64 = 16;
 
@@ -200,6 +209,7 @@ impl Terminal {
                 }
             }
             Cmd::Break => return Some(Action::Break),
+            Cmd::SendFile => return Some(Action::Choose(Wanted::ToSend)),
             Cmd::Times => self.with_times = !self.with_times,
             Cmd::Find => return Some(Action::Ask(Question::find(&self.words))),
             Cmd::FindNext => {
@@ -214,6 +224,16 @@ impl Terminal {
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let (heading, body) = lines::split(area, 1);
+        let (body, sending) = match &scene.view.sending {
+            Some(sending) => {
+                let (body, below) = lines::split(body, body.height.saturating_sub(SENDING_ROWS));
+                (body, Some((sending, below)))
+            }
+            None => (body, None),
+        };
+        if let Some((sending, below)) = sending {
+            lines::draw(frame, below, sending_rows(scene, sending, below.width));
+        }
         let (name, following) = match self.mode {
             Mode::Text(place) => ("Text", place.is_none()),
             Mode::Hex(place) => ("Hexadecimal", place.is_none()),
@@ -261,6 +281,34 @@ impl Terminal {
             }
         };
     }
+}
+
+/// How far a file has come that is sent as it is.
+fn sending_rows(scene: Scene, sending: &Sending, columns: u16) -> Vec<Line<'static>> {
+    let theme = scene.theme;
+    let share = if sending.total == 0 { 1.0 } else { sending.sent as f64 / sending.total as f64 };
+    let room = usize::from(columns).saturating_sub(11).min(100);
+    let filled = (share * room as f64).floor() as usize;
+    let (sent, total) = (format::grouped(sending.sent), format::grouped(sending.total));
+    let mut told = vec![
+        Span::raw(format!("  {sent} of {total} bytes out, ")),
+        Span::styled("Esc", theme.key()),
+        Span::raw(" stops it"),
+    ];
+    if let Some(since) = scene.view.load.held_since {
+        let since = format::time_of_day(scene.start_of_day, since);
+        told.push(Span::styled(format!("; held by XOFF since {since}"), theme.warning()));
+    }
+    vec![
+        lines::rule(theme, columns, "Sending a file", &visible::text(&sending.name)),
+        Line::from(vec![
+            Span::raw("  "),
+            Span::styled("█".repeat(filled), theme.good()),
+            Span::styled("░".repeat(room - filled), theme.quiet()),
+            Span::styled(format!("  {:>3.0} %", (share * 100.0).floor()), theme.strong()),
+        ]),
+        Line::from(told),
+    ]
 }
 
 /// The newest lines that fit, for a place beside other things.

@@ -3,7 +3,6 @@
 //!
 //! An upload cannot be started while anything stands against it; what stands against it is on the screen.
 
-mod picker;
 mod progress;
 mod report;
 mod verdict;
@@ -15,21 +14,21 @@ use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-pub use picker::is_image_name;
-
 use report::{findings, findings_room, objections, report};
 use verdict::verdict;
 
 use super::Scene;
+use crate::device::LoaderKind;
 use crate::image::DefectId;
 use crate::session::Job;
 use crate::tui::action::Action;
 use crate::tui::input::{FileEntry, ImageFacts};
 use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::picker::{Offers, Picked, Picker};
 use crate::tui::popup::Question;
 use crate::tui::view::View;
 use crate::tui::visible;
-use crate::tui::widgets::lines;
+use crate::tui::widgets::{format, lines};
 
 /// Name on the tab.
 pub const TITLE: &str = "Load software";
@@ -60,6 +59,12 @@ pub const BINDINGS: &[Binding] = &[
         cmd: Cmd::Pack,
         short: "",
         long: "send long records: the same words in a sixth less time",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('g'))],
+        cmd: Cmd::Loader,
+        short: "",
+        long: "another kind of loader than the product's: g1, g2, g3",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('o'))],
@@ -99,24 +104,14 @@ const fn footer(keys: &'static [Press], cmd: Cmd, short: &'static str) -> Bindin
 /// Choosing a file and reading about it.
 #[derive(Debug)]
 pub struct Load {
-    directory: PathBuf,
-    listing: Listing,
-    cursor: usize,
+    picker: Picker,
     stage: Stage,
     /// Long records are sent instead of the file's own.
     packed: bool,
+    /// The loader the unit has, where the user knows better than the product's file.
+    loader: Option<LoaderKind>,
     /// Errors in spite of which the file may be sent.
     allow: Vec<DefectId>,
-}
-
-/// What is in the folder.
-#[derive(Debug)]
-enum Listing {
-    /// Nobody has asked yet.
-    Unread,
-    Reading,
-    Read(Vec<FileEntry>),
-    Failed(String),
 }
 
 /// Where the choosing stands.
@@ -130,12 +125,54 @@ enum Stage {
 impl Load {
     /// Starts in a folder.
     pub fn new(directory: PathBuf) -> Self {
-        Load { directory, listing: Listing::Unread, cursor: 0, stage: Stage::Picking, packed: false, allow: Vec::new() }
+        Load {
+            picker: Picker::new(Offers::Images, directory),
+            stage: Stage::Picking,
+            packed: false,
+            loader: None,
+            allow: Vec::new(),
+        }
     }
 
     /// The screen comes to the front: a folder that has never been read is read now.
     pub fn entered(&mut self) -> Option<Action> {
-        matches!(self.listing, Listing::Unread).then(|| self.list(self.directory.clone()))
+        (!self.picker.is_read()).then(|| self.list())
+    }
+
+    /// A folder has been read. One that was typed as if it were a file is opened.
+    pub fn listed(&mut self, directory: PathBuf, entries: Result<Vec<FileEntry>, String>) {
+        if matches!(&self.stage, Stage::Checking(path) if *path == directory) {
+            self.stage = Stage::Picking;
+        }
+        self.picker.listed(directory, entries);
+    }
+
+    fn list(&mut self) -> Action {
+        let directory = self.picker.directory().to_path_buf();
+        Action::ListFiles(self.picker.list(directory))
+    }
+
+    fn pick(&mut self, cmd: Cmd, page: usize) -> Option<Action> {
+        if cmd == Cmd::Type {
+            return Some(Action::Ask(Question::image(self.picker.directory())));
+        }
+        Some(match self.picker.on(cmd, page / 2)? {
+            Picked::Folder(directory) => Action::ListFiles(directory),
+            Picked::File(path) => self.check(path),
+        })
+    }
+
+    /// The file or folder that is drawn in row `y` of the screen.
+    pub fn entry_at(&self, view: &View, area: Rect, y: u16) -> Option<usize> {
+        let is_picking =
+            view.job != Some(Job::Load) && view.load.report.is_none() && matches!(self.stage, Stage::Picking);
+        let row = usize::from(y.checked_sub(area.y + 1).filter(|_| is_picking)?);
+        self.picker.entry_at(row, usize::from(area.height.saturating_sub(1)))
+    }
+
+    /// Puts the cursor on an entry. Says whether it was there already.
+    pub fn choose(&mut self, number: usize) -> bool {
+        self.picker.choose(number)
     }
 
     /// A file has been checked. An answer to an older question is not wanted any more.
@@ -156,6 +193,25 @@ impl Load {
     /// Whether long records are to be sent.
     pub fn is_packed(&self) -> bool {
         self.packed
+    }
+
+    /// The loader the unit is said to have; `None` for the one its product is believed to have.
+    pub fn loader(&self) -> Option<LoaderKind> {
+        self.loader
+    }
+
+    /// Another unit: what was said of the loader was said of the one before.
+    pub fn begin_unit(&mut self) {
+        self.loader = None;
+    }
+
+    /// The next kind of loader; behind the last one the product's own again.
+    fn next_loader(&mut self) {
+        let next = match self.loader {
+            None => 0,
+            Some(kind) => LoaderKind::ALL.iter().position(|known| *known == kind).map_or(0, |place| place + 1),
+        };
+        self.loader = LoaderKind::ALL.get(next).copied();
     }
 
     /// Errors in spite of which the file may be sent.
@@ -211,14 +267,20 @@ impl Load {
                     Cmd::Last => *scrolled = last,
                     Cmd::Back => {
                         self.stage = Stage::Picking;
-                        return Some(self.list(self.directory.clone()));
+                        return Some(self.list());
                     }
                     Cmd::Refresh => {
                         let path = facts.path.clone();
                         return Some(self.check(path));
                     }
-                    Cmd::Type => return Some(Action::Ask(Question::image(&self.directory))),
+                    Cmd::Type => return Some(Action::Ask(Question::image(self.picker.directory()))),
                     Cmd::Pack => self.packed = !self.packed,
+                    Cmd::Loader => {
+                        // What a loader does with some defects differs: the file is judged anew.
+                        let path = facts.path.clone();
+                        self.next_loader();
+                        return Some(self.check(path));
+                    }
                     Cmd::Allow if !facts.errors.is_empty() => {
                         return Some(Action::Ask(Question::allow(facts.errors.clone())));
                     }
@@ -260,12 +322,20 @@ impl Load {
             verdict(scene, report, area)
         } else {
             match &self.stage {
-                Stage::Picking => self.picker(scene, area),
+                Stage::Picking => {
+                    let directory = visible::text(&self.picker.directory().to_string_lossy());
+                    let place = format::keep_end(&directory, usize::from(area.width).saturating_sub(30));
+                    let mut rows = vec![lines::rule(scene.theme, area.width, "Choose a file", &place)];
+                    let (columns, room) = (usize::from(area.width), usize::from(area.height).saturating_sub(1));
+                    let otherwise = "P types a path.";
+                    rows.extend(self.picker.rows(scene.theme, columns, room, otherwise));
+                    rows
+                }
                 Stage::Checking(path) => vec![
                     lines::rule(scene.theme, area.width, "Image", ""),
                     Line::raw(format!("  Reading and checking {} ...", file_name(path))),
                 ],
-                Stage::Report { facts, scrolled } => report(scene, facts, self.packed, *scrolled, area),
+                Stage::Report { facts, scrolled } => report(scene, facts, (self.packed, self.loader), *scrolled, area),
             }
         };
         lines::draw(frame, area, rows);

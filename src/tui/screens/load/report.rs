@@ -6,6 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::file_name;
+use crate::device::{LoaderKind, Product};
 use crate::session::UnitState;
 use crate::time::Duration;
 use crate::tui::input::ImageFacts;
@@ -18,7 +19,7 @@ use crate::tui::widgets::{format, lines};
 /// Lines of findings shown at once on a small screen before the plan takes its place.
 const LEAST_DEFECT_ROWS: usize = 3;
 /// Lines that say what the file is, with their heading.
-const REPORT_ROWS: usize = 4;
+const REPORT_ROWS: usize = 5;
 /// Steps of the plan.
 const PLAN_STEPS: usize = 4;
 
@@ -53,7 +54,7 @@ pub(super) fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
 pub(super) fn report(
     scene: Scene,
     facts: &ImageFacts,
-    packed: bool,
+    (packed, loader): (bool, Option<LoaderKind>),
     scrolled: usize,
     area: Rect,
 ) -> Vec<Line<'static>> {
@@ -69,6 +70,7 @@ pub(super) fn report(
             format!("{} records, {} characters", format::grouped(facts.records), format::grouped(facts.characters)),
         ),
         lines::labelled(theme, "Check", check_word(theme, facts)),
+        loader_line(theme, facts, loader),
     ];
     let plan = plan(scene, facts, packed, area.width);
     if !facts.defects.is_empty() {
@@ -82,6 +84,20 @@ pub(super) fn report(
     }
     rows.extend(plan);
     rows
+}
+
+/// Which loader the unit has, and who says so.
+fn loader_line(theme: Theme, facts: &ImageFacts, chosen: Option<LoaderKind>) -> Line<'static> {
+    let believed = facts.product.as_deref().and_then(Product::named);
+    let text = match (chosen, believed) {
+        (Some(kind), _) => format!("{}, as chosen; ", kind.name()),
+        (None, Some(product)) => format!("{}, believed of every {}; ", product.loader.kind.name(), product.name),
+        (None, None) => "as believed of the product; ".to_owned(),
+    };
+    let mut line = lines::labelled(theme, "Loader", text);
+    line.push_span(Span::styled("G", theme.key()));
+    line.push_span(Span::raw(" says another"));
+    line
 }
 
 /// Every finding, in as many lines as it needs.

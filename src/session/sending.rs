@@ -1,0 +1,78 @@
+//! A file that goes to the unit as it is, as a terminal program sends it.
+//!
+//! Its bytes go out as if typed, a little ahead of the line, under the same flow control and into the same record. Nobody
+//! knows what the unit makes of them: what is told is how much has left, and that is true at any moment.
+
+use super::event::{Event, FileEnd, Outcome};
+use super::job::{Desk, Signal, Work};
+use crate::time::Instant;
+
+/// Bytes that wait for the line at most: some pieces, so that it never runs dry, and little to call back.
+const AHEAD: usize = 256;
+
+/// A file on its way.
+pub(super) struct SendFile {
+    bytes: Vec<u8>,
+    /// Bytes handed to the transmitter.
+    handed: usize,
+    /// Bytes that have left the line's queue, as last told.
+    told: usize,
+    deadline: Option<Instant>,
+}
+
+impl SendFile {
+    pub(super) fn new(bytes: Vec<u8>) -> Self {
+        SendFile { bytes, handed: 0, told: 0, deadline: None }
+    }
+
+    /// Bytes that have left. What waits in the queue is the file's last part: what was typed before goes first.
+    fn left(&self, desk: &Desk<'_>) -> usize {
+        self.handed.saturating_sub(desk.transmitter.waiting())
+    }
+
+    fn go_on(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let left = self.left(desk);
+        if left != self.told {
+            self.told = left;
+            desk.events.push_back(Event::FileProgress { sent: left, total: self.bytes.len() });
+        }
+        if left == self.bytes.len() {
+            // The last piece is let go; it needs its time on the line.
+            let free_at = desk.transmitter.free_at();
+            if free_at <= desk.now {
+                return Some(self.ended(FileEnd::Whole, left));
+            }
+            self.deadline = Some(free_at);
+            return None;
+        }
+        let room = AHEAD.saturating_sub(desk.transmitter.waiting());
+        let end = self.bytes.len().min(self.handed + room);
+        desk.typed.extend_from_slice(&self.bytes[self.handed..end]);
+        self.handed = end;
+        None
+    }
+
+    fn ended(&self, end: FileEnd, sent: usize) -> Outcome {
+        Outcome::FileSent { sent, total: self.bytes.len(), end }
+    }
+}
+
+impl Work for SendFile {
+    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            Signal::Begin | Signal::Tick | Signal::Hold(_) => self.go_on(desk),
+            Signal::Cancel => {
+                let sent = self.left(desk);
+                desk.transmitter.clear();
+                Some(self.ended(FileEnd::Cancelled, sent))
+            }
+            // The session has emptied the queue already.
+            Signal::LinkLost => Some(self.ended(FileEnd::LinkLost, self.told)),
+            Signal::Heard(..) | Signal::Typed(_) | Signal::Over => None,
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.deadline
+    }
+}
