@@ -148,6 +148,24 @@ mod tests {
     }
 
     #[test]
+    fn what_is_on_many_lines_is_said_once_with_their_number() {
+        let (one, end) = ("S307000000001122C5\n", "S70500000000FA\n");
+        for (blank, words) in [("\n", "in one line"), ("\n \n\n", "in 3 lines")] {
+            let report = report(format!("{HEAD}{blank}{one}{end}").as_bytes());
+            let blank = report.defects.iter().find(|defect| defect.id == DefectId::BlankLine).expect("it is there");
+            assert_eq!(blank.message, format!("nothing but blanks, {words}"));
+        }
+    }
+
+    #[test]
+    fn an_unreadable_data_record_is_one_of_those_a_count_counts() {
+        let (one, end) = ("S307000000001122C5\n", "S70500000000FA\n");
+        let spoiled = one.replace("1122", "11x2");
+        let report = report(format!("{HEAD}{one}{spoiled}{spoiled}S5030003F9\n{end}").as_bytes());
+        assert!(report.defects.iter().all(|defect| defect.id != DefectId::WrongCount), "{:?}", found(&report));
+    }
+
+    #[test]
     fn small_intel_hex_files_and_all_that_is_wrong_with_them() {
         let one = ":040000001122334452\n:040002005566778840\n";
         let (start, end) = (":0400000500000000F7\n", ":00000001FF\n");
