@@ -2,11 +2,12 @@
 //! the session but its own deadlines, so a wait that does not end by itself shows here and nowhere else.
 
 use axcon::endpoint::Endpoint;
-use axcon::session::{Command, Event, Job, Outcome, Session, UnitNow, Verdict};
+use axcon::session::{Command, Event, Job, LoadReport, Outcome, Phase, Session, UnitNow, Verdict};
 use axcon::time::{Duration, Instant};
+use axcon::version::Version;
 use axcon::wire::stream::Source;
 
-use crate::support::bench::{order, small_image};
+use crate::support::bench::{image_of, order, small_image};
 
 /// A session, what it has sent, and what the other end says to that.
 struct Alone {
@@ -15,8 +16,8 @@ struct Alone {
     /// Each piece that was sent, with the milliseconds since the command.
     sent: Vec<(u64, String)>,
     pages: usize,
-    /// What is said when this piece has been sent, and how many milliseconds later; the last one is the next. Without a
-    /// piece it belongs to the one before.
+    /// What is said when a piece that begins so has been sent, and how many milliseconds later; the last one is the next.
+    /// Without a piece it belongs to the one before.
     script: Vec<(&'static str, u64, &'static str)>,
     /// What is under way.
     says: Vec<(Instant, &'static str)>,
@@ -41,7 +42,7 @@ impl Alone {
             while let Some(piece) = self.session.poll_transmit() {
                 let text = String::from_utf8(piece.bytes).expect("keys").replace('\r', "~");
                 // A piece that is awaited, and everything that is said behind it.
-                if self.script.last().is_some_and(|(awaited, _, _)| *awaited == text) {
+                if self.script.last().is_some_and(|(awaited, _, _)| !awaited.is_empty() && text.starts_with(awaited)) {
                     let (_, late, says) = self.script.pop().expect("the last one");
                     self.says.push((self.now + Duration::from_millis(late), says));
                     while let Some((_, late, says)) = self.script.pop_if(|(awaited, _, _)| awaited.is_empty()) {
@@ -84,8 +85,8 @@ fn on() -> Command {
     Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(200) }
 }
 
-/// A row of field values, as the AXTC4CO's manual quotes it.
-const ROW: &str = "   23.5; -12.5;Null  ;Open  ;Short \r\n";
+/// A row of field values, as a transcript has it.
+const ROW: &str = "  23.500;  24.125;Disabled;OpenCct ; -12.750\r\n";
 const MENU: &str = "AXRTD8CO V1.0.0\r\nV - View Object Dictionary\r\nD - Default Object Dictionary\r\n\
                     T - Toggle Stream\r\nS - Diagnostics\r\nL - Load New Software\r\n";
 
@@ -176,6 +177,96 @@ fn a_loader_that_wants_a_key_gets_three_and_then_is_asked_who_it_is() {
     let rounded: Vec<(u64, &str)> = behind.iter().map(|(at, text)| ((at + 20) / 100 * 100, *text)).collect();
     assert_eq!(rounded, wanted, "{}", alone.log());
     assert_eq!((time - begun + 20) / 100 * 100, 10_400);
+}
+
+#[test]
+fn the_question_for_yes_is_answered_once_and_only_a_banner_is_the_end() {
+    let question = "Enter Yes to restore the default object dictionary: ";
+    let script = [("d", 3, question), ("Yes~", 50, "\r\nV1.0.0\r\n"), ("", 2_000, "AXTC4CO V1.1.0\r\n")];
+    let mut alone = Alone::with(&script);
+    let (outcome, time) = alone.ask(Command::RestoreDefaults);
+    assert_eq!(outcome, Outcome::Done(Job::RestoreDefaults));
+    let (at, _) = alone.sent[1];
+    assert_eq!((alone.sent.len(), time), (2, at + 2_000), "a version alone is no banner: {}", alone.log());
+    // It never comes back.
+    let mut alone = Alone::with(&[("d", 3, question), ("Yes~", 50, question)]);
+    let (outcome, time) = alone.ask(Command::RestoreDefaults);
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "the banner after the reset", heard: Some(_), .. }));
+    assert_eq!((alone.sent.len(), time), (2, alone.sent[1].0 + 10_000), "nothing is answered twice: {}", alone.log());
+}
+
+/// Uploads to a loader that stops nobody and says this behind the end record. Gives the report, the milliseconds from
+/// the end record on, and what was sent behind it.
+fn end_of_an_upload(
+    behind: &[(u64, &'static str)],
+    asked: &[(&'static str, u64, &'static str)],
+) -> (LoadReport, u64, String) {
+    const WAITS: &str = "\r\nWaiting for application S-Record.\r\n";
+    const HERE: &str = "AXTC4CO V1.1.0\r\nV - View Object Dictionary\r\nD - Default Object Dictionary\r\n\
+                        T - Toggle Stream\r\nS - Diagnostics\r\nL - Load New Software\r\n";
+    let mut script = vec![("\u{11}m", 3, HERE), ("l", 5, "Password: "), ("AXIO-2010", 50, WAITS)];
+    script.extend(
+        behind.iter().enumerate().map(|(number, &(late, text))| (if number == 0 { "S7" } else { "" }, late, text)),
+    );
+    script.extend(asked);
+    let mut alone = Alone::with(&script);
+    let (outcome, time) = alone.ask(Command::Load(Box::new(order(image_of("AXTC4CO", "1.2.0", 320)))));
+    let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+    let end = alone.sent.iter().position(|(_, text)| text.starts_with("S7")).unwrap_or_else(|| panic!("{report:?}"));
+    let (at, _) = alone.sent[end];
+    let log = alone.sent[end + 1..].iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(" ");
+    (*report, time - at, log)
+}
+
+#[test]
+fn behind_the_end_record_what_comes_back_decides_and_every_wait_has_its_end() {
+    let (report, time, log) = end_of_an_upload(&[], &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Failed, UnitNow::Unknown, 20_000), "{report:?}");
+    assert_eq!((report.what.as_str(), log.as_str()), ("the file was sent, but the unit has not come back", ""));
+    assert_eq!((report.phase, report.records), (Phase::Finish, report.records_total));
+
+    let (report, time, _) = end_of_an_upload(&[(100, "AXTC4CO V1.2.0\r\n")], &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Done, UnitNow::Application, 400), "{report:?}");
+    assert_eq!((report.version_after, report.heard.as_str()), (Some(Version::new(1, 2, 0)), "AXTC4CO V1.2.0"));
+
+    let (report, time, _) = end_of_an_upload(&[(100, "AXTC4CO V1.1.0\r\n")], &[]);
+    assert_eq!(
+        (report.verdict, report.unit, time),
+        (Verdict::WrongApplication, UnitNow::Application, 400),
+        "{report:?}"
+    );
+
+    // A loader that waits for the next file may still start what it has, so it gets three seconds.
+    let (report, time, _) = end_of_an_upload(&[(100, "Waiting for application S-Record.\r\n")], &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Failed, UnitNow::Loader, 3_100), "{report:?}");
+    assert!(report.what.contains("does not start what was sent"), "{}", report.what);
+    let late = [(100, "Waiting for application S-Record.\r\n"), (2_500, "AXTC4CO V1.2.0\r\n")];
+    assert_eq!(end_of_an_upload(&late, &[]).0.verdict, Verdict::Done);
+
+    let error = [(100, "Error # 0003\r\nRestarting.\r\n"), (300, "Waiting for application S-Record.\r\n")];
+    let (report, time, _) = end_of_an_upload(&error, &[]);
+    assert_eq!(
+        (report.verdict, report.unit, report.phase),
+        (Verdict::Failed, UnitNow::Loader, Phase::Finish),
+        "{report:?}"
+    );
+    assert!(report.what.contains("at the end of the file") && time == 300, "{time}: {}", report.what);
+    // Without a prompt behind it, too.
+    let (report, time, _) = end_of_an_upload(&error[..1], &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Failed, UnitNow::Loader, 2_100), "{report:?}");
+}
+
+#[test]
+fn a_unit_that_comes_back_with_rows_alone_is_asked_for_its_version() {
+    let rows: Vec<(u64, &'static str)> = (0..20).map(|number| (100 + number * 200, ROW)).collect();
+    let named = "AXTC4CO V1.2.0\r\nV - View Object Dictionary\r\nT - Toggle Stream\r\nL - Load New Software\r\n";
+    let (report, _, log) = end_of_an_upload(&rows, &[("\u{11}m", 5, named)]);
+    assert_eq!((report.verdict, log.as_str()), (Verdict::Done, "\u{11}m"), "{report:?}");
+    assert_eq!(report.heard, "L - Load New Software", "rows are no words to quote");
+    // It runs, but whatever it is asked it does not say what.
+    let (report, time, log) = end_of_an_upload(&rows, &[]);
+    assert_eq!((report.verdict, report.unit), (Verdict::WrongApplication, UnitNow::Application), "{report:?}");
+    assert_eq!((log.as_str(), time), ("\u{11}m ~m xm", 1_100 + 2_400));
 }
 
 #[test]
