@@ -148,6 +148,62 @@ mod tests {
     }
 
     #[test]
+    fn what_is_on_many_lines_is_said_once_with_their_number() {
+        let (one, end) = ("S307000000001122C5\n", "S70500000000FA\n");
+        for (blank, words) in [("\n", "in one line"), ("\n \n\n", "in 3 lines")] {
+            let report = report(format!("{HEAD}{blank}{one}{end}").as_bytes());
+            let blank = report.defects.iter().find(|defect| defect.id == DefectId::BlankLine).expect("it is there");
+            assert_eq!(blank.message, format!("nothing but blanks, {words}"));
+        }
+    }
+
+    #[test]
+    fn the_size_and_the_records_of_a_file_are_those_it_has() {
+        let hex = ":040000001122334452\n:040002005566778840\n:0400000500000000F7\n:00000001FF\n";
+        let records = format!("{HEAD}S307000000001122C5\nS70500000000FA\n");
+        for (file, count) in [(hex, 4), (records.as_str(), 3), ("hello\n", 0), ("", 0)] {
+            let report = report(file.as_bytes());
+            assert_eq!((report.facts.size, report.facts.records), (file.len() as u64, count), "{file:?}");
+        }
+    }
+
+    #[test]
+    fn records_that_continue_outside_of_the_flash_are_one_complaint_with_all_addresses() {
+        let record = |address, data: &[u8]| {
+            String::from_utf8(Record { kind: Kind::Data32, address, data }.to_text()).expect("digits") + "\n"
+        };
+        let inside = record(0, &[1, 2]);
+        let (outside, behind) = (record(0x1_8000, &[1, 2]), record(0x1_8001, &[3, 4]));
+        let report = report(format!("{HEAD}{inside}{outside}{behind}S70500000000FA\n").as_bytes());
+        let complaints: Vec<_> = report.defects.iter().filter(|defect| defect.id == DefectId::OutOfRange).collect();
+        let [one] = complaints.as_slice() else { panic!("{:?}", found(&report)) };
+        assert_eq!((one.line, one.column), (3, 5));
+        assert!(one.message.contains("program flash (to 0xFFFF)"), "{}", one.message);
+        assert!(one.message.starts_with("0x00018000 to 0x00018001: "), "{}", one.message);
+    }
+
+    #[test]
+    fn a_file_whose_addresses_count_bytes_is_told_so() {
+        let bytes = "S30900000000112233444C\nS309000000045566778838\n";
+        let report = report(format!("{HEAD}{bytes}S70500000000FA\n").as_bytes());
+        let unit = report.defects.iter().find(|defect| defect.id == DefectId::AddressUnit);
+        let unit = unit.unwrap_or_else(|| panic!("{:?}", found(&report)));
+        assert!(
+            unit.message.contains("addresses count bytes") && unit.message.contains("count words"),
+            "{}",
+            unit.message
+        );
+    }
+
+    #[test]
+    fn an_unreadable_data_record_is_one_of_those_a_count_counts() {
+        let (one, end) = ("S307000000001122C5\n", "S70500000000FA\n");
+        let spoiled = one.replace("1122", "11x2");
+        let report = report(format!("{HEAD}{one}{spoiled}{spoiled}S5030003F9\n{end}").as_bytes());
+        assert!(report.defects.iter().all(|defect| defect.id != DefectId::WrongCount), "{:?}", found(&report));
+    }
+
+    #[test]
     fn small_intel_hex_files_and_all_that_is_wrong_with_them() {
         let one = ":040000001122334452\n:040002005566778840\n";
         let (start, end) = (":0400000500000000F7\n", ":00000001FF\n");

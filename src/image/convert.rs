@@ -219,6 +219,14 @@ mod tests {
     }
 
     #[test]
+    fn half_a_word_is_filled_up_where_addresses_count_words() {
+        let odd = image(AddressUnit::Byte, 0, &[(0, &[1, 2, 3])]);
+        let blocks = |unit| regrouped(&odd, unit, None).expect("it has an address");
+        assert_eq!(blocks(AddressUnit::Byte), [Block { address: 0, data: vec![1, 2, 3] }]);
+        assert_eq!(blocks(AddressUnit::Word), [Block { address: 0, data: vec![1, 2, 3, 0xFF] }]);
+    }
+
+    #[test]
     fn what_has_no_address_in_the_unit_is_refused() {
         let high = image(AddressUnit::Word, 0, &[(0x8000_0000, &[1, 2])]);
         let to_bytes = shape(Format::SRecord, AddressUnit::Byte);

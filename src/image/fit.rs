@@ -116,6 +116,26 @@ mod tests {
     const OTHER: &[DefectId] = &[DefectId::WrongProduct];
 
     #[test]
+    fn an_image_whose_addresses_count_something_else_is_one_misfit_and_no_more() {
+        let bytes = {
+            let mut bytes = small();
+            bytes.flash.address_unit = AddressUnit::Byte;
+            bytes
+        };
+        let recipe = make::Recipe { target: &bytes, version: Version::new(1, 2, 0), words: 600, flaw: None };
+        let file = make::make(&recipe).expect("an image");
+        let counted =
+            check(file.as_slice(), None, std::slice::from_ref(&bytes), Some("AXSMALL"), &[]).expect("a slice");
+        let counted = counted.image().expect("sound for such a unit");
+        assert_eq!(counted.misfits(&bytes, None), []);
+        let misfits = counted.misfits(&small(), None);
+        assert_eq!(ids(&misfits), ["address-unit"]);
+        assert_eq!(misfits[0].message, "the image's addresses count bytes, the AXSMALL's count words");
+        let misfits = image(&small(), 600, &[]).misfits(&bytes, None);
+        assert_eq!(misfits[0].message, "the image's addresses count words, the AXSMALL's count bytes");
+    }
+
+    #[test]
     fn an_image_fits_its_own_product_and_no_smaller_flash() {
         assert_eq!(image(&small(), 600, &[]).misfits(&small(), None), []);
         assert_eq!(ids(&image(&small(), 600, &[]).misfits(&large(), None)), ["wrong-product"]);

@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn lines_that_are_no_records_say_where_and_why() {
-        let table: [(&[u8], LineError); 14] = [
+        let table: [(&[u8], LineError); 15] = [
             (b"", LineError::NotARecord(b' ')),
             (b"S00", LineError::NotARecord(b'S')),
             (b":", LineError::Short { needs: 5, holds: 0 }),
@@ -253,6 +253,7 @@ mod tests {
             (b":00", LineError::Short { needs: 5, holds: 1 }),
             (b":00000001F", LineError::Short { needs: 5, holds: 4 }),
             (b":000000010G", LineError::Character { column: 11, found: b'G' }),
+            (b":01000000GGFF", LineError::Character { column: 10, found: b'G' }),
             (b":00000006FA", LineError::UnknownType(6)),
             (b":000000FF01", LineError::UnknownType(0xFF)),
             (b":0100000100FE", LineError::Length { kind: Kind::EndOfFile, says: 1 }),

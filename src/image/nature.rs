@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn the_first_record_decides_what_a_file_is() {
-        let table: [(&[u8], Nature); 9] = [
+        let table: [(&[u8], Nature); 12] = [
             (b"S0030000FC\r", Nature::SRecord { mark: 0 }),
             (b"\xEF\xBB\xBFs1", Nature::SRecord { mark: 3 }),
             (b"\n\n:00000001FF\n", Nature::IntelHex { mark: 0 }),
@@ -69,6 +69,9 @@ mod tests {
             (b"junk\nS9030000FC\n:00000001FF", Nature::SRecord { mark: 0 }),
             (b": a remark\n", Nature::Other("a text without any record")),
             (b" \r\n", Nature::Empty),
+            (&[b' '; lines::HEAD], Nature::Other("a text without any record")),
+            (b"ab\x00\x01cd\n", Nature::Other("binary data")),
+            (b"a\ttable\x1A\n", Nature::Other("a text without any record")),
             (b"\x1F\x8BS0", Nature::Other("a gzip archive")),
         ];
         for (head, nature) in table {

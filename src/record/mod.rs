@@ -207,6 +207,27 @@ mod tests {
     }
 
     #[test]
+    fn bytes_that_come_at_once_are_kept_in_pieces_that_follow_one_another() {
+        let mut record = Record::new();
+        record.push(T0, Direction::FromUnit, Secrecy::Open, b"before");
+        let bytes: Vec<u8> = (0..3 * ENTRY_BYTES).map(|at| (at / 16) as u8).collect();
+        let span = record.push(T0, Direction::FromUnit, Secrecy::Open, &bytes);
+        assert_eq!((span.len(), span.is_empty(), record.entry_count()), (3 * ENTRY_BYTES as u64, false, 4));
+        assert_eq!(record.bytes(span), bytes);
+        let starts: Vec<u64> = record.entries().map(|entry| entry.start).collect();
+        assert_eq!(starts, [0, 6, 6 + 4096, 6 + 2 * 4096]);
+        assert!(Span { start: 6, end: 6 }.is_empty());
+    }
+
+    #[test]
+    fn the_last_entry_stays_however_little_may_be_kept() {
+        let mut record = Record::with_limit(10);
+        record.push(T0, Direction::FromUnit, Secrecy::Open, b"first");
+        record.push(T0, Direction::FromUnit, Secrecy::Open, b"second");
+        assert_eq!(record.entries().map(|entry| entry.bytes.as_slice()).collect::<Vec<_>>(), [b"second"]);
+    }
+
+    #[test]
     fn secret_bytes_keep_their_place_and_lose_their_content() {
         let mut record = Record::new();
         record.push(T0, Direction::ToUnit, Secrecy::Secret, b"AXIO-2010");

@@ -288,6 +288,7 @@ mod tests {
         let (pieces, ending) = whole(v2).expect("a recording");
         assert_eq!(ending, Ending::Whole);
         assert_eq!(pieces.len(), 2, "{pieces:?}");
+        assert!(matches!(&pieces[0], Piece::Header(header) if header.unix_millis == 7000), "{pieces:?}");
         let at = Instant::from_millis(500);
         assert_eq!(pieces[1], Piece::Bytes { at, direction: Direction::FromUnit, bytes: "23 °C".into() });
         let v3 = "{\"version\":3,\"term\":{\"cols\":80,\"rows\":24}}\n# a comment\n[0.5,\"o\",\"a\"]\n[0.5,\"i\",\"b\"]\n[0.1,\"x\",3]\n";
@@ -326,6 +327,15 @@ mod tests {
         }
         let error = read(&[own.as_bytes(), &vec![b' '; LONGEST_LINE + 1]]).expect_err("too long");
         assert_eq!((error.line, error.what.as_str()), (2, "the line has more than 4194304 bytes"));
+    }
+
+    #[test]
+    fn thirty_years_can_be_read_twice_over_and_not_a_second_more() {
+        let v3 =
+            |last: &str| format!("{{\"version\":3}}\n[1e9,\"o\",\"a\"]\n[1e9,\"o\",\"b\"]\n[{last},\"o\",\"c\"]\n");
+        assert!(whole(&v3("0")).is_ok());
+        let error = whole(&v3("1")).expect_err("too long");
+        assert_eq!((error.line, error.what.as_str()), (4, "the recording spans more than thirty years"));
     }
 
     #[test]

@@ -188,6 +188,20 @@ mod tests {
     }
 
     #[test]
+    fn what_may_be_its_beginning_is_kept_back_and_given_once() {
+        let mut redactor = Redactor::default();
+        assert!(redactor.is_idle() && !redactor.keeps_back());
+        redactor.look_for(b"AXIO-2010");
+        assert!(!redactor.is_idle() && !redactor.keeps_back());
+        assert_eq!(redactor.push(b"no AXI"), [(b"no ".to_vec(), Secrecy::Open)]);
+        assert!(redactor.keeps_back());
+        assert_eq!(redactor.flush(), [(b"AXI".to_vec(), Secrecy::Open)]);
+        assert!(!redactor.keeps_back());
+        assert_eq!(redactor.flush(), []);
+        assert_eq!(redactor.push(b"O-2010"), [(b"O-2010".to_vec(), Secrecy::Secret)], "the rest is known as such");
+    }
+
+    #[test]
     fn a_text_is_scrubbed() {
         let mut redactor = Redactor::default();
         redactor.look_for(b"AXIO-2010");

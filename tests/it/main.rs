@@ -1,6 +1,7 @@
 //! Everything that needs more than one module, in one binary.
 
 mod acceptance;
+mod answers;
 #[cfg(unix)]
 mod commands;
 mod console;

@@ -8,7 +8,7 @@ use axcon::canopen::{ObjectAddress, Value};
 use axcon::endpoint::{Arrived, Endpoint};
 use axcon::record::Direction;
 use axcon::rng::Rng;
-use axcon::session::{Command, Event, Job, Origin, Outcome, Session, UnitState};
+use axcon::session::{Command, DictionaryReading, Event, Job, Origin, Outcome, Session, UnitState};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::stream::Source;
@@ -283,6 +283,33 @@ fn a_unit_that_falls_silent_in_its_view_is_left_and_what_was_read_is_kept() {
     assert!(!reading.complete && reading.entries.len() > 90, "{}", reading.entries.len());
     let entry = "6100:1".parse().expect("an entry");
     assert!(bench.unit.unit().read_object(entry).is_ok(), "the view has been left");
+}
+
+/// Reads the dictionary while a part of what the unit answers is lost, by the characters received since the key. Gives
+/// the reading, the entries there are, and how often the view was opened.
+fn read_with_a_loss(lost: std::ops::Range<u64>) -> (DictionaryReading, usize, usize) {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    bench.ask(Command::Identify);
+    let first = bench.received_so_far();
+    bench.disturb_answers(move |number, byte| if lost.contains(&(number - first)) { Vec::new() } else { vec![byte] });
+    bench.wire.clear();
+    let Outcome::DictionaryRead(reading) = bench.ask(Command::ReadDictionary) else { panic!("{}", bench.transcript()) };
+    let views = bench.wire.iter().filter(|key| **key == b'v').count();
+    let entry = "6100:1".parse().expect("an entry");
+    assert!(bench.unit.unit().read_object(entry).is_ok(), "the view has been left");
+    (*reading, axtc4co().dictionary.entries().count(), views)
+}
+
+#[test]
+fn lines_of_the_dictionary_that_were_lost_are_read_in_a_second_walk_and_whole_objects_are_not_looked_for() {
+    let (reading, all, views) = read_with_a_loss(0..0);
+    assert_eq!((reading.entries.len(), reading.complete, views), (all, true, 1));
+    let (reading, all, views) = read_with_a_loss(2000..2100);
+    assert_eq!((reading.entries.len(), reading.complete, views), (all, true, 2), "a few lines");
+    let (reading, all, views) = read_with_a_loss(1000..3500);
+    assert!(reading.entries.len() * 10 < all * 9, "{} of {all}", reading.entries.len());
+    assert_eq!(views, 1, "so much is no loss of the line");
 }
 
 #[test]

@@ -10,6 +10,8 @@
 mod enter;
 mod pages;
 mod records;
+#[cfg(test)]
+mod tests;
 mod transfer;
 mod verify;
 

@@ -104,7 +104,7 @@ fn runs(image: &Image) -> Vec<(u32, Vec<u8>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::{AddressUnit, Block};
+    use crate::image::{AddressUnit, Block, DefectId, check};
 
     fn image(blocks: &[(u32, usize)]) -> Image {
         let block = |&(address, length): &(u32, usize)| Block {
@@ -143,6 +143,53 @@ mod tests {
             assert!(packed.iter().all(|record| record.text.len() <= AROUND + 2 * bytes));
         }
         assert_eq!(build(&image, Size::Packed(LONGEST), LINE_END).len(), 2 + 3 + 1, "header, end, 640 and 39 bytes");
+    }
+
+    #[test]
+    fn half_a_word_is_filled_up_and_counts_as_one() {
+        let mut image = image(&[(0, 3)]);
+        image.blocks[0].data = vec![0x11, 0x22, 0x33];
+        for size in [Size::AsInFile, Size::Packed(LONGEST)] {
+            let records = build(&image, size, LINE_END);
+            assert_eq!(records[1].text, b"S30900000000112233FF91\r");
+            assert_eq!(records[1].words, Some(0..=1));
+        }
+        // What follows behind half a word is a record of its own.
+        let records = build(&self::image(&[(0, 3), (2, 4)]), Size::Packed(LONGEST), LINE_END);
+        let words: Vec<_> = records.iter().filter_map(|record| record.words.clone()).collect();
+        assert_eq!(words, [0..=1, 2..=3]);
+    }
+
+    #[test]
+    fn a_header_says_nothing_that_would_act_on_us() {
+        let mut image = image(&[(0, 4)]);
+        image.header = b"\0\x07A \x13~\x7F!\xFF".to_vec();
+        assert_eq!(header(&image), b"..A .~.!.");
+        image.header = vec![b'x'; 300];
+        assert_eq!(header(&image).len(), srecord::LONGEST_HEADER);
+        assert_eq!(
+            build(&image, Size::AsInFile, LINE_END)[0].text.len(),
+            4 + 2 * 255 + 1,
+            "as long as a record can be"
+        );
+    }
+
+    #[test]
+    fn as_many_characters_leave_as_the_check_of_the_file_has_said() {
+        let files = [
+            "S0110000000050524F4752414D264441544196\nS307000000001122C5\nS70500000000FA\n",
+            "S0030000FC\nS307000000001122C5\nS70500000000FA\n",
+            ":040000001122334452\n:040002005566778840\n:0400000500000000F7\n:00000001FF\n",
+            ":040000001122334452\n:00000001FF\n",
+        ];
+        for file in files {
+            let allow = [DefectId::HeaderForm, DefectId::MissingEntry];
+            let report = check(file.as_bytes(), None, &[], None, &allow).expect("a slice");
+            let image = report.image().expect("nothing else is wrong with it");
+            let records = build(image.image(), Size::AsInFile, LINE_END);
+            let leave: usize = records.iter().map(|record| record.text.len()).sum();
+            assert_eq!(report.facts.characters, leave as u64, "{file:?}");
+        }
     }
 
     #[test]

@@ -142,3 +142,29 @@ impl Upload {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::SoftwareName;
+
+    fn named(product: Option<&str>, version: (u8, u8, u8), confidence: Confidence) -> Message {
+        let (major, minor, patch) = version;
+        let version = Some(Version::new(major.into(), minor.into(), patch.into()));
+        Message::Software(SoftwareName { product: product.map(str::to_owned), version, confidence })
+    }
+
+    #[test]
+    fn of_all_versions_the_one_that_is_surest_counts_and_of_those_the_last() {
+        let mut after = After::default();
+        assert!(after.note(&named(None, (3, 2, 1), Confidence::Bare)));
+        assert!(!after.is_complete(), "nobody has said which product it is");
+        assert!(after.note(&named(Some("AXTC4CO"), (1, 2, 0), Confidence::WithProduct)));
+        assert!(after.is_complete());
+        after.note(&named(None, (9, 9, 9), Confidence::Named));
+        assert_eq!(after.version.map(|(_, version)| version), Some(Version::new(1, 2, 0)));
+        after.note(&named(Some("AXTC4CO"), (1, 3, 0), Confidence::WithProduct));
+        assert_eq!(after.version.map(|(_, version)| version), Some(Version::new(1, 3, 0)));
+        assert!(!after.note(&Message::Text) && !after.note(&Message::Refusal));
+    }
+}

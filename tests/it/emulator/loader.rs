@@ -316,6 +316,38 @@ fn a_character_that_cannot_be_read_is_error_1_at_once_and_nothing_while_an_error
 }
 
 #[test]
+fn a_character_that_cannot_be_read_while_a_page_is_written_is_error_1_when_that_is_done() {
+    let mut bench = in_loader();
+    let records = file(&new_program());
+    send_obeying(&mut bench, &records[..18], Instant::NEVER);
+    bench.run_ms(5);
+    assert!(bench.is_stopped());
+    bench.take();
+    let now = bench.now;
+    bench.unit().handle_framing_error(now);
+    assert_eq!(bench.take(), "", "it is not looked at yet");
+    bench.run_ms(500);
+    assert_eq!(without_flow_control(&bench.take()), format!("Error # 0001\r\nRestarting.\r\n{PROMPT}"));
+}
+
+#[test]
+fn behind_s7_the_last_page_waits_for_silence_whatever_is_on_the_line() {
+    let mut bench = in_loader();
+    let program = new_program();
+    let records = file(&program);
+    send_obeying(&mut bench, &records, Instant::NEVER);
+    // Nothing of this is read, but it is no silence: characters come closer than the 0.6 ms the loader waits for.
+    for _ in 0..400 {
+        bench.send(b"\r");
+        bench.run(Duration::from_micros(250));
+    }
+    let last = program.len() - 2;
+    assert_eq!(bench.unit().flash()[last..last + 2], [0xFF; 2], "it is not written yet");
+    bench.run_ms(500);
+    assert_eq!(bench.unit().flash()[last..last + 2], program[last..], "now it is");
+}
+
+#[test]
 fn a_sender_that_goes_on_after_an_error_causes_a_cascade_with_an_end() {
     let mut bench = in_loader();
     let mut records = file(&new_program());

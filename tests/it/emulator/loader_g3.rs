@@ -188,7 +188,8 @@ fn without_a_key_for_ten_seconds_the_application_starts() {
     bench.run_ms(9_400);
     assert_eq!(bench.take(), "");
     bench.run_ms(1_000);
-    assert!(bench.take().contains("V2.1.1"), "the old software is untouched");
+    let said = bench.take();
+    assert!(said.starts_with("\r\n") && said.contains("V2.1.1"), "the old software is untouched: {said}");
     assert_eq!(bench.unit().running(), Running::Application);
 }
 
@@ -415,6 +416,19 @@ fn a_character_that_cannot_be_read_is_error_0040_when_the_loader_reads_on() {
     assert!(!bench.take().contains("Error"), "it erases");
     bench.run_ms(6_000);
     assert!(without_flow_control(&bench.take()).ends_with(&complaint("0040")));
+    let said = upload(&mut bench, &file(&new_program()));
+    assert!(said.contains("V2.2.0"), "{said}");
+}
+
+#[test]
+fn what_cannot_be_read_while_an_error_is_told_is_not_held_against_the_next_file() {
+    let mut bench = in_loader();
+    bench.send(b"m");
+    bench.run_ms(1);
+    let now = bench.now;
+    bench.unit().handle_framing_error(now);
+    bench.run_ms(500);
+    assert_eq!(bench.take(), complaint("0002"));
     let said = upload(&mut bench, &file(&new_program()));
     assert!(said.contains("V2.2.0"), "{said}");
 }

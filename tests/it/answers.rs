@@ -1,0 +1,295 @@
+//! The session's jobs with nobody at the other end but a script: what is sent, when, and how the job ends. Nothing wakes
+//! the session but its own deadlines, so a wait that does not end by itself shows here and nowhere else.
+
+use axcon::endpoint::Endpoint;
+use axcon::session::{Command, Event, Job, LoadReport, Outcome, Phase, Session, UnitNow, Verdict};
+use axcon::time::{Duration, Instant};
+use axcon::version::Version;
+use axcon::wire::stream::Source;
+
+use crate::support::bench::{image_of, order, small_image};
+
+/// A session, what it has sent, and what the other end says to that.
+struct Alone {
+    session: Session,
+    now: Instant,
+    /// Each piece that was sent, with the milliseconds since the command.
+    sent: Vec<(u64, String)>,
+    pages: usize,
+    /// What is said when a piece that begins so has been sent, and how many milliseconds later; the last one is the next.
+    /// Without a piece it belongs to the one before.
+    script: Vec<(&'static str, u64, &'static str)>,
+    /// What is under way.
+    says: Vec<(Instant, &'static str)>,
+}
+
+impl Alone {
+    fn with(script: &[(&'static str, u64, &'static str)]) -> Self {
+        let script = script.iter().rev().copied().collect();
+        let session = Session::new(115_200);
+        Alone { session, now: Instant::ZERO, sent: Vec::new(), pages: 0, script, says: Vec::new() }
+    }
+
+    /// Gives a command and lets its job come to its end: how, and behind how many milliseconds.
+    fn ask(&mut self, command: Command) -> (Outcome, u64) {
+        let begun = self.now;
+        self.session.command(self.now, command).expect("it is free");
+        self.end(begun)
+    }
+
+    fn end(&mut self, begun: Instant) -> (Outcome, u64) {
+        loop {
+            while let Some(piece) = self.session.poll_transmit() {
+                let text = String::from_utf8(piece.bytes).expect("keys").replace('\r', "~");
+                // A piece that is awaited, and everything that is said behind it.
+                if self.script.last().is_some_and(|(awaited, _, _)| !awaited.is_empty() && text.starts_with(awaited)) {
+                    let (_, late, says) = self.script.pop().expect("the last one");
+                    self.says.push((self.now + Duration::from_millis(late), says));
+                    while let Some((_, late, says)) = self.script.pop_if(|(awaited, _, _)| awaited.is_empty()) {
+                        self.says.push((self.now + Duration::from_millis(late), says));
+                    }
+                }
+                self.sent.push((millis(self.now.since(begun)), text));
+            }
+            while let Some(event) = self.session.poll_event() {
+                match event {
+                    Event::Finished(outcome) => return (outcome, millis(self.now.since(begun))),
+                    Event::Page { .. } => self.pages += 1,
+                    _ => {}
+                }
+            }
+            let due = self.session.poll_timeout();
+            self.says.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
+            let said = self.says.last().map(|(at, _)| *at);
+            let next = due.into_iter().chain(said).min().expect("a job has a deadline");
+            self.now = next.max(self.now);
+            assert!(self.now < Instant::from_millis(120_000), "an end");
+            match self.says.pop_if(|(at, _)| *at <= self.now) {
+                Some((_, text)) => self.session.handle_bytes(self.now, text.as_bytes()),
+                None => self.session.handle_timeout(self.now),
+            }
+        }
+    }
+
+    /// Everything that was sent, with times.
+    fn log(&self) -> String {
+        self.sent.iter().map(|(at, text)| format!("{at}:{text}")).collect::<Vec<_>>().join(" ")
+    }
+}
+
+fn millis(span: Duration) -> u64 {
+    u64::try_from(span.as_nanos() / 1_000_000).expect("a short story")
+}
+
+fn on() -> Command {
+    Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(200) }
+}
+
+/// A row of field values, as a transcript has it.
+const ROW: &str = "  23.500;  24.125;Disabled;OpenCct ; -12.750\r\n";
+const MENU: &str = "AXRTD8CO V1.0.0\r\nV - View Object Dictionary\r\nD - Default Object Dictionary\r\n\
+                    T - Toggle Stream\r\nS - Diagnostics\r\nL - Load New Software\r\n";
+
+#[test]
+fn a_silent_line_ends_every_job_by_its_own_deadlines() {
+    let no_answer = |job, awaited| Outcome::NoAnswer { job, awaited, heard: None };
+    let table = [
+        (on(), no_answer(Job::StreamOn, "the question for the stream's source"), "0:t 1500:t 3000:~", 3000),
+        (Command::StreamOff, Outcome::Done(Job::StreamOff), "0:t", 1500),
+        (Command::RestoreDefaults, no_answer(Job::RestoreDefaults, "the question for Yes"), "0:d 1500:~", 1500),
+        (
+            Command::Diagnostics { pages: Some(1) },
+            no_answer(Job::Diagnostics, "a page of diagnostics"),
+            "1300:s",
+            1300 + 6500,
+        ),
+        (
+            Command::ReadDictionary,
+            no_answer(Job::ReadDictionary, "the object dictionary"),
+            "0:v 1200:x 1320:m 2520:x 2640:m 3840:x 3960:m",
+            5160,
+        ),
+        (Command::Identify, Outcome::Identified, "0:\u{11}m 800:~m 1600:xm", 2400),
+    ];
+    for (command, outcome, log, time) in table {
+        let mut alone = Alone::with(&[]);
+        let name = format!("{command:?}");
+        assert_eq!(alone.ask(command), (outcome, time), "{name}: {}", alone.log());
+        assert_eq!(alone.log(), log, "{name}");
+    }
+}
+
+#[test]
+fn rows_behind_the_key_that_stops_them_are_forgiven_for_a_moment_and_it_is_pressed_three_times() {
+    let mut alone = Alone::with(&[("t", 299, ROW), ("", 300, ROW), ("t", 400, ROW), ("t", 299, ROW), ("", 301, ROW)]);
+    let (outcome, time) = alone.ask(Command::StreamOff);
+    assert!(
+        matches!(outcome, Outcome::NoAnswer { awaited: "that the stream is off", heard: Some(_), .. }),
+        "{outcome:?}"
+    );
+    assert_eq!((alone.log().as_str(), time), ("0:t 300:t 700:t", 1001));
+    // The second press is heard.
+    let mut alone = Alone::with(&[("t", 310, ROW)]);
+    assert_eq!(alone.ask(Command::StreamOff), (Outcome::Done(Job::StreamOff), 310 + 1500), "{}", alone.log());
+    assert_eq!(alone.session.facts().stream, None, "the row that came is history");
+}
+
+#[test]
+fn what_looked_like_a_page_before_the_key_does_not_keep_anybody_from_pressing_it() {
+    let page = "Supply voltage: 24.1 V\r\nInternal temperature: 31.0 C\r\n";
+    // Something with numbers comes once, unasked, then nothing: the pages have to be switched on all the same.
+    let mut alone = Alone::with(&[("s", 900, page), ("s", 1000, "")]);
+    alone.says.push((Instant::from_millis(500), page));
+    let (outcome, _) = alone.ask(Command::Diagnostics { pages: Some(2) });
+    assert_eq!((outcome, alone.pages), (Outcome::Done(Job::Diagnostics), 2), "{}", alone.log());
+    // 500, 200 of silence, 2,500 without a next page; 900, 200, and the key that stops them.
+    assert_eq!(alone.log(), "3200:s 4300:s");
+}
+
+#[test]
+fn a_page_that_was_under_way_is_no_sign_that_the_key_was_lost_and_a_later_one_is() {
+    let page = "Supply voltage: 24.1 V\r\n";
+    let script = [("s", 100, page), ("s", 300, page), ("", 1300, page), ("s", 10, "")];
+    let mut alone = Alone::with(&script);
+    let (outcome, time) = alone.ask(Command::Diagnostics { pages: Some(1) });
+    assert_eq!((outcome, alone.pages), (Outcome::Done(Job::Diagnostics), 1), "{}", alone.log());
+    // Asked at 1,300, a page complete at 1,600, one under way at 2,100, and one too many at 3,100.
+    assert_eq!((alone.log().as_str(), time), ("1300:s 1600:s 3100:s", 4600));
+    // A unit that does not stop at all is told so.
+    let script = [("s", 100, page), ("s", 1000, page), ("s", 1000, page), ("s", 1000, page)];
+    let (outcome, _) = Alone::with(&script).ask(Command::Diagnostics { pages: Some(1) });
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "the end of the diagnostics", .. }), "{outcome:?}");
+}
+
+#[test]
+fn a_loader_that_wants_a_key_gets_three_and_then_is_asked_who_it_is() {
+    let script = [("\u{11}m", 3, MENU), ("l", 5, "Password: ")];
+    let mut alone = Alone::with(&script);
+    let (outcome, time) = alone.ask(Command::Load(Box::new(order(small_image("AXRTD8CO", "1.2.0")))));
+    let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+    assert_eq!((report.verdict, report.unit), (Verdict::UnitRefused, UnitNow::Unknown), "{report:?}");
+    assert_eq!(report.what, "the password was sent, but no loader asks for the file");
+    assert_eq!(report.heard, "Password:", "what was heard last");
+    let begun = alone.sent.iter().find(|(_, text)| text == "AXIO-2010").expect("the password").0;
+    let behind: Vec<(u64, &str)> =
+        alone.sent.iter().map(|(at, text)| (at.saturating_sub(begun), text.as_str())).skip(4).collect();
+    let wanted = [(3_000, "~"), (4_000, "~"), (5_000, "~"), (8_000, "\u{11}m"), (8_800, "~m"), (9_600, "xm")];
+    let rounded: Vec<(u64, &str)> = behind.iter().map(|(at, text)| ((at + 20) / 100 * 100, *text)).collect();
+    assert_eq!(rounded, wanted, "{}", alone.log());
+    assert_eq!((time - begun + 20) / 100 * 100, 10_400);
+}
+
+#[test]
+fn the_question_for_yes_is_answered_once_and_only_a_banner_is_the_end() {
+    let question = "Enter Yes to restore the default object dictionary: ";
+    let script = [("d", 3, question), ("Yes~", 50, "\r\nV1.0.0\r\n"), ("", 2_000, "AXTC4CO V1.1.0\r\n")];
+    let mut alone = Alone::with(&script);
+    let (outcome, time) = alone.ask(Command::RestoreDefaults);
+    assert_eq!(outcome, Outcome::Done(Job::RestoreDefaults));
+    let (at, _) = alone.sent[1];
+    assert_eq!((alone.sent.len(), time), (2, at + 2_000), "a version alone is no banner: {}", alone.log());
+    // It never comes back.
+    let mut alone = Alone::with(&[("d", 3, question), ("Yes~", 50, question)]);
+    let (outcome, time) = alone.ask(Command::RestoreDefaults);
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "the banner after the reset", heard: Some(_), .. }));
+    assert_eq!((alone.sent.len(), time), (2, alone.sent[1].0 + 10_000), "nothing is answered twice: {}", alone.log());
+}
+
+/// Uploads to a loader that stops nobody and says this behind the end record. Gives the report, the milliseconds from
+/// the end record on, and what was sent behind it.
+fn end_of_an_upload(
+    behind: &[(u64, &'static str)],
+    asked: &[(&'static str, u64, &'static str)],
+) -> (LoadReport, u64, String) {
+    const WAITS: &str = "\r\nWaiting for application S-Record.\r\n";
+    const HERE: &str = "AXTC4CO V1.1.0\r\nV - View Object Dictionary\r\nD - Default Object Dictionary\r\n\
+                        T - Toggle Stream\r\nS - Diagnostics\r\nL - Load New Software\r\n";
+    let mut script = vec![("\u{11}m", 3, HERE), ("l", 5, "Password: "), ("AXIO-2010", 50, WAITS)];
+    script.extend(
+        behind.iter().enumerate().map(|(number, &(late, text))| (if number == 0 { "S7" } else { "" }, late, text)),
+    );
+    script.extend(asked);
+    let mut alone = Alone::with(&script);
+    let (outcome, time) = alone.ask(Command::Load(Box::new(order(image_of("AXTC4CO", "1.2.0", 320)))));
+    let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+    let end = alone.sent.iter().position(|(_, text)| text.starts_with("S7")).unwrap_or_else(|| panic!("{report:?}"));
+    let (at, _) = alone.sent[end];
+    let log = alone.sent[end + 1..].iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(" ");
+    (*report, time - at, log)
+}
+
+#[test]
+fn behind_the_end_record_what_comes_back_decides_and_every_wait_has_its_end() {
+    let (report, time, log) = end_of_an_upload(&[], &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Failed, UnitNow::Unknown, 20_000), "{report:?}");
+    assert_eq!((report.what.as_str(), log.as_str()), ("the file was sent, but the unit has not come back", ""));
+    assert_eq!((report.phase, report.records), (Phase::Finish, report.records_total));
+
+    let (report, time, _) = end_of_an_upload(&[(100, "AXTC4CO V1.2.0\r\n")], &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Done, UnitNow::Application, 400), "{report:?}");
+    assert_eq!((report.version_after, report.heard.as_str()), (Some(Version::new(1, 2, 0)), "AXTC4CO V1.2.0"));
+
+    let (report, time, _) = end_of_an_upload(&[(100, "AXTC4CO V1.1.0\r\n")], &[]);
+    assert_eq!(
+        (report.verdict, report.unit, time),
+        (Verdict::WrongApplication, UnitNow::Application, 400),
+        "{report:?}"
+    );
+
+    // A loader that waits for the next file may still start what it has, so it gets three seconds.
+    let (report, time, _) = end_of_an_upload(&[(100, "Waiting for application S-Record.\r\n")], &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Failed, UnitNow::Loader, 3_100), "{report:?}");
+    assert!(report.what.contains("does not start what was sent"), "{}", report.what);
+    let late = [(100, "Waiting for application S-Record.\r\n"), (2_500, "AXTC4CO V1.2.0\r\n")];
+    assert_eq!(end_of_an_upload(&late, &[]).0.verdict, Verdict::Done);
+
+    let error = [(100, "Error # 0003\r\nRestarting.\r\n"), (300, "Waiting for application S-Record.\r\n")];
+    let (report, time, _) = end_of_an_upload(&error, &[]);
+    assert_eq!(
+        (report.verdict, report.unit, report.phase),
+        (Verdict::Failed, UnitNow::Loader, Phase::Finish),
+        "{report:?}"
+    );
+    assert!(report.what.contains("at the end of the file") && time == 300, "{time}: {}", report.what);
+    // Without a prompt behind it, too.
+    let (report, time, _) = end_of_an_upload(&error[..1], &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Failed, UnitNow::Loader, 2_100), "{report:?}");
+}
+
+#[test]
+fn a_unit_that_comes_back_with_rows_alone_is_asked_for_its_version() {
+    let rows: Vec<(u64, &'static str)> = (0..20).map(|number| (100 + number * 200, ROW)).collect();
+    let named = "AXTC4CO V1.2.0\r\nV - View Object Dictionary\r\nT - Toggle Stream\r\nL - Load New Software\r\n";
+    let (report, _, log) = end_of_an_upload(&rows, &[("\u{11}m", 5, named)]);
+    assert_eq!((report.verdict, log.as_str()), (Verdict::Done, "\u{11}m"), "{report:?}");
+    assert_eq!(report.heard, "L - Load New Software", "rows are no words to quote");
+    // It runs, but whatever it is asked it does not say what.
+    let (report, time, log) = end_of_an_upload(&rows, &[]);
+    assert_eq!((report.verdict, report.unit), (Verdict::WrongApplication, UnitNow::Application), "{report:?}");
+    assert_eq!((log.as_str(), time), ("\u{11}m ~m xm", 1_100 + 2_400));
+}
+
+#[test]
+fn what_is_typed_as_a_password_is_known_again_wherever_the_unit_repeats_it() {
+    let mut session = Session::new(115_200);
+    let mut now = Instant::ZERO;
+    // With a slip of the finger that is taken back.
+    session.command(now, Command::Keys(b"lAXIP\x08O-2010\r".to_vec())).expect("taken");
+    for _ in 0..10 {
+        now += Duration::from_millis(10);
+        session.handle_timeout(now);
+        while session.poll_transmit().is_some() {}
+    }
+    session.handle_bytes(now, b"Password: AXIP\x08 \x08O-2010\r\nno such password: AXIO-2010, sorry\r\nAXI");
+    let received = |session: &Session| {
+        let bytes: Vec<u8> = session.record().entries().flat_map(|entry| entry.bytes.clone()).collect();
+        String::from_utf8(bytes).expect("text")
+    };
+    assert!(received(&session).ends_with("\r\nno such password: *********, sorry\r\n"), "{}", received(&session));
+    // What looks like its beginning is kept back for a moment, and no longer.
+    let due = session.poll_timeout().expect("it is given out by itself");
+    assert!(due <= now + Duration::from_millis(500), "{due:?}");
+    session.handle_timeout(due);
+    session.handle_timeout(due + Duration::from_millis(500));
+    assert!(received(&session).ends_with(", sorry\r\nAXI"), "{}", received(&session));
+}
