@@ -135,7 +135,7 @@ fn judged(tree: &Tree, tried: &[u32], tests: &[Test], folder: &Path) -> Result<V
                         };
                         if !verdict.starts_with("caught") && before.is_none() {
                             eprintln!("[{place}] {verdict}: {}", shown(candidate));
-                        } else if place % 100 == 0 {
+                        } else if place.is_multiple_of(100) {
                             eprintln!("[{place}]");
                         }
                         verdicts.lock().expect("no worker panics")[place] = verdict;
