@@ -11,6 +11,7 @@ mod dictionary;
 mod event;
 #[doc(hidden)]
 pub mod flaw;
+mod hearing;
 mod identify;
 mod job;
 mod overheard;
@@ -27,28 +28,16 @@ use zeroize::Zeroizing;
 
 use crate::device::Product;
 use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
-use crate::record::{Direction, REDACTED, Record};
+use crate::record::{Direction, Record};
 use crate::time::character_time;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
-use crate::wire::{Confidence, Framer, Item, LoaderText, Message, NmtState, Prompt, Text, Vocabulary};
+use crate::wire::{Framer, Message, Vocabulary};
 use dialogue::Dialogue;
+use hearing::PromptWatch;
 use job::{Desk, Signal, Work};
 use redactor::Redactor;
 use transmitter::Transmitter;
-
-/// Silence behind a text without a line end that makes a prompt of it: several character times, and more than an
-/// adapter's latency of 16 ms.
-const PROMPT_QUIET: Duration = Duration::from_millis(60);
-
-/// Bytes of a question for the password at most; what goes on longer is looked at when the unit has fallen silent.
-const LONGEST_PROMPT: usize = 200;
-
-/// How long bytes that may be the beginning of the password wait for the next ones.
-const ECHO_QUIET: Duration = Duration::from_millis(30);
-
-/// How long behind the question for the menu what comes is its answer.
-const MENU_ANSWER: Duration = Duration::from_millis(1500);
 
 /// A conversation with one unit.
 pub struct Session {
@@ -99,25 +88,6 @@ pub struct Session {
 struct Running {
     job: Job,
     work: Box<dyn Work + Send>,
-}
-
-/// Watches for text without a line end behind which the unit falls silent.
-#[derive(Debug, Default)]
-struct PromptWatch {
-    /// When the text counts as a prompt.
-    due: Option<Instant>,
-    /// End of the text that has been looked at already.
-    seen: u64,
-    /// The last text that was understood without its line end.
-    heard: Option<Text>,
-}
-
-impl PromptWatch {
-    /// Whether this line is a text that has been understood already, and only its end has come since.
-    fn was(&self, line: &Text) -> bool {
-        let same = |heard: &Text| heard.span.start == line.span.start && heard.text.trim() == line.text.trim();
-        self.heard.as_ref().is_some_and(same)
-    }
 }
 
 impl Session {
@@ -397,240 +367,11 @@ impl Session {
         self.dated = self.now;
     }
 
-    /// Appends to the record; what may echo the password is secret up to the next line end, and the password itself
-    /// wherever it stands.
-    fn append(&mut self, bytes: &[u8]) {
-        let mut rest = bytes;
-        while !rest.is_empty() {
-            let (part, is_echo) = if self.echo_is_secret {
-                let end = rest.iter().position(|&byte| byte == b'\r' || byte == b'\n');
-                (&rest[..end.unwrap_or(rest.len())], true)
-            } else {
-                (rest, false)
-            };
-            if part.is_empty() {
-                self.echo_is_secret = false;
-                continue;
-            }
-            rest = &rest[part.len()..];
-            if is_echo {
-                self.hand_out_echo();
-                self.take_in(part, Secrecy::Secret);
-                continue;
-            }
-            if self.redactor.is_idle() {
-                self.take_in(part, Secrecy::Open);
-                continue;
-            }
-            for (bytes, secrecy) in self.redactor.push(part) {
-                self.take_in(&bytes, secrecy);
-            }
-        }
-        self.echo_due = self.redactor.keeps_back().then(|| self.now + ECHO_QUIET);
-    }
-
-    /// What looks like the beginning of the password has stood still for long enough.
-    fn hand_out_echo(&mut self) {
-        self.echo_due = None;
-        for (bytes, secrecy) in self.redactor.flush() {
-            self.take_in(&bytes, secrecy);
-        }
-    }
-
     /// What is printed soon is the menu that was asked for, and no banner.
     fn note_menu_key(&mut self, sent: &[u8]) {
         // X leaves the view, behind which the menu stands.
         self.menu_asked_at = sent.iter().any(|key| matches!(key.to_ascii_lowercase(), b'm' | b'x')).then_some(self.now);
         self.dialogue.sent(self.now, sent);
-    }
-
-    fn take_in(&mut self, bytes: &[u8], secrecy: Secrecy) {
-        if secrecy == Secrecy::Secret {
-            let from = self.record.received();
-            let begins = if self.echo.1 == from { self.echo.0 } else { from };
-            self.echo = (begins, from + bytes.len() as u64);
-        }
-        self.record.push(self.dated, Direction::FromUnit, secrecy, bytes);
-        self.frame(bytes);
-    }
-
-    fn frame(&mut self, bytes: &[u8]) {
-        let mut items = Vec::new();
-        self.framer.push(bytes, |item| items.push(item));
-        for item in items {
-            match item {
-                Item::Line(text) => self.line(text),
-                Item::Hold(held) => {
-                    self.transmitter.hold(self.now, held);
-                    self.events.push_back(Event::Held(held));
-                    self.signal(Signal::Hold(held));
-                }
-            }
-        }
-        let pending = self.framer.pending();
-        let asks_password = pending.as_ref().is_some_and(|text| {
-            text.text.len() <= LONGEST_PROMPT
-                && text.span.end > self.prompt.seen
-                && self.vocabulary.asks_password(&text.text)
-        });
-        self.password_asked |= asks_password;
-        self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);
-    }
-
-    /// A line is complete.
-    fn line(&mut self, mut text: Text) {
-        if self.recognises {
-            self.redactor.scrub(&mut text.text);
-        }
-        let matters = self.password_asked || self.recognises;
-        let question = matters.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
-        // Rows of the stream may go on while the unit waits for its password.
-        self.password_asked &= match question {
-            Some((prompt, _)) => prompt == Prompt::Password,
-            None => self.password_asked && self.vocabulary.is_row(&text.text),
-        };
-        if !self.recognises {
-            return;
-        }
-        if self.prompt.was(&text) {
-            return;
-        }
-        if let Some((prompt, at)) = question {
-            self.password_asked |= prompt == Prompt::Password;
-            let row = Text { text: text.text.split_off(at), ..text.clone() };
-            if !self.prompt.was(&text) {
-                self.hear_line(text, Message::Prompt(prompt));
-            }
-            text = row;
-        }
-        let message = self.understand(&text.text);
-        self.hear_line(text, message);
-    }
-
-    fn hear_line(&mut self, mut text: Text, message: Message) {
-        self.conceal(&mut text);
-        self.heard(text, message);
-    }
-
-    /// Looks at a text without a line end behind which the unit has fallen silent.
-    fn look_at_prompt(&mut self) {
-        self.prompt.due = None;
-        let Some(mut text) = self.framer.pending() else { return };
-        self.redactor.scrub(&mut text.text);
-        self.prompt.seen = text.span.end;
-        let message = match self.vocabulary.prompt(&text.text) {
-            Some(prompt) => Message::Prompt(prompt),
-            None => self.understand(&text.text),
-        };
-        self.conceal(&mut text);
-        if message != Message::Text {
-            self.prompt.heard = Some(text.clone());
-            self.heard(text, message);
-        }
-    }
-
-    /// What a line means. A row without a number looks the same from either source: it is one of what was asked for.
-    fn understand(&self, line: &str) -> Message {
-        match self.vocabulary.line(line) {
-            Message::Row(row) => {
-                let other = self.source.and_then(|source| self.vocabulary.row_as(line, &row, source));
-                Message::Row(other.unwrap_or(row))
-            }
-            other => other,
-        }
-    }
-
-    /// Makes a text unreadable that may be an echo of the password, in whatever form the unit or the line gave it.
-    fn conceal(&self, text: &mut Text) {
-        if text.span.start < self.echo.1 && self.echo.0 < text.span.end {
-            let star = |c: char| if c.is_whitespace() { c } else { char::from(REDACTED) };
-            text.text = text.text.chars().map(star).collect();
-        }
-    }
-
-    fn heard(&mut self, text: Text, message: Message) {
-        self.learn(&text, &message);
-        // A unit that starts has forgotten that it stopped us, and will never say "go on".
-        let starts = matches!(
-            message,
-            Message::Software(_)
-                | Message::FirstStart
-                | Message::Loader(LoaderText::Header | LoaderText::Waiting)
-                | Message::Prompt(Prompt::WaitingForFile)
-        );
-        if starts && self.transmitter.held_since().is_some() {
-            self.transmitter.hold(self.now, false);
-            self.events.push_back(Event::Held(false));
-        }
-        self.events.push_back(match &message {
-            Message::Row(row) => Event::Row { at: self.dated, span: text.span, row: row.clone() },
-            _ => Event::Heard { at: self.dated, span: text.span, message: message.clone() },
-        });
-        self.signal(Signal::Heard(&text, &message));
-    }
-
-    /// Folds a message into the facts.
-    fn learn(&mut self, text: &Text, message: &Message) {
-        let span = text.span;
-        let before = self.facts.clone();
-        let asked = self.menu_asked_at.is_some_and(|at| self.now <= at + MENU_ANSWER);
-        // What comes in a dialogue is no banner, but for those that end with a reset.
-        let talks = matches!(self.job(), Some(Job::Identify | Job::ReadDictionary | Job::StreamOn | Job::StreamOff));
-        let asked = asked || talks;
-        let origin = if asked { Origin::Menu } else { Origin::Banner };
-        self.counted = *message == Message::Text && !self.dialogue.owns(self.dated, &text.text);
-        let facts = &mut self.facts;
-        match message {
-            Message::Text => facts.unrecognised_lines += u64::from(self.counted),
-            Message::Refusal | Message::Prompt(_) => {}
-            Message::Row(row) => {
-                facts.state = UnitState::Application;
-                facts.stream = Some(row.source);
-                if row.readings.iter().any(|reading| reading.value().is_some()) {
-                    self.source = Some(row.source);
-                }
-            }
-            Message::MenuKey(_) => {
-                facts.state = UnitState::Application;
-                facts.unrecognised_lines = facts.unrecognised_lines.saturating_sub(self.dialogue.menu());
-            }
-            Message::FirstStart => facts.state = UnitState::Application,
-            Message::Loader(text) => {
-                // "Press any key" and "restarting" an application may say as well.
-                if matches!(text, LoaderText::Waiting) {
-                    facts.enter_loader();
-                }
-            }
-            Message::Software(name) => {
-                // Three numbers with points between them are not enough to make a unit of whatever talks there.
-                if name.product.is_some() || name.confidence > Confidence::Bare {
-                    facts.state = UnitState::Application;
-                }
-                if let Some(product) = &name.product {
-                    facts.product = Some(Known { value: product.clone(), origin, span });
-                }
-                if let Some(version) = name.version {
-                    facts.version = Some(Known { value: version, origin, span });
-                }
-            }
-            Message::Network(network) => {
-                if let Some(value) = network.node_id {
-                    facts.node_id = Some(Known { value, origin, span });
-                }
-                if let Some(value) = network.can_kbps {
-                    facts.can_kbps = Some(Known { value, origin, span });
-                }
-                if let Some(state) = network.nmt_state {
-                    facts.nmt_state = Some(Known { value: NmtState::name(state).to_owned(), origin, span });
-                }
-            }
-        }
-        if matches!(message, Message::Prompt(Prompt::WaitingForFile)) {
-            facts.enter_loader();
-        }
-        if *facts != before {
-            self.events.push_back(Event::FactsChanged);
-        }
     }
 
     /// Tells the running job something, and ends it if it says so.
