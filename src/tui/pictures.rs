@@ -5,7 +5,10 @@
 
 mod choices;
 mod keys;
+mod links;
+mod loading;
 mod stage;
+mod typing;
 
 use insta::assert_snapshot;
 use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode};

@@ -6,86 +6,11 @@ use ratatui::crossterm::event::{
 
 use super::stage::*;
 use crate::canopen::{ObjectAddress, Value};
-use crate::endpoint::Transmit;
-use crate::image::DefectId;
 use crate::record::Span;
 use crate::session::{DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry};
 use crate::time::Duration;
-use crate::tui::{
-    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Options, Pace, Palette, Playback, Playing,
-};
+use crate::tui::{Effect, Input, LinkInfo, Pace, Playback, Playing};
 use crate::wire::stream::Source;
-
-#[test]
-fn connecting_asks_the_unit_who_it_is() {
-    let mut stage = Stage::with_ports(SMALL);
-    stage.asked();
-    stage.press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())]);
-    stage.opened("/dev/ttyUSB0");
-    stage.wait(10_000);
-    let sent = stage.sent();
-    assert!(sent.contains(&b'm'), "{sent:?}");
-    assert!(!sent.iter().any(|byte| b"VvDdTtSsLl".contains(byte)), "nothing but the menu is asked for: {sent:?}");
-}
-
-#[test]
-fn the_link_given_at_the_start_is_opened_at_once() {
-    let mut app = App::new(Options {
-        link: Some("emu:axtc4co".into()),
-        directory: "/".into(),
-        home: None,
-        palette: Palette::Dark,
-        size: SMALL,
-    });
-    assert_eq!(app.start(), [Effect::ListPorts, Effect::ListRecordings, Effect::OpenLink("emu:axtc4co".into())]);
-}
-
-#[test]
-fn another_link_is_asked_about_and_opened_before_the_first_is_given_up() {
-    let opens = |link: &str| Effect::OpenLink(link.into());
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("1").press(KeyCode::Down).asked();
-    stage.press(KeyCode::Enter);
-    assert!(stage.shows("Close the link?") && stage.shows("if that fails, the link stays"), "{}", stage.picture());
-    stage.keys("n");
-    assert_eq!(stage.asked(), [], "not without a yes");
-    stage.press(KeyCode::Enter).keys("y");
-    assert_eq!(stage.asked(), [opens("/dev/ttyUSB1")]);
-    stage.input(Input::LinkFailed(Failure { text: "no such port".into(), hints: Vec::new() }));
-    assert!(stage.shows("Not connected") && stage.shows("No such port"), "{}", stage.picture());
-    stage.press(KeyCode::Enter).keys("2m");
-    assert!(stage.shows("AXTC4CO 1.1.0") && stage.shows("/dev/ttyUSB0 │ connected"), "{}", stage.picture());
-    assert!(stage.sent().ends_with(b"m"), "the first link goes on");
-    stage.wait(3000).keys("1").press(KeyCode::Enter).keys("y").asked();
-    stage.press(KeyCode::Esc);
-    assert_eq!(stage.asked(), [Effect::DoNotOpen]);
-    stage.press(KeyCode::Enter).keys("y").lost();
-    assert!(stage.shows("Opening /dev/ttyUSB1."), "the first may go meanwhile: {}", stage.picture());
-    stage.opened("/dev/ttyUSB1");
-    assert!(stage.shows("/dev/ttyUSB1 │ connected") && !stage.shows("AXTC4CO 1.1.0"), "{}", stage.picture());
-    // The same port cannot be opened twice; a recording is asked about as well.
-    stage.keys("1").press(KeyCode::Enter).keys("y");
-    assert!(stage.asked().ends_with(&[Effect::CloseLink, opens("/dev/ttyUSB1")]));
-    let mut stage = Stage::connected(SMALL).with_recordings();
-    stage.asked();
-    stage.press(KeyCode::Enter);
-    assert_eq!((stage.asked(), stage.shows("Close the link?")), (Vec::new(), true), "{}", stage.picture());
-}
-
-#[test]
-fn a_unit_in_its_loader_is_asked_for_no_password_and_an_empty_one_is_named() {
-    let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO")).with_image(good_image());
-    assert!(stage.shows("neither L nor a password") && stage.shows("Enter starts."), "{}", stage.picture());
-    stage.asked();
-    stage.press(KeyCode::Enter);
-    assert!(stage.asked().iter().any(|effect| matches!(effect, Effect::UploadBegins { .. })), "{}", stage.picture());
-    let mut stage = Stage::connected(SMALL).with_image(good_image());
-    stage.press(KeyCode::Enter).press(KeyCode::Enter);
-    assert!(stage.shows("The password is missing"), "{}", stage.picture());
-    stage.keys("A");
-    assert!(!stage.shows("The password is missing"), "{}", stage.picture());
-}
 
 #[test]
 fn a_long_word_takes_two_lines_and_the_next_screen_ends_it() {
@@ -186,17 +111,6 @@ fn a_dictionary_of_no_known_product_is_compared_with_nothing_until_it_is_known()
 }
 
 #[test]
-fn a_lost_link_is_opened_again_by_c_and_the_terminal_keeps_its_lines() {
-    let mut stage = Stage::connected(SMALL);
-    stage.lost().asked();
-    stage.keys("c");
-    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())]);
-    stage.opened("/dev/ttyUSB0");
-    stage.keys("3");
-    assert!(stage.shows("Software Version V1.1.0") && stage.shows("link lost"), "{}", stage.picture());
-}
-
-#[test]
 fn a_recording_is_steered_by_its_keys() {
     let mut stage = Stage::with_ports(SMALL).with_recordings();
     stage.keys(" +").press(KeyCode::Left);
@@ -268,23 +182,6 @@ fn a_click_is_the_key_it_stands_on_and_the_wheel_moves() {
 }
 
 #[test]
-fn rows_go_on_to_their_file_when_the_same_link_is_back_and_end_with_another() {
-    let row = b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n";
-    let appended = |stage: &mut Stage| {
-        stage.wait(1000).bytes(row);
-        stage.asked().iter().any(|effect| matches!(effect, Effect::AppendFile { .. }))
-    };
-    let mut stage = Stage::streaming(SMALL);
-    stage.keys("6e").press(KeyCode::Enter).asked();
-    assert!(appended(&mut stage));
-    stage.lost().keys("c").opened("/dev/ttyUSB0");
-    assert!(appended(&mut stage), "the same link");
-    stage.wait(10_000).keys("1").press(KeyCode::Down).press(KeyCode::Enter).keys("y");
-    stage.opened("/dev/ttyUSB1");
-    assert!(!appended(&mut stage), "another unit's rows are not mixed in");
-}
-
-#[test]
 fn only_an_emulated_unit_is_given_orders() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("9");
@@ -326,120 +223,6 @@ fn menu_keys_do_what_the_manual_says_in_either_case() {
 }
 
 #[test]
-fn leaving_with_the_view_open_offers_to_close_it() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("vt").prefix().keys("2q");
-    stage.asked();
-    stage.press(KeyCode::Enter);
-    let effects = stage.asked();
-    assert_eq!(effects, [Effect::Transmit(Transmit::open(*b"x")), Effect::Quit]);
-}
-
-#[test]
-fn a_view_opened_by_a_typed_key_is_asked_about_on_every_way_out_and_closed() {
-    for way in ["q", "1x"] {
-        let mut stage = Stage::connected(SMALL);
-        stage.keys("3v").sent();
-        assert!(stage.shows("halted by V"), "{}", stage.picture());
-        stage.prefix().keys("2").keys(way);
-        assert!(stage.shows("The unit's view is open"), "{way}: {}", stage.picture());
-        stage.keys("y");
-        let effects = stage.asked();
-        assert_eq!(effects.first(), Some(&Effect::Transmit(Transmit::open(*b"x"))), "{way}");
-        assert!(matches!(effects.last(), Some(Effect::Quit | Effect::CloseLink)), "{way}: {effects:?}");
-    }
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("3vx").prefix().keys("q");
-    assert_eq!(stage.asked().last(), Some(&Effect::Quit), "it was closed again: nothing to ask");
-}
-
-#[test]
-fn a_silent_unit_holds_a_signal_for_two_seconds_and_q_for_none() {
-    let reading = || {
-        let mut stage = Stage::connected(SMALL);
-        stage.keys("v").press(KeyCode::Enter).wait(200).asked();
-        stage.input(Input::Signal);
-        assert!(!stage.effects.contains(&Effect::Quit), "the unit is left in order first");
-        stage
-    };
-    let mut stage = reading();
-    stage.wait(1999);
-    assert!(!stage.effects.contains(&Effect::Quit));
-    stage.wait(1);
-    assert!(stage.effects.contains(&Effect::Quit));
-    let mut stage = reading();
-    assert!(stage.shows("Leaving the unit in order"), "{}", stage.picture());
-    stage.keys("q");
-    assert!(stage.effects.contains(&Effect::Quit));
-    let mut stage = reading();
-    stage.lost();
-    assert!(stage.effects.contains(&Effect::Quit), "nobody is there to wait for");
-}
-
-#[test]
-fn another_link_is_opened_once_the_first_has_been_left_in_order() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("3v").prefix().keys("1").press(KeyCode::Down).press(KeyCode::Enter);
-    stage.asked();
-    assert!(stage.shows("/dev/ttyUSB1 is opened first"), "{}", stage.picture());
-    stage.keys("y");
-    let opens = Effect::OpenLink("/dev/ttyUSB1".into());
-    assert_eq!(stage.asked(), [Effect::Transmit(Transmit::open(*b"x")), opens]);
-}
-
-#[test]
-fn ctrl_z_stops_the_program_but_not_in_the_middle_of_a_job() {
-    let ctrl_z = |stage: &mut Stage| {
-        stage.asked();
-        stage.key(KeyCode::Char('z'), KeyModifiers::CONTROL).asked()
-    };
-    assert_eq!(ctrl_z(&mut Stage::connected(SMALL)), [Effect::Suspend]);
-    assert_eq!(ctrl_z(&mut typed(Stage::connected(SMALL), "t")), [Effect::Suspend], "also in front of a question");
-    let mut stage = Stage::loading(SMALL);
-    assert_eq!(ctrl_z(&mut stage), []);
-    assert!(stage.shows("Not stopped: a job runs."), "{}", stage.picture());
-    let mut stage = typed(Stage::connected(SMALL), "3");
-    assert_eq!(ctrl_z(&mut stage), [Effect::Transmit(Transmit::open([0x1a]))], "the bare terminal passes it on");
-}
-
-#[test]
-fn an_upload_is_noted_once_it_is_taken_and_before_its_first_byte() {
-    let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO")).with_image(good_image());
-    stage.press(KeyCode::Enter);
-    assert!(stage.shows("── Loading"), "the note spares the label: {}", stage.picture());
-    let mut stage = Stage::connected(SMALL).with_image(good_image());
-    stage.press(KeyCode::Enter).keys("AXIO-2010").asked();
-    stage.press(KeyCode::Enter);
-    let effects = stage.asked();
-    let note = effects
-        .iter()
-        .position(|effect| matches!(effect, Effect::UploadBegins { product, .. } if product == "AXTC4CO"));
-    let first = effects.iter().position(|effect| matches!(effect, Effect::Transmit(_)));
-    assert!(note.is_some() && (first.is_none() || note < first), "{effects:?}");
-}
-
-#[test]
-fn the_end_of_every_finding_can_be_read() {
-    let facts = bad_image();
-    let last = facts.defects.last().and_then(|text| text.split_whitespace().last()).expect("findings").to_owned();
-    let mut stage = Stage::connected(SMALL).with_image(facts.clone());
-    let mut seen = stage.picture();
-    for _ in 0..200 {
-        stage.press(KeyCode::Down);
-        seen.push_str(&stage.picture());
-    }
-    for defect in &facts.defects {
-        for word in defect.split_whitespace() {
-            assert!(seen.contains(word), "no '{word}' of '{defect}'");
-        }
-    }
-    assert!(stage.shows(&last), "{}", stage.picture());
-    let end = stage.picture();
-    stage.press(KeyCode::Up);
-    assert_ne!(stage.picture(), end, "one step back is one line");
-}
-
-#[test]
 fn defaults_are_restored_only_after_yes_written_like_this() {
     let mut stage = Stage::connected(SMALL);
     stage.sent();
@@ -466,107 +249,6 @@ fn t_switches_a_running_stream_off_and_asks_before_it_switches_one_on() {
 }
 
 #[test]
-fn letters_typed_into_a_question_are_no_commands() {
-    let mut stage = Stage::with_ports(SMALL);
-    stage.asked();
-    stage.keys("pq1?lt");
-    assert_eq!(stage.asked(), []);
-    stage.press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::OpenLink("q1?lt".into())]);
-}
-
-#[test]
-fn on_the_terminal_screen_letters_go_to_the_unit_and_the_prefix_takes_one_back() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("3").sent();
-    stage.keys("q1").press(KeyCode::Enter).press(KeyCode::Left).press(KeyCode::Up).press(KeyCode::Tab);
-    assert_eq!(stage.sent(), b"q1\r\t");
-    stage.prefix().keys("q");
-    assert_eq!(stage.asked(), [Effect::Quit]);
-    stage.prefix().prefix();
-    assert_eq!(stage.sent(), b"\x1d");
-}
-
-#[test]
-fn pasted_text_goes_to_the_unit_only_after_a_yes() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("3").sent();
-    stage.input(Input::Terminal(TerminalEvent::Paste("m\n\x1b[D\n".into())));
-    assert_eq!(stage.sent(), b"");
-    stage.keys("y");
-    assert_eq!(stage.sent(), b"m\r[D\r", "the escape character is not passed on");
-}
-
-#[test]
-fn the_terminal_stays_where_it_was_scrolled_to_while_more_comes() {
-    let mut stage = Stage::connected(SMALL);
-    (0..100).for_each(|n| {
-        stage.bytes(format!("line {n}\r\n").as_bytes());
-    });
-    stage.keys("3").press(KeyCode::PageUp);
-    assert!(stage.shows("stopped") && !stage.shows("line 99"));
-    let stopped = stage.picture();
-    let place = stopped.lines().nth(10).map(str::to_owned);
-    stage.bytes(b"more\r\n");
-    assert_eq!(stage.picture().lines().nth(10).map(str::to_owned), place);
-    stage.press(KeyCode::End);
-    assert!(stage.shows("follows") && stage.shows("more"));
-}
-
-#[test]
-fn an_upload_cannot_start_while_anything_stands_against_it() {
-    let cases = [
-        (bad_image(), "the file has errors"),
-        (ImageFacts { product: Some("AXRTD8CO".into()), ..good_image() }, "the file is for an AXRTD8CO"),
-    ];
-    for (facts, why) in cases {
-        let mut stage = Stage::connected(SMALL).with_image(facts);
-        stage.sent();
-        assert!(stage.shows(why), "{}", stage.picture());
-        stage.press(KeyCode::Enter);
-        assert!(!stage.shows("Password"));
-        assert_eq!(stage.sent(), b"");
-    }
-    let mut stage = Stage::with_ports(SMALL).with_image(good_image());
-    stage.press(KeyCode::Enter);
-    assert!(stage.shows("no unit is connected") && !stage.shows("Password"));
-}
-
-#[test]
-fn an_answer_about_a_file_nobody_waits_for_is_ignored() {
-    let mut stage = Stage::connected(SMALL).picking();
-    stage.input(Input::ImageChecked(Box::new(good_image())));
-    assert!(stage.shows("Choose a file"));
-}
-
-#[test]
-fn folders_are_walked_and_the_way_back_finds_the_folder_again() {
-    let mut stage = Stage::connected(SMALL).picking();
-    stage.asked();
-    stage.press(KeyCode::Down).press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images/bad".into())]);
-    stage.input(Input::FilesListed { directory: "/home/service/images/bad".into(), entries: Ok(Vec::new()) });
-    stage.press(KeyCode::Esc);
-    assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images".into())]);
-    let bad = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, begins: Vec::new(), modified: None };
-    stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(vec![bad]) });
-    assert!(stage.shows("› bad/"));
-}
-
-#[test]
-fn nothing_a_unit_sends_reaches_the_screen_as_a_control_code() {
-    let mut stage = Stage::connected(LARGE);
-    let every: Vec<u8> = (0..=255).collect();
-    stage.bytes(&every).bytes(b"\r\n");
-    for keys in ["2", "3"] {
-        stage.keys(keys);
-        assert!(stage.picture().chars().all(|character| character == '\n' || !character.is_control()));
-    }
-    stage.prefix().keys("h");
-    assert!(stage.picture().chars().all(|character| character == '\n' || !character.is_control()));
-}
-
-#[test]
 fn an_idle_console_wants_nothing_and_draws_nothing() {
     let mut stage = Stage::connected(SMALL);
     stage.wait(60_000);
@@ -590,14 +272,6 @@ fn an_idle_console_wants_nothing_and_draws_nothing() {
     assert!(!stage.app.is_dirty(), "the release of a key is not a key");
     stage.keys("3");
     assert!(stage.app.is_dirty());
-}
-
-#[test]
-fn a_signal_ends_the_program_without_a_question() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("m").asked();
-    stage.input(Input::Signal);
-    assert_eq!(stage.asked(), [Effect::Quit]);
 }
 
 /// The screens with something chosen, and what stands on the chosen row.
@@ -641,17 +315,6 @@ fn what_is_chosen_is_seen_without_colours_and_colours_are_those_of_the_ground() 
 }
 
 #[test]
-fn a_link_that_takes_long_to_open_is_given_up_by_esc() {
-    let mut stage = pressed(Stage::with_ports(SMALL), KeyCode::Enter);
-    stage.asked();
-    assert!(stage.shows("Opening /dev/ttyUSB0.") && stage.shows("Esc do not wait"), "{}", stage.picture());
-    stage.press(KeyCode::Esc);
-    assert_eq!(stage.asked(), [Effect::CloseLink]);
-    stage.press(KeyCode::Down).press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB1".into())], "another can be chosen");
-}
-
-#[test]
 fn a_click_chooses_an_entry_of_a_list_and_a_second_one_does_it() {
     for size in [SMALL, LARGE] {
         let mut stage = Stage::with_ports(size);
@@ -676,46 +339,4 @@ fn a_click_chooses_an_entry_of_a_list_and_a_second_one_does_it() {
             stage.picture()
         );
     }
-}
-
-#[test]
-fn a_break_is_sent_by_its_key_and_stands_between_the_lines_and_in_the_recording() {
-    let mut stage = Stage::connected(SMALL);
-    stage.keys("3").asked();
-    stage.prefix().keys("b");
-    assert_eq!(stage.asked(), [Effect::Break]);
-    stage.input(Input::BreakSent(Ok(())));
-    assert_eq!(stage.asked(), [Effect::Mark("break sent".into())]);
-    assert!(stage.shows("── break sent"), "{}", stage.picture());
-    stage.input(Input::BreakSent(Err("this link cannot send one".into())));
-    assert!(stage.shows("No break sent: this link cannot send one."), "{}", stage.picture());
-}
-
-#[test]
-fn long_records_are_chosen_with_a_key_and_the_plan_says_so() {
-    let mut stage = Stage::connected(SMALL).with_image(good_image());
-    assert!(stage.shows("K pack") && !stage.shows("in long records"), "{}", stage.picture());
-    stage.keys("k");
-    assert!(stage.shows("in long records"), "{}", stage.picture());
-}
-
-#[test]
-fn an_error_is_allowed_by_its_name_in_one_file_only_and_the_plan_says_so() {
-    let mut stage = Stage::connected(SMALL).with_image(bad_image());
-    stage.keys("obad-character").press(KeyCode::Enter);
-    assert!(stage.shows("part of the program unknown"), "{}", stage.picture());
-    let faulty = ImageFacts { ok: false, checked: None, errors: vec![DefectId::IdentityCrc], ..good_image() };
-    let path = faulty.path.clone();
-    let mut stage = Stage::connected(SMALL).with_image(faulty);
-    assert!(stage.shows("O override"), "{}", stage.picture());
-    stage.asked();
-    stage.keys("o");
-    assert!(stage.shows("waits in its loader") && stage.shows("identity-crc"), "{}", stage.picture());
-    stage.keys("identity-crc").press(KeyCode::Enter);
-    let allow = vec![DefectId::IdentityCrc];
-    assert_eq!(stage.asked(), [Effect::CheckImage { path: path.clone(), loader: None, allow: allow.clone() }]);
-    stage.input(Input::ImageChecked(Box::new(ImageFacts { allowed: allow, ..good_image() })));
-    assert!(stage.shows("passed in spite of identity-crc"), "{}", stage.picture());
-    stage.keys("p/other.S").press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::CheckImage { path: "/other.S".into(), loader: None, allow: Vec::new() }]);
 }

@@ -1,0 +1,188 @@
+//! Links opened, lost, replaced and left, in sentences.
+
+use ratatui::crossterm::event::{KeyCode, KeyModifiers};
+
+use super::stage::*;
+use crate::endpoint::Transmit;
+use crate::tui::{App, Effect, Failure, Input, Options, Palette};
+
+#[test]
+fn connecting_asks_the_unit_who_it_is() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())]);
+    stage.opened("/dev/ttyUSB0");
+    stage.wait(10_000);
+    let sent = stage.sent();
+    assert!(sent.contains(&b'm'), "{sent:?}");
+    assert!(!sent.iter().any(|byte| b"VvDdTtSsLl".contains(byte)), "nothing but the menu is asked for: {sent:?}");
+}
+
+#[test]
+fn the_link_given_at_the_start_is_opened_at_once() {
+    let mut app = App::new(Options {
+        link: Some("emu:axtc4co".into()),
+        directory: "/".into(),
+        home: None,
+        palette: Palette::Dark,
+        size: SMALL,
+    });
+    assert_eq!(app.start(), [Effect::ListPorts, Effect::ListRecordings, Effect::OpenLink("emu:axtc4co".into())]);
+}
+
+#[test]
+fn another_link_is_asked_about_and_opened_before_the_first_is_given_up() {
+    let opens = |link: &str| Effect::OpenLink(link.into());
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("1").press(KeyCode::Down).asked();
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("Close the link?") && stage.shows("if that fails, the link stays"), "{}", stage.picture());
+    stage.keys("n");
+    assert_eq!(stage.asked(), [], "not without a yes");
+    stage.press(KeyCode::Enter).keys("y");
+    assert_eq!(stage.asked(), [opens("/dev/ttyUSB1")]);
+    stage.input(Input::LinkFailed(Failure { text: "no such port".into(), hints: Vec::new() }));
+    assert!(stage.shows("Not connected") && stage.shows("No such port"), "{}", stage.picture());
+    stage.press(KeyCode::Enter).keys("2m");
+    assert!(stage.shows("AXTC4CO 1.1.0") && stage.shows("/dev/ttyUSB0 │ connected"), "{}", stage.picture());
+    assert!(stage.sent().ends_with(b"m"), "the first link goes on");
+    stage.wait(3000).keys("1").press(KeyCode::Enter).keys("y").asked();
+    stage.press(KeyCode::Esc);
+    assert_eq!(stage.asked(), [Effect::DoNotOpen]);
+    stage.press(KeyCode::Enter).keys("y").lost();
+    assert!(stage.shows("Opening /dev/ttyUSB1."), "the first may go meanwhile: {}", stage.picture());
+    stage.opened("/dev/ttyUSB1");
+    assert!(stage.shows("/dev/ttyUSB1 │ connected") && !stage.shows("AXTC4CO 1.1.0"), "{}", stage.picture());
+    // The same port cannot be opened twice; a recording is asked about as well.
+    stage.keys("1").press(KeyCode::Enter).keys("y");
+    assert!(stage.asked().ends_with(&[Effect::CloseLink, opens("/dev/ttyUSB1")]));
+    let mut stage = Stage::connected(SMALL).with_recordings();
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    assert_eq!((stage.asked(), stage.shows("Close the link?")), (Vec::new(), true), "{}", stage.picture());
+}
+
+#[test]
+fn a_lost_link_is_opened_again_by_c_and_the_terminal_keeps_its_lines() {
+    let mut stage = Stage::connected(SMALL);
+    stage.lost().asked();
+    stage.keys("c");
+    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())]);
+    stage.opened("/dev/ttyUSB0");
+    stage.keys("3");
+    assert!(stage.shows("Software Version V1.1.0") && stage.shows("link lost"), "{}", stage.picture());
+}
+
+#[test]
+fn rows_go_on_to_their_file_when_the_same_link_is_back_and_end_with_another() {
+    let row = b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n";
+    let appended = |stage: &mut Stage| {
+        stage.wait(1000).bytes(row);
+        stage.asked().iter().any(|effect| matches!(effect, Effect::AppendFile { .. }))
+    };
+    let mut stage = Stage::streaming(SMALL);
+    stage.keys("6e").press(KeyCode::Enter).asked();
+    assert!(appended(&mut stage));
+    stage.lost().keys("c").opened("/dev/ttyUSB0");
+    assert!(appended(&mut stage), "the same link");
+    stage.wait(10_000).keys("1").press(KeyCode::Down).press(KeyCode::Enter).keys("y");
+    stage.opened("/dev/ttyUSB1");
+    assert!(!appended(&mut stage), "another unit's rows are not mixed in");
+}
+
+#[test]
+fn leaving_with_the_view_open_offers_to_close_it() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("vt").prefix().keys("2q");
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    let effects = stage.asked();
+    assert_eq!(effects, [Effect::Transmit(Transmit::open(*b"x")), Effect::Quit]);
+}
+
+#[test]
+fn a_view_opened_by_a_typed_key_is_asked_about_on_every_way_out_and_closed() {
+    for way in ["q", "1x"] {
+        let mut stage = Stage::connected(SMALL);
+        stage.keys("3v").sent();
+        assert!(stage.shows("halted by V"), "{}", stage.picture());
+        stage.prefix().keys("2").keys(way);
+        assert!(stage.shows("The unit's view is open"), "{way}: {}", stage.picture());
+        stage.keys("y");
+        let effects = stage.asked();
+        assert_eq!(effects.first(), Some(&Effect::Transmit(Transmit::open(*b"x"))), "{way}");
+        assert!(matches!(effects.last(), Some(Effect::Quit | Effect::CloseLink)), "{way}: {effects:?}");
+    }
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3vx").prefix().keys("q");
+    assert_eq!(stage.asked().last(), Some(&Effect::Quit), "it was closed again: nothing to ask");
+}
+
+#[test]
+fn a_silent_unit_holds_a_signal_for_two_seconds_and_q_for_none() {
+    let reading = || {
+        let mut stage = Stage::connected(SMALL);
+        stage.keys("v").press(KeyCode::Enter).wait(200).asked();
+        stage.input(Input::Signal);
+        assert!(!stage.effects.contains(&Effect::Quit), "the unit is left in order first");
+        stage
+    };
+    let mut stage = reading();
+    stage.wait(1999);
+    assert!(!stage.effects.contains(&Effect::Quit));
+    stage.wait(1);
+    assert!(stage.effects.contains(&Effect::Quit));
+    let mut stage = reading();
+    assert!(stage.shows("Leaving the unit in order"), "{}", stage.picture());
+    stage.keys("q");
+    assert!(stage.effects.contains(&Effect::Quit));
+    let mut stage = reading();
+    stage.lost();
+    assert!(stage.effects.contains(&Effect::Quit), "nobody is there to wait for");
+}
+
+#[test]
+fn another_link_is_opened_once_the_first_has_been_left_in_order() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3v").prefix().keys("1").press(KeyCode::Down).press(KeyCode::Enter);
+    stage.asked();
+    assert!(stage.shows("/dev/ttyUSB1 is opened first"), "{}", stage.picture());
+    stage.keys("y");
+    let opens = Effect::OpenLink("/dev/ttyUSB1".into());
+    assert_eq!(stage.asked(), [Effect::Transmit(Transmit::open(*b"x")), opens]);
+}
+
+#[test]
+fn ctrl_z_stops_the_program_but_not_in_the_middle_of_a_job() {
+    let ctrl_z = |stage: &mut Stage| {
+        stage.asked();
+        stage.key(KeyCode::Char('z'), KeyModifiers::CONTROL).asked()
+    };
+    assert_eq!(ctrl_z(&mut Stage::connected(SMALL)), [Effect::Suspend]);
+    assert_eq!(ctrl_z(&mut typed(Stage::connected(SMALL), "t")), [Effect::Suspend], "also in front of a question");
+    let mut stage = Stage::loading(SMALL);
+    assert_eq!(ctrl_z(&mut stage), []);
+    assert!(stage.shows("Not stopped: a job runs."), "{}", stage.picture());
+    let mut stage = typed(Stage::connected(SMALL), "3");
+    assert_eq!(ctrl_z(&mut stage), [Effect::Transmit(Transmit::open([0x1a]))], "the bare terminal passes it on");
+}
+
+#[test]
+fn a_signal_ends_the_program_without_a_question() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("m").asked();
+    stage.input(Input::Signal);
+    assert_eq!(stage.asked(), [Effect::Quit]);
+}
+
+#[test]
+fn a_link_that_takes_long_to_open_is_given_up_by_esc() {
+    let mut stage = pressed(Stage::with_ports(SMALL), KeyCode::Enter);
+    stage.asked();
+    assert!(stage.shows("Opening /dev/ttyUSB0.") && stage.shows("Esc do not wait"), "{}", stage.picture());
+    stage.press(KeyCode::Esc);
+    assert_eq!(stage.asked(), [Effect::CloseLink]);
+    stage.press(KeyCode::Down).press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB1".into())], "another can be chosen");
+}

@@ -1,0 +1,127 @@
+//! What leads to an upload and what stands against it, in sentences.
+
+use ratatui::crossterm::event::KeyCode;
+
+use super::stage::*;
+use crate::image::DefectId;
+use crate::tui::{Effect, FileEntry, FileKind, ImageFacts, Input};
+
+#[test]
+fn a_unit_in_its_loader_is_asked_for_no_password_and_an_empty_one_is_named() {
+    let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO")).with_image(good_image());
+    assert!(stage.shows("neither L nor a password") && stage.shows("Enter starts."), "{}", stage.picture());
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    assert!(stage.asked().iter().any(|effect| matches!(effect, Effect::UploadBegins { .. })), "{}", stage.picture());
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    stage.press(KeyCode::Enter).press(KeyCode::Enter);
+    assert!(stage.shows("The password is missing"), "{}", stage.picture());
+    stage.keys("A");
+    assert!(!stage.shows("The password is missing"), "{}", stage.picture());
+}
+
+#[test]
+fn an_upload_is_noted_once_it_is_taken_and_before_its_first_byte() {
+    let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO")).with_image(good_image());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("── Loading"), "the note spares the label: {}", stage.picture());
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    stage.press(KeyCode::Enter).keys("AXIO-2010").asked();
+    stage.press(KeyCode::Enter);
+    let effects = stage.asked();
+    let note = effects
+        .iter()
+        .position(|effect| matches!(effect, Effect::UploadBegins { product, .. } if product == "AXTC4CO"));
+    let first = effects.iter().position(|effect| matches!(effect, Effect::Transmit(_)));
+    assert!(note.is_some() && (first.is_none() || note < first), "{effects:?}");
+}
+
+#[test]
+fn the_end_of_every_finding_can_be_read() {
+    let facts = bad_image();
+    let last = facts.defects.last().and_then(|text| text.split_whitespace().last()).expect("findings").to_owned();
+    let mut stage = Stage::connected(SMALL).with_image(facts.clone());
+    let mut seen = stage.picture();
+    for _ in 0..200 {
+        stage.press(KeyCode::Down);
+        seen.push_str(&stage.picture());
+    }
+    for defect in &facts.defects {
+        for word in defect.split_whitespace() {
+            assert!(seen.contains(word), "no '{word}' of '{defect}'");
+        }
+    }
+    assert!(stage.shows(&last), "{}", stage.picture());
+    let end = stage.picture();
+    stage.press(KeyCode::Up);
+    assert_ne!(stage.picture(), end, "one step back is one line");
+}
+
+#[test]
+fn an_upload_cannot_start_while_anything_stands_against_it() {
+    let cases = [
+        (bad_image(), "the file has errors"),
+        (ImageFacts { product: Some("AXRTD8CO".into()), ..good_image() }, "the file is for an AXRTD8CO"),
+    ];
+    for (facts, why) in cases {
+        let mut stage = Stage::connected(SMALL).with_image(facts);
+        stage.sent();
+        assert!(stage.shows(why), "{}", stage.picture());
+        stage.press(KeyCode::Enter);
+        assert!(!stage.shows("Password"));
+        assert_eq!(stage.sent(), b"");
+    }
+    let mut stage = Stage::with_ports(SMALL).with_image(good_image());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("no unit is connected") && !stage.shows("Password"));
+}
+
+#[test]
+fn an_answer_about_a_file_nobody_waits_for_is_ignored() {
+    let mut stage = Stage::connected(SMALL).picking();
+    stage.input(Input::ImageChecked(Box::new(good_image())));
+    assert!(stage.shows("Choose a file"));
+}
+
+#[test]
+fn folders_are_walked_and_the_way_back_finds_the_folder_again() {
+    let mut stage = Stage::connected(SMALL).picking();
+    stage.asked();
+    stage.press(KeyCode::Down).press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images/bad".into())]);
+    stage.input(Input::FilesListed { directory: "/home/service/images/bad".into(), entries: Ok(Vec::new()) });
+    stage.press(KeyCode::Esc);
+    assert_eq!(stage.asked(), [Effect::ListFiles("/home/service/images".into())]);
+    let bad = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, begins: Vec::new(), modified: None };
+    stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(vec![bad]) });
+    assert!(stage.shows("› bad/"));
+}
+
+#[test]
+fn long_records_are_chosen_with_a_key_and_the_plan_says_so() {
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    assert!(stage.shows("K pack") && !stage.shows("in long records"), "{}", stage.picture());
+    stage.keys("k");
+    assert!(stage.shows("in long records"), "{}", stage.picture());
+}
+
+#[test]
+fn an_error_is_allowed_by_its_name_in_one_file_only_and_the_plan_says_so() {
+    let mut stage = Stage::connected(SMALL).with_image(bad_image());
+    stage.keys("obad-character").press(KeyCode::Enter);
+    assert!(stage.shows("part of the program unknown"), "{}", stage.picture());
+    let faulty = ImageFacts { ok: false, checked: None, errors: vec![DefectId::IdentityCrc], ..good_image() };
+    let path = faulty.path.clone();
+    let mut stage = Stage::connected(SMALL).with_image(faulty);
+    assert!(stage.shows("O override"), "{}", stage.picture());
+    stage.asked();
+    stage.keys("o");
+    assert!(stage.shows("waits in its loader") && stage.shows("identity-crc"), "{}", stage.picture());
+    stage.keys("identity-crc").press(KeyCode::Enter);
+    let allow = vec![DefectId::IdentityCrc];
+    assert_eq!(stage.asked(), [Effect::CheckImage { path: path.clone(), loader: None, allow: allow.clone() }]);
+    stage.input(Input::ImageChecked(Box::new(ImageFacts { allowed: allow, ..good_image() })));
+    assert!(stage.shows("passed in spite of identity-crc"), "{}", stage.picture());
+    stage.keys("p/other.S").press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::CheckImage { path: "/other.S".into(), loader: None, allow: Vec::new() }]);
+}

@@ -1,0 +1,80 @@
+//! What is typed, pasted and printed, in sentences.
+
+use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode};
+
+use super::stage::*;
+use crate::tui::{Effect, Input};
+
+#[test]
+fn letters_typed_into_a_question_are_no_commands() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.asked();
+    stage.keys("pq1?lt");
+    assert_eq!(stage.asked(), []);
+    stage.press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::OpenLink("q1?lt".into())]);
+}
+
+#[test]
+fn on_the_terminal_screen_letters_go_to_the_unit_and_the_prefix_takes_one_back() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").sent();
+    stage.keys("q1").press(KeyCode::Enter).press(KeyCode::Left).press(KeyCode::Up).press(KeyCode::Tab);
+    assert_eq!(stage.sent(), b"q1\r\t");
+    stage.prefix().keys("q");
+    assert_eq!(stage.asked(), [Effect::Quit]);
+    stage.prefix().prefix();
+    assert_eq!(stage.sent(), b"\x1d");
+}
+
+#[test]
+fn pasted_text_goes_to_the_unit_only_after_a_yes() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").sent();
+    stage.input(Input::Terminal(TerminalEvent::Paste("m\n\x1b[D\n".into())));
+    assert_eq!(stage.sent(), b"");
+    stage.keys("y");
+    assert_eq!(stage.sent(), b"m\r[D\r", "the escape character is not passed on");
+}
+
+#[test]
+fn the_terminal_stays_where_it_was_scrolled_to_while_more_comes() {
+    let mut stage = Stage::connected(SMALL);
+    (0..100).for_each(|n| {
+        stage.bytes(format!("line {n}\r\n").as_bytes());
+    });
+    stage.keys("3").press(KeyCode::PageUp);
+    assert!(stage.shows("stopped") && !stage.shows("line 99"));
+    let stopped = stage.picture();
+    let place = stopped.lines().nth(10).map(str::to_owned);
+    stage.bytes(b"more\r\n");
+    assert_eq!(stage.picture().lines().nth(10).map(str::to_owned), place);
+    stage.press(KeyCode::End);
+    assert!(stage.shows("follows") && stage.shows("more"));
+}
+
+#[test]
+fn nothing_a_unit_sends_reaches_the_screen_as_a_control_code() {
+    let mut stage = Stage::connected(LARGE);
+    let every: Vec<u8> = (0..=255).collect();
+    stage.bytes(&every).bytes(b"\r\n");
+    for keys in ["2", "3"] {
+        stage.keys(keys);
+        assert!(stage.picture().chars().all(|character| character == '\n' || !character.is_control()));
+    }
+    stage.prefix().keys("h");
+    assert!(stage.picture().chars().all(|character| character == '\n' || !character.is_control()));
+}
+
+#[test]
+fn a_break_is_sent_by_its_key_and_stands_between_the_lines_and_in_the_recording() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").asked();
+    stage.prefix().keys("b");
+    assert_eq!(stage.asked(), [Effect::Break]);
+    stage.input(Input::BreakSent(Ok(())));
+    assert_eq!(stage.asked(), [Effect::Mark("break sent".into())]);
+    assert!(stage.shows("── break sent"), "{}", stage.picture());
+    stage.input(Input::BreakSent(Err("this link cannot send one".into())));
+    assert!(stage.shows("No break sent: this link cannot send one."), "{}", stage.picture());
+}
