@@ -5,9 +5,10 @@
 //! that is killed in between leaves the note, and the next upload on that port needs no more than being asked for.
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
@@ -43,6 +44,12 @@ const MOST_NOTES: usize = 200;
 
 /// Bytes of a journal that are read at most: far more than the notes take.
 const LARGEST: u64 = 1 << 20;
+
+/// How long another program may be at the journal: it takes milliseconds, unless somebody has stopped it there.
+const LOCK_PATIENCE: Duration = Duration::from_secs(2);
+
+/// How often it is looked whether it still is.
+const LOCK_RETRY: Duration = Duration::from_millis(5);
 
 impl Journal {
     /// The user's journal; `None` where there is no home directory.
@@ -85,17 +92,23 @@ impl Journal {
         if notes.uploads.remove(port).is_some() { self.write(notes) } else { Ok(()) }
     }
 
-    /// Waits until no other upload, of this program or another, is at the journal; given back with the file.
+    /// Waits until no other upload, of this program or another, is at the journal; given back with the file. One that
+    /// stays there is not waited for: an upload must not hang for a note.
     fn lock(&self) -> io::Result<fs::File> {
         let folder = self.file.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(folder)?;
         let lock = fs::File::options().create(true).append(true).open(self.file.with_extension("lock"))?;
-        match lock.lock() {
-            // Where locks do not work, two uploads at the same moment may lose a note, which costs a question later.
-            Err(error) if error.kind() == io::ErrorKind::Unsupported => {}
-            locked => locked?,
+        let give_up = Instant::now() + LOCK_PATIENCE;
+        loop {
+            match lock.try_lock() {
+                Err(TryLockError::WouldBlock) if Instant::now() < give_up => std::thread::sleep(LOCK_RETRY),
+                // Without it, two uploads at the same moment may lose a note, which costs a question later.
+                Err(TryLockError::WouldBlock) => return Ok(lock),
+                Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => return Ok(lock),
+                Err(TryLockError::Error(error)) => return Err(error),
+                Ok(()) => return Ok(lock),
+            }
         }
-        Ok(lock)
     }
 
     /// A journal that cannot be read holds nothing: the user is asked for the product then, and no harm is done.
@@ -122,6 +135,15 @@ mod tests {
 
     fn note(unix_seconds: i64) -> Note {
         Note { product: "AXTC4CO".into(), image: "a.S".into(), unix_seconds }
+    }
+
+    #[test]
+    fn whoever_stays_at_the_journal_stops_nobody() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let journal = Journal::at(folder.path().join("uploads.json"));
+        let _stays = journal.lock().expect("locked");
+        journal.begin("/dev/ttyUSB0", note(1)).expect("noted all the same");
+        assert_eq!(journal.note("/dev/ttyUSB0"), Some(note(1)));
     }
 
     #[test]
