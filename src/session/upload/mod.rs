@@ -34,6 +34,9 @@ const RESTART: Duration = Duration::from_secs(2);
 const MOST_STRANGE: usize = 3;
 /// Records to such a line behind which they are a loader's own way to show its progress: it has one for each page.
 const RECORDS_TO_A_PAGE: usize = 4;
+/// How long words are given to become something that is known: text whose line end the line has lost is looked at when it
+/// has stood still for 60 ms, an adapter of 20 ms on the way.
+const HEARD_OUT: Duration = Duration::from_millis(100);
 /// How long a loader with a ring may be silent behind the end record, before it is taken to wait for the rest of it.
 const END_UNHEARD: Duration = Duration::from_millis(1500);
 /// What brings a loader out of a record it has lost its place in: as many digits as the longest record has (it takes
@@ -72,6 +75,10 @@ pub(super) struct Upload {
     /// Lines of words nobody knows since the loader has acknowledged anything, and the records sent before the first.
     strange: usize,
     strange_from: usize,
+    /// Letters of a text without a line end that stands behind the records, and until when something that may talk is
+    /// heard out before the next record goes.
+    talk: String,
+    talks_until: Option<Instant>,
     /// The loader has been brought out of a record once.
     filled: bool,
     /// How long a silent unit is asked again and again.
@@ -157,6 +164,8 @@ impl Upload {
             asked_in_loader: None,
             strange: 0,
             strange_from: 0,
+            talk: String::new(),
+            talks_until: None,
             filled: false,
             patience: None,
             mark: 0,
@@ -187,7 +196,10 @@ impl Upload {
                 if self.strange == 0 {
                     self.strange_from = sent;
                 }
-                self.strange += usize::from(has_a_word(&text.text));
+                if has_a_word(&text.text) {
+                    self.strange += 1;
+                    self.talks_until = Some(desk.now + HEARD_OUT);
+                }
                 let pages = (sent - self.strange_from.min(sent)) / RECORDS_TO_A_PAGE;
                 let what = "what answers does not talk as a loader does".to_owned();
                 (self.strange > MOST_STRANGE.max(pages)).then_some((what, UnitNow::Unknown))
@@ -393,7 +405,24 @@ impl Upload {
         }
     }
 
+    /// Until when no record goes, because something talks. A loader that takes records makes marks; words may be the
+    /// first ones of a unit that has started anew, whose keys the records would be.
+    fn hears_out(&mut self, desk: &Desk<'_>) -> Option<Instant> {
+        let words = desk.pending.map_or("", |text| &text.text);
+        let letters =
+            if has_a_word(words) { words.chars().filter(char::is_ascii_alphabetic).collect() } else { String::new() };
+        if self.talk != letters {
+            self.talks_until = (!letters.is_empty()).then_some(desk.now + HEARD_OUT).or(self.talks_until);
+            self.talk = letters;
+        }
+        self.talks_until.filter(|&until| desk.now < until && self.order.flaw != Some(Flaw::SendsBehindErrors))
+    }
+
     fn transfer(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if let Some(until) = self.hears_out(desk) {
+            self.deadline = Some(until);
+            return None;
+        }
         let transfer = self.transfer.as_mut()?;
         match transfer.advance(desk.now, desk.transmitter) {
             Ok(false) => self.deadline = transfer.deadline(),
