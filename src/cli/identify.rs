@@ -247,5 +247,6 @@ fn source<T>(known: &Option<Known<T>>) -> Option<&'static str> {
         Origin::Banner => "banner",
         Origin::Menu => "menu",
         Origin::Dictionary => "object dictionary",
+        Origin::Diagnostics => "diagnostics",
     })
 }

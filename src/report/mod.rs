@@ -219,6 +219,7 @@ fn known<T>(label: &str, fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -
                 Origin::Banner => "banner",
                 Origin::Menu => "menu",
                 Origin::Dictionary => "object dictionary",
+                Origin::Diagnostics => "diagnostics",
             };
             row(label, show(&known.value), origin)
         }

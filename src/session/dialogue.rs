@@ -71,6 +71,16 @@ impl Dialogue {
         }
     }
 
+    /// Whether what comes now is on a page of diagnostics.
+    pub(super) fn shows_pages(&self, at: Instant) -> bool {
+        self.asked == Some(Asked::Pages) && at <= self.until
+    }
+
+    /// A unit says its name: no page does, so it has started anew and shows none any more.
+    pub(super) fn named(&mut self) {
+        self.asked = self.asked.filter(|asked| *asked != Asked::Pages);
+    }
+
     /// An entry of the menu has come: how many of the lines before it were its titles.
     pub(super) fn menu(&mut self) -> u64 {
         if self.asked == Some(Asked::Menu) {
@@ -106,8 +116,13 @@ mod tests {
         for second in 1..100 {
             assert!(dialogue.owns(at(second * 1000), "--- Diagnostics ---"), "{second}");
             assert!(dialogue.owns(at(second * 1000), "Supply 24.0 V"), "{second}");
+            assert!(dialogue.shows_pages(at(second * 1000 + 10)));
         }
-        assert!(!dialogue.owns(at(103_000), "noise"));
+        dialogue.named();
+        assert!(!dialogue.shows_pages(at(99_500)), "the unit has started anew");
+        dialogue.sent(at(100_000), b"s");
+        assert!(dialogue.shows_pages(at(102_000)));
+        assert!(!dialogue.owns(at(103_001), "noise") && !dialogue.shows_pages(at(103_001)));
     }
 
     #[test]

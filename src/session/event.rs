@@ -339,6 +339,8 @@ pub enum Origin {
     Menu,
     /// The object dictionary.
     Dictionary,
+    /// A page of diagnostics.
+    Diagnostics,
 }
 
 /// Who is talking at the other end.

@@ -216,6 +216,7 @@ impl Session {
         // What comes in a dialogue is no banner, but for those that end with a reset.
         let talks = matches!(self.job(), Some(Job::Identify | Job::ReadDictionary | Job::StreamOn | Job::StreamOff));
         let asked = asked || talks;
+        let pages = self.job() == Some(Job::Diagnostics) || self.dialogue.shows_pages(self.dated);
         let origin = if asked { Origin::Menu } else { Origin::Banner };
         self.counted = *message == Message::Text && !self.dialogue.owns(self.dated, &text.text);
         let facts = &mut self.facts;
@@ -245,6 +246,9 @@ impl Session {
                 if name.product.is_some() || name.confidence > Confidence::Bare {
                     facts.state = UnitState::Application;
                 }
+                if name.product.is_some() {
+                    self.dialogue.named();
+                }
                 if let Some(product) = &name.product {
                     facts.product = Some(Known { value: product.clone(), origin, span });
                 }
@@ -253,6 +257,7 @@ impl Session {
                 }
             }
             Message::Network(network) => {
+                let origin = if pages { Origin::Diagnostics } else { origin };
                 if let Some(value) = network.node_id {
                     facts.node_id = Some(Known { value, origin, span });
                 }

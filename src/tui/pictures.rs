@@ -435,7 +435,7 @@ pictures! {
     };
     stream_of_a_disabled_channel: |size| {
         let mut stage = Stage::streaming(size);
-        stage.keys("6").press(KeyCode::End);
+        stage.keys("6");
         (0..4).for_each(|_| {
             stage.press(KeyCode::Down);
         });

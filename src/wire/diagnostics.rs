@@ -6,7 +6,7 @@
 /// A number on a page, and what the page calls it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quantity {
-    /// The words before it; those of the line's first quantity stand before the further ones.
+    /// The words before it. A further quantity of a line with one word or none, `raw`, is one of what the first one names.
     pub label: String,
     /// The number.
     pub value: f64,
@@ -44,7 +44,8 @@ pub fn quantities(line: &str) -> Vec<Quantity> {
             label.push(word);
             continue;
         }
-        let first = found.first().map(|quantity| quantity.label.as_str());
+        // `TC1 100 C raw 3991 uV` is about TC1; `Supply Voltage=24.1V Source Current=4.0mA` is about two things.
+        let first = found.first().map(|quantity| quantity.label.as_str()).filter(|_| label.len() < 2);
         let label: Vec<&str> = first.into_iter().chain(std::mem::take(&mut label)).collect();
         found.push(Quantity { label: label.join(" "), value, decimals, unit });
         if found.len() == MOST_QUANTITIES {
@@ -99,6 +100,10 @@ mod tests {
             (
                 "TC1  100.123 C   raw   3991 uV",
                 vec![quantity("TC1", 100.123, Some("C")), quantity("TC1 raw", 3991.0, Some("uV"))],
+            ),
+            (
+                "Supply Voltage=24.28V Source Current=4.000mA",
+                vec![quantity("Supply Voltage", 24.28, Some("V")), quantity("Source Current", 4.0, Some("mA"))],
             ),
             ("Active Errors              0", vec![quantity("Active Errors", 0.0, None)]),
             ("Cold junction (°C) -12.5", vec![quantity("Cold junction °C", -12.5, None)]),

@@ -473,10 +473,17 @@ impl Row<'_> {
     fn detail(&self, scene: Scene, columns: u16, has_room: bool) -> Vec<Line<'static>> {
         let theme = scene.theme;
         let room = usize::from(columns).saturating_sub(2 + lines::LABEL_COLUMNS);
-        let section = self.known.map(|(object, _)| format!("manual, section {}", object.section)).unwrap_or_default();
+        let section = self.known.map(|(object, _)| format!("section {}", object.section)).unwrap_or_default();
+        let long = self.known.map(|_| format!("manual, {section}")).unwrap_or_default();
+        let title = format!("{} {}", self.at, self.name());
+        let fits = |remark: &str| format::width(&title) + format::width(remark) + 10 <= usize::from(columns);
         // Beside the table there are rows for it, and no columns.
-        let remark = if has_room { "" } else { &section };
-        let mut rows = vec![lines::rule(theme, columns, &format!("{} {}", self.at, self.name()), remark)];
+        let remark = match has_room {
+            true => "",
+            false if fits(&long) => &long,
+            false => &section,
+        };
+        let mut rows = vec![lines::rule(theme, columns, &title, remark)];
         let mut labelled = |label: &str, text: String, most: usize| {
             let most = if has_room { usize::MAX } else { most };
             for (number, line) in format::wrap(&text, room).into_iter().take(most).enumerate() {
@@ -536,7 +543,7 @@ impl Row<'_> {
             labelled("Printed", visible::text(&read.text), 1);
         }
         if has_room {
-            labelled("Described", section, 1);
+            labelled("Described", format!("in the {long}"), 1);
         }
         rows
     }

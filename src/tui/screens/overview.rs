@@ -6,6 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::{Scene, terminal};
+use crate::device::Product;
 use crate::monitor::{Channel, Fault, Tracked};
 use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
@@ -47,6 +48,8 @@ const TABLE_COLUMNS: usize = 64;
 const LEAST_TREND: usize = 12;
 /// Rows of the faults that the rest of the page leaves room for, with their heading, where there are any.
 const FAULT_ROWS: usize = 3;
+/// Columns of a channel and its value on a page of diagnostics, where the stream is off.
+const DIAGNOSED_COLUMNS: usize = 2 + 6 + 12;
 /// From this width on the limits have columns of their own ...
 const LIMITS_AT: u16 = 110;
 /// ... of this width each.
@@ -142,7 +145,7 @@ impl Overview {
             let room = usize::from(columns).saturating_sub(4);
             let broken = without_values(scene).into_iter().flat_map(|text| format::wrap(text, room));
             shown.extend(broken.map(|line| Line::raw(format!("  {line}"))));
-            shown.extend(diagnosed_values(scene));
+            shown.extend(diagnosed_values(scene, columns));
             shown.push(Line::default());
             return shown;
         };
@@ -298,21 +301,30 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
 }
 
 /// The channels' temperatures on the newest page of diagnostics: without a stream they are all there is to know.
-fn diagnosed_values(scene: Scene) -> Vec<Line<'static>> {
+fn diagnosed_values(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     let diagnostics = &scene.view.monitor.diagnostics;
-    let (Some(at), Some(product)) = (diagnostics.at, scene.view.product()) else { return Vec::new() };
-    let time = format::time_of_day(scene.start_of_day, at);
+    let Some(at) = diagnostics.at else { return Vec::new() };
     let is_celsius = |found: &&Tracked| found.unit.as_deref().is_some_and(|unit| matches!(unit, "C" | "°C" | "degC"));
-    let row = |name: &String| {
-        let found = diagnostics.found.iter().filter(is_celsius).find(|found| found.label == *name)?;
-        let value = format!("{} °C", found.text(found.value?));
-        Some(Line::from(vec![
-            Span::raw(format!("    {name:<8}")),
-            Span::styled(format!("{value:>13}"), scene.theme.quiet()),
-            Span::styled(format!("   on the diagnostics' last page, {time}"), scene.theme.quiet()),
-        ]))
+    let value = |name: &str| {
+        let found = diagnostics.found.iter().filter(is_celsius).find(|found| found.label == name)?;
+        Some(format!("{} °C", found.text(found.value?)))
     };
-    product.stream.channels.iter().filter_map(row).collect()
+    // A unit that has not said what it is gives itself away by its channels.
+    let has_most = |product: &&Product| {
+        let names = &product.stream.channels;
+        names.iter().filter(|name| value(name).is_some()).count() * 2 > names.len()
+    };
+    let Some(product) = scene.view.product().or_else(|| Product::all().iter().find(has_most)) else {
+        return Vec::new();
+    };
+    let names = product.stream.channels.iter();
+    let cells: Vec<String> = names.filter_map(|name| Some(format!("  {name:<6}{:>12}", value(name)?))).collect();
+    let time = format::time_of_day(scene.start_of_day, at);
+    let heading = format!("  On the diagnostics' last page, {time}:");
+    let heading = (!cells.is_empty()).then(|| Line::styled(heading, scene.theme.quiet()));
+    let in_a_row = (usize::from(columns) / DIAGNOSED_COLUMNS).max(1);
+    let rows = cells.chunks(in_a_row).map(|row| Line::styled(format!("  {}", row.concat()), scene.theme.quiet()));
+    heading.into_iter().chain(rows).collect()
 }
 
 /// What the unit's diagnostics say beside the channels: supply, cold junction, active errors.
@@ -360,6 +372,7 @@ fn known<T>(fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -> Span<'stati
                 Origin::Banner => "banner",
                 Origin::Menu => "menu",
                 Origin::Dictionary => "object dictionary",
+                Origin::Diagnostics => "diagnostics",
             };
             Span::raw(format!("{} ({origin})", show(&known.value)))
         }

@@ -202,7 +202,7 @@ impl Stream {
     fn charts(&self, values: &Values, area: Rect, (from, to): (Instant, Instant)) -> Vec<(usize, Rect)> {
         let Some(last) = values.channels.len().checked_sub(1) else { return Vec::new() };
         let chosen = self.channel.min(last);
-        let (columns, rows) = (area.width / LEAST_CHART.0, area.height / LEAST_CHART.1);
+        let (columns, rows) = room(area);
         if self.alone || columns * rows < 2 {
             return vec![(chosen, area)];
         }
@@ -264,7 +264,14 @@ impl Stream {
         let span = format!("{low:.decimals$} to {high:.decimals$} {}", curve.quantity.unit);
         let state = if self.held.is_some() { "held, End follows again" } else { "follows" };
         let window = format!("{}, {state}", WINDOWS[self.window].0);
-        let parts = [(charts.len() > 1 && low <= high, span), (self.is_chosen(values, number), window)];
+        let is_chosen = self.is_chosen(values, number);
+        let (columns, rows) = charts.first().map_or((0, 0), |(_, area)| room(*area));
+        let parts = [
+            (charts.len() > 1 && low <= high, span),
+            (is_chosen, window),
+            (is_chosen && charts.len() > 1, "Enter enlarges".into()),
+            (self.alone && columns * rows > 1, "Enter shows all".into()),
+        ];
         let parts: Vec<String> = parts.into_iter().filter_map(|(is_wanted, text)| is_wanted.then_some(text)).collect();
         parts.join(", ")
     }
@@ -323,6 +330,11 @@ impl Stream {
         }
         line
     }
+}
+
+/// How many charts have room, side by side and one below the other.
+fn room(area: Rect) -> (u16, u16) {
+    (area.width / LEAST_CHART.0, area.height / LEAST_CHART.1)
 }
 
 /// Where the part number `place` of `count` equal parts begins.
