@@ -365,6 +365,9 @@ impl Widths {
     }
 }
 
+/// Columns of a heading's rule beside its texts, and of the blank in its title.
+const RULE_COLUMNS: usize = 11;
+
 impl Row<'_> {
     fn name(&self) -> String {
         match self.known {
@@ -475,14 +478,19 @@ impl Row<'_> {
         let room = usize::from(columns).saturating_sub(2 + lines::LABEL_COLUMNS);
         let section = self.known.map(|(object, _)| format!("section {}", object.section)).unwrap_or_default();
         let long = self.known.map(|_| format!("manual, {section}")).unwrap_or_default();
-        let title = format!("{} {}", self.at, self.name());
-        let fits = |remark: &str| format::width(&title) + format::width(remark) + 10 <= usize::from(columns);
+        let address = self.at.to_string();
+        // What is left beside address, remark, and the rule between and around them.
+        let left = |remark: &str| {
+            usize::from(columns).saturating_sub(format::width(&address) + format::width(remark) + RULE_COLUMNS)
+        };
+        let fits = |remark: &str| format::width(&self.name()) <= left(remark);
         // Beside the table there are rows for it, and no columns.
         let remark = match has_room {
             true => "",
             false if fits(&long) => &long,
             false => &section,
         };
+        let title = format!("{address} {}", format::keep_ends(&self.name(), left(remark)));
         let mut rows = vec![lines::rule(theme, columns, &title, remark)];
         let mut labelled = |label: &str, text: String, most: usize| {
             let most = if has_room { usize::MAX } else { most };
