@@ -98,3 +98,13 @@ fn the_kind_of_loader_is_chosen_on_the_load_screen_judged_and_ordered() {
     stage.keys("1").press(KeyCode::Enter).keys("y").opened("/dev/ttyUSB0").keys("4");
     assert!(stage.shows("believed of every"), "{}", stage.picture());
 }
+
+#[test]
+fn an_image_is_sent_as_it_is_only_after_y() {
+    let mut stage = super::asked_to_send(SMALL, "AXTC4CO_V1.2.0.elf.S");
+    stage.asked();
+    stage.press(KeyCode::Enter);
+    assert!(stage.asked().is_empty() && stage.shows("all the same"), "{}", stage.picture());
+    stage.keys("y");
+    assert!(stage.asked().iter().any(|effect| matches!(effect, Effect::Transmit(_))), "{}", stage.picture());
+}

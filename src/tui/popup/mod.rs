@@ -319,6 +319,8 @@ impl Question {
                 self.clear();
                 self.changed()
             }
+            // The Enter behind its path may come twice, and records are keys to a unit in its menu: only Y sends them.
+            KeyCode::Enter if matches!(self, Question::SendFile { is_image: true, .. }) => Answer::Stay,
             KeyCode::Enter => self.accept(),
             // Nothing is left of what was typed: as in the list of the load screen.
             KeyCode::Backspace if self.is_untyped_choice() => self.move_in_list(Cmd::Back),
