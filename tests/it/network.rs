@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use axcon::host::clock::Clock;
-use axcon::host::link::{CLOSE_PATIENCE, Cause, Connection, Options};
-use axcon::host::{Input, channel};
+use axcon::host::Input;
+use axcon::host::link::{CLOSE_PATIENCE, Cause, Connection};
 
+use crate::support::connection::{connected, receive};
 use crate::support::screen::Screen;
 use crate::support::server::Server;
 use crate::support::shell::{PATIENCE, Running, World};
@@ -51,20 +51,7 @@ fn header(world: &World) -> String {
 }
 
 fn open(link: &str) -> (Connection, Receiver<Input>) {
-    let (inputs, received) = channel();
-    let spec = link.parse().expect("a link");
-    (Connection::open(&spec, Options { baud: 115_200 }, Clock::start(), inputs).expect("opened"), received)
-}
-
-fn receive(received: &Receiver<Input>, count: usize) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    while bytes.len() < count {
-        match received.recv_timeout(PATIENCE).expect("more bytes") {
-            Input::Bytes { bytes: more, .. } => bytes.extend(more),
-            other => panic!("{other:?} after {:?}", bytes.escape_ascii().to_string()),
-        }
-    }
-    bytes
+    connected(&link.parse().expect("a link"), 115_200)
 }
 
 /// Reads until what was read ends so.

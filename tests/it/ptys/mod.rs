@@ -20,13 +20,13 @@ use rustix::process::Signal;
 use axcon::emulator::Store;
 use axcon::emulator::scenario::Verb;
 use axcon::endpoint::{Endpoint, Transmit};
-use axcon::host::clock::Clock;
-use axcon::host::link::{Cause, Connection, LinkSpec, Options};
+use axcon::host::Input;
+use axcon::host::link::{Cause, Connection, LinkSpec};
 use axcon::host::pty::Pty;
 use axcon::host::unit::{AHEAD, Answer, Hosted, HostedUnit, Hosting, LineRate, Power};
-use axcon::host::{Input, channel};
 use axcon::time::Instant;
 
+use crate::support::connection::{connected, receive};
 use crate::support::screen::Screen;
 use crate::support::shell::{PATIENCE, Running, World};
 
@@ -117,21 +117,7 @@ fn host(fake: Fake) -> HostedUnit {
 }
 
 fn connect(path: &Path, baud: u32) -> (Connection, Receiver<Input>) {
-    let (inputs, received) = channel();
-    let spec = LinkSpec::Serial(path.to_owned());
-    (Connection::open(&spec, Options { baud }, Clock::start(), inputs).expect("opened"), received)
-}
-
-/// Bytes from the connection until there are this many.
-fn receive(received: &Receiver<Input>, count: usize) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    while bytes.len() < count {
-        match received.recv_timeout(PATIENCE).expect("more bytes") {
-            Input::Bytes { bytes: more, .. } => bytes.extend(more),
-            other => panic!("{other:?} after {:?}", bytes.escape_ascii().to_string()),
-        }
-    }
-    bytes
+    connected(&LinkSpec::Serial(path.to_owned()), baud)
 }
 
 fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {

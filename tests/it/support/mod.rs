@@ -1,6 +1,8 @@
 //! What several stories need.
 
 pub mod bench;
+#[cfg(unix)]
+pub mod connection;
 pub mod flashed;
 #[cfg(unix)]
 pub mod puppet;
