@@ -410,6 +410,19 @@ fn diagnostics_stand_beside_their_numbers_until_s_stops_them() {
 }
 
 #[test]
+fn a_job_given_while_the_unit_is_being_asked_who_it_is_is_known_to_run_and_ended_by_its_key() {
+    let mut desk = Desk::new();
+    desk.keys("ms");
+    desk.wait_for("page 3");
+    assert!(desk.picture().contains("S stops"), "{}", desk.picture());
+    desk.keys("s");
+    desk.wait_for("The diagnostics are off.");
+    let before = desk.picture();
+    desk.run(Duration::from_secs(5));
+    assert_eq!(desk.picture(), before, "no more pages come");
+}
+
+#[test]
 fn words_are_found_in_the_terminal_one_place_after_the_other() {
     let mut desk = Desk::new();
     desk.keys("3");
