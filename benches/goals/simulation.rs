@@ -45,8 +45,9 @@ pub struct Seen {
     pub report: LoadReport,
     /// Characters of all records sent.
     pub characters: usize,
-    /// Records that left behind the moment at which the whole text of the trouble had arrived at the console.
-    pub behind: Option<usize>,
+    /// Records that left behind the moment at which the whole text of the trouble had arrived at the console; none if
+    /// the upload had ended before.
+    pub behind: usize,
 }
 
 /// An image of so many words.
@@ -118,7 +119,7 @@ pub fn run(upload: &Upload<'_>) -> Seen {
         }
         while let Some(event) = session.poll_event() {
             if let Event::Finished(Outcome::Loaded(report)) = event {
-                let behind = wire.arrived.map(|arrived| wire.records - arrived);
+                let behind = wire.arrived.map_or(0, |arrived| wire.records - arrived);
                 return Seen { report: *report, characters: wire.characters, behind };
             }
         }

@@ -27,7 +27,7 @@ pub fn run(global: &Global) -> Result<(), CliError> {
     let world = World {
         link: link.map(|link| link.to_string()),
         baud: global.baud,
-        recording: link::recording(global),
+        recording: link::recording(global)?,
         noted: |link| {
             journal(link).and_then(|(journal, key)| journal.note(&key)).map(|note| (note.product, note.image))
         },

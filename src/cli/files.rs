@@ -28,7 +28,7 @@ pub fn save_error(path: &Path, error: SaveError) -> CliError {
     let shown = shown(path);
     match error {
         SaveError::Exists => CliError::message(Kind::NeedsYes, format!("{shown} exists already"))
-            .hint("Overwrite it with --yes, or name another with --out."),
+            .hint("Overwrite it with --yes, or name another."),
         SaveError::NotAFile => CliError::message(Kind::Failed, format!("{shown} is not a file")).hint("Name a file."),
         SaveError::Io(error) => {
             CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot write '{shown}'")))

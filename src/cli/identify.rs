@@ -7,10 +7,12 @@ use serde::Serialize;
 use super::Global;
 use super::ask::{self, confirm};
 use super::error::{CliError, Kind};
+use super::journal::Desk;
 use super::link;
 use super::output::Output;
 use super::talk::{Talk, no_answer_hints};
 use crate::canopen::ObjectAddress;
+use crate::host::journal::Note;
 use crate::session::{Command, Facts, Known, Origin, Outcome, UnitState};
 use crate::time::Duration;
 
@@ -88,6 +90,14 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     };
     let facts = talk.session().facts().clone();
     let deep = deep.unwrap_or_default();
+    let unfinished = Desk::of(&talk).note;
+    if let Some(note) = &unfinished {
+        let Note { product, image, .. } = note;
+        output.remark(&format!(
+            "axcon: an upload of {image} to the {product} on this port has not ended well; 'axcon load' with that image, \
+             or a newer one, brings the unit back"
+        ));
+    }
     if output.json {
         output.object(&object(&facts, &deep))?;
     } else if matches!(facts.state, UnitState::Application | UnitState::Loader) {

@@ -6,13 +6,15 @@ use std::sync::mpsc::SyncSender;
 
 use super::Global;
 use super::error::{CliError, Kind};
+use super::files;
+use super::output::Output;
 use crate::host::Input;
 use crate::host::clock::Clock;
 use crate::host::link::{Cause, Connection, LinkError, LinkSpec, LinkSpecError, Options};
 use crate::host::network::NetworkError;
 use crate::host::ports::{self, Port};
 use crate::host::pump::PumpError;
-use crate::host::recorder::{self, Plan};
+use crate::host::recorder::{self, Plan, Recorder};
 use crate::host::replay::RecordingError;
 use crate::telnet::Refusal;
 
@@ -79,12 +81,39 @@ pub fn journal_key(spec: &LinkSpec) -> Option<String> {
     }
 }
 
-/// Where a session is recorded, as the command line says.
-pub fn recording(global: &Global) -> Plan {
+/// Where a session is recorded, as the command line says: to be asked before a link opens.
+///
+/// # Errors
+/// If a file is there that should stay.
+pub fn recording(global: &Global) -> Result<Plan, CliError> {
     match &global.record {
-        _ if global.no_record => Plan::Nothing,
-        Some(file) => Plan::File(file.clone()),
-        None => Plan::Unasked,
+        _ if global.no_record => Ok(Plan::Nothing),
+        Some(file) => files::admit(file, global.yes).map(|()| Plan::File(file.clone())),
+        None => Ok(Plan::Unasked),
+    }
+}
+
+/// Starts recording. Who names a file wants the recording, so there is no session without it; one that nobody asked for
+/// is missed with a warning.
+///
+/// # Errors
+/// If the file that the user named cannot be written.
+pub fn start_recording(
+    plan: &Plan,
+    connection: &Connection,
+    clock: Clock,
+    output: &mut Output,
+) -> Result<Recorder, CliError> {
+    let mut recorder = Recorder::start(plan, connection, clock);
+    match (plan, recorder.take_warning()) {
+        (_, None) => Ok(recorder),
+        (Plan::File(_), Some(warning)) => Err(CliError::message(Kind::Failed, warning)
+            .hint("Look whether the folder exists, may be written to, and has room.")
+            .hint("Nothing has been sent.")),
+        (Plan::Unasked | Plan::Nothing, Some(warning)) => {
+            output.remark(&format!("axcon: {warning}"));
+            Ok(recorder)
+        }
     }
 }
 

@@ -11,6 +11,7 @@ pub mod error;
 pub mod files;
 pub mod identify;
 pub mod image;
+pub mod journal;
 pub mod link;
 pub mod load;
 pub mod manual;
@@ -84,7 +85,7 @@ pub struct Global {
     /// Answer yes to every question, and replace files that are there.
     #[arg(long, short = 'y', global = true)]
     pub yes: bool,
-    /// Record to this file instead of the state directory.
+    /// Record to this file instead of the state directory; one that is there is replaced only with --yes.
     #[arg(long, value_name = "FILE", global = true, conflicts_with = "no_record")]
     pub record: Option<PathBuf>,
     /// Record nothing.
@@ -187,8 +188,20 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         cli.global.ports.retain(|port| !port.is_empty());
     }
     let mut output = Output::standard(cli.global.json);
-    let result = dispatch(cli, &mut output);
+    let result = all_ports(&cli.global, &args).and_then(|()| dispatch(cli, &mut output));
     output::conclude(&mut output, result)
+}
+
+/// Makes sure that no named link is forgotten: behind the command a global option takes the place of the same one before
+/// it, and of several units one would never get its software.
+fn all_ports(global: &Global, args: &[OsString]) -> Result<(), CliError> {
+    let options = args.iter().take_while(|arg| *arg != "--").map(|arg| arg.to_string_lossy());
+    let named = options.filter(|arg| arg == "--port" || arg.starts_with("--port=")).count();
+    if named <= global.ports.len() {
+        return Ok(());
+    }
+    Err(CliError::message(error::Kind::Usage, "--port stands both before the command and behind it")
+        .hint("name all links behind the command"))
 }
 
 fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {

@@ -15,7 +15,6 @@ use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::LinkSpec;
 use crate::host::pump::{Pump, PumpError};
-use crate::host::recorder::Recorder;
 use crate::host::replay::Recording;
 use crate::host::signal::Signals;
 use crate::host::{self, Input};
@@ -108,12 +107,10 @@ impl Talk {
             (line, Session::of_recording(global.baud))
         } else {
             let clock = Clock::start();
+            let plan = link::recording(global)?;
             let connection = link::open(&spec, global, clock, sender.clone())?;
             comeback = Comeback::of(&spec, link::options(global));
-            let mut recorder = Recorder::start(&link::recording(global), &connection, clock);
-            if let Some(warning) = recorder.take_warning() {
-                output.remark(&format!("axcon: {warning}"));
-            }
+            let recorder = link::start_recording(&plan, &connection, clock, output)?;
             let line = Line::Live(Box::new(Pump::new(connection, inputs, clock, recorder)));
             (line, Session::new(global.baud))
         };

@@ -23,6 +23,22 @@ pub enum Plan {
     Nothing,
 }
 
+impl Plan {
+    /// Where a later session of the same program is recorded, the first being number 1: beside the file of the first
+    /// one, whose recording stays, under a name that nobody has.
+    pub fn of_session(&self, number: u32) -> Plan {
+        match self {
+            Plan::File(first) if number > 1 => {
+                let stem = first.file_stem().unwrap_or_default().to_string_lossy();
+                let ending = first.extension().map_or(String::new(), |ending| format!(".{}", ending.to_string_lossy()));
+                let named = |number: u32| first.with_file_name(format!("{stem}-{number}{ending}"));
+                Plan::File((number..).map(named).find(|path| !path.exists()).unwrap_or_else(|| named(number)))
+            }
+            plan => plan.clone(),
+        }
+    }
+}
+
 /// The recording of one session.
 #[derive(Debug, Default)]
 pub struct Recorder {

@@ -133,6 +133,28 @@ fn what_is_no_recording_is_said_with_its_place() {
 }
 
 #[test]
+fn a_recording_takes_the_place_of_no_file_and_without_the_wanted_one_nothing_is_sent() {
+    let world = World::new();
+    let puppet = Puppet::silent();
+    fs::write(world.path("kept"), "somebody's").expect("written");
+    for command in [&["identify"][..], &["terminal"], &[]] {
+        let ran = world.run(&[command, &["--port", puppet.port(), "--record", "kept"]].concat(), b"");
+        assert_eq!(ran.code, Some(2), "{command:?}: {}", ran.err);
+        assert!(ran.err.starts_with("axcon: kept exists already\n"), "{command:?}: {}", ran.err);
+    }
+    assert_eq!(fs::read_to_string(world.path("kept")).expect("there"), "somebody's");
+    for command in ["identify", "terminal"] {
+        let ran = world.run(&[command, "--port", puppet.port(), "--record", "no/such/folder/it.cast"], b"");
+        assert_eq!(ran.code, Some(1), "{command}: {}", ran.err);
+        assert!(ran.err.starts_with("axcon: this session is not recorded: no/such/folder/it.cast: "), "{}", ran.err);
+    }
+    assert_eq!(puppet.heard(), b"");
+    let ran = world.run(&["identify", "--port", "emu:axtc4co", "--yes", "--record", "kept"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(!read(&world.path("kept")).0.is_empty());
+}
+
+#[test]
 fn a_killed_program_has_recorded_whatever_it_had_shown() {
     for round in 0..25usize {
         let world = World::new();

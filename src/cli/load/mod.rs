@@ -9,11 +9,12 @@ use serde::Serialize;
 
 use super::error::{CliError, Kind};
 use super::image::{self as image_cli, DefectObject};
+use super::journal::Desk;
 use super::output::Output;
 use super::talk::{Ended, Talk, no_answer_hints};
 use super::{Global, ask, link, password};
 use crate::device::{self, LoaderKind, Product};
-use crate::host::journal::{Journal, Note};
+use crate::host::journal::Note;
 use crate::image::{CheckedImage, DefectId, Report};
 use crate::secret::Secret;
 use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, Phase, UnitNow, UnitState, Verdict};
@@ -54,6 +55,11 @@ pub struct Args {
 /// # Errors
 /// As the exit codes say: see the report.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    if let (Some(file), [_, _, ..]) = (&global.record, global.ports.as_slice()) {
+        let message = format!("several units cannot be recorded to one file, {}", image_cli::shown(file));
+        return Err(CliError::message(Kind::Usage, message)
+            .hint("leave --record away: each upload has its own recording in the state directory"));
+    }
     let name = image_cli::shown(&args.image);
     let expected = args.product.map(|product| product.name.as_str());
     let report = image_cli::read_for(&args.image, &image_cli::targets_with(args.loader), expected, &args.allow)?;
@@ -268,46 +274,6 @@ fn planned(
         next: "run the same command without --dry-run",
         defects: image_cli::defect_objects(report),
     })
-}
-
-/// The journal's part in an upload on one port.
-struct Desk {
-    journal: Option<(Journal, String)>,
-    note: Option<Note>,
-}
-
-impl Desk {
-    fn of(talk: &Talk) -> Self {
-        let journal = link::journal_key(talk.spec()).and_then(|key| Some((Journal::of_user()?, key)));
-        // A loader that erases its flash, or has lost its place in a record, does not say that it is one.
-        let says_nothing = talk.session().facts().state != UnitState::Application;
-        let note = journal.as_ref().filter(|_| says_nothing).and_then(|(journal, key)| journal.note(key));
-        Desk { journal, note }
-    }
-
-    /// What is to be noted of this upload, if anything can be.
-    fn compose(&self, facts: &Facts, product: Option<&str>, image: &str, talk: &Talk) -> Option<Note> {
-        let said = facts.product.as_ref().map(|known| known.value.as_str());
-        let product = said.or(product)?.to_owned();
-        let unix_seconds = talk.calendar().at(talk.now()).as_second();
-        Some(Note { product, image: image.to_owned(), unix_seconds })
-    }
-
-    fn begin(&self, note: Note, output: &mut Output) {
-        let Some((journal, key)) = &self.journal else { return };
-        if let Err(error) = journal.begin(key, note) {
-            output.remark(&format!("axcon: this upload is not noted, so a failed one will want --product: {error}"));
-        }
-    }
-
-    fn end(&self, report: &LoadReport, output: &mut Output) {
-        let Some((journal, key)) = &self.journal else { return };
-        if report.unit == UnitNow::Application
-            && let Err(error) = journal.end(key)
-        {
-            output.remark(&format!("axcon: the note of this upload stays: {error}"));
-        }
-    }
 }
 
 /// The image has errors: report, nothing else.

@@ -105,11 +105,9 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let log = args.log.map(open_log).transpose()?;
     let sending = args.send.as_deref().map(|path| Sending::open(path, args.newline_out)).transpose()?;
     let _signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
+    let plan = link::recording(global)?;
     let connection = link::open(&spec, global, clock, sender.clone())?;
-    let mut recorder = Recorder::start(&link::recording(global), &connection, clock);
-    if let Some(warning) = recorder.take_warning() {
-        output.remark(&warning);
-    }
+    let recorder = link::start_recording(&plan, &connection, clock, output)?;
     let interactive = io::stdin().is_terminal();
     let comeback = Comeback::of(&spec, link::options(global)).filter(|_| interactive);
     if interactive {

@@ -71,7 +71,9 @@ impl Console {
         // open waits for them to be there.
         let leaves = self.take_rest();
         self.close_link();
-        self.recorder = Recorder::start_ahead(&self.world.recording, &connection, self.clock, self.skew);
+        self.sessions += 1;
+        let plan = self.world.recording.of_session(self.sessions);
+        self.recorder = Recorder::start_ahead(&plan, &connection, self.clock, self.skew);
         let recording = self.recorder.path().map(|path| path.display().to_string());
         let options = link::Options { baud: self.world.baud };
         self.comeback = Comeback::of(&spec, options);

@@ -134,6 +134,8 @@ struct Console {
     /// By how much the console's time is ahead of the clock: a recording's time passes in no time.
     skew: Duration,
     recorder: Recorder,
+    /// Links opened so far.
+    sessions: u32,
     /// The program is to be stopped as soon as the effects before that are done.
     suspends: bool,
     /// How the console ends once the unit has been left, where that is not the user's wish.
@@ -169,6 +171,7 @@ impl Console {
             player: None,
             skew: Duration::ZERO,
             recorder: Recorder::nothing(),
+            sessions: 0,
             suspends: false,
             over: None,
         }

@@ -1,5 +1,7 @@
 //! `load`: what is sent, what is refused, and what is said of the unit afterwards.
 
+use rustix::process::Signal;
+
 use super::*;
 
 #[test]
@@ -282,6 +284,15 @@ fn several_units_are_uploaded_to_at_once_and_one_that_fails_disturbs_none() {
     assert!(ran.out.lines().all(|line| line.starts_with("{\"schema\":\"axcon.")), "{}", ran.out);
     let ran = world.run(&["identify", "--port", "u1", "--port", "u2"], b"");
     assert_eq!(ran.code, Some(2), "what works on one unit says so: {}", ran.err);
+    // Two writers would spoil one recording.
+    let ran = world.run(&[&again[..], &["--port", "u1", "--port", "u2", "--record", "both.cast"]].concat(), b"");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("several units cannot be recorded to one file, both.cast"), "{}", ran.err);
+    // Behind the command, --port takes the place of the one before it; a unit would be left without its software.
+    let apart = [&["--port", "u1"], &again[..], &["--port=u2"]].concat();
+    let ran = world.run(&apart, b"");
+    assert_eq!((ran.code, ran.out.as_str()), (Some(2), ""), "{}", ran.err);
+    assert!(ran.err.contains("--port stands both before the command and behind it"), "{}", ran.err);
     drop(emulators);
 }
 
@@ -344,4 +355,19 @@ fn an_upload_that_nobody_answers_leaves_no_note_that_another_unit_would_be_judge
     assert_eq!(ran.code, Some(4), "{}", ran.err);
     let notes = fs::read_to_string(bench.world.path("state/axcon/uploads.json")).unwrap_or_default();
     assert!(!notes.contains("u1"), "{notes}");
+}
+
+#[test]
+fn what_a_killed_upload_has_left_is_said_by_whoever_identifies_the_unit() {
+    let bench = Bench::new();
+    let loading = bench.world.start(&["load", "new.S", "--yes", "--password-file", "pw", "--json", "--port", "u0"]);
+    loading.wait_out(r#""phase":"transfer""#);
+    loading.signal(Signal::KILL);
+    loading.wait();
+    let said = "an upload of new.S to the AXTC4CO on this port has not ended well";
+    let left = bench.run(&["identify", "--json"]);
+    assert!(left.err.contains(said), "{}", left.err);
+    assert_eq!(bench.load("new.S", &[]).code, Some(0));
+    let saved = bench.run(&["identify", "--json"]);
+    assert_eq!((saved.code, saved.err.as_str()), (Some(0), ""));
 }
