@@ -219,7 +219,12 @@ impl Session {
         let pages = self.job() == Some(Job::Diagnostics) || self.dialogue.shows_pages(self.dated);
         let origin = if asked { Origin::Menu } else { Origin::Banner };
         self.counted = *message == Message::Text && !self.dialogue.owns(self.dated, &text.text);
+        let identifies = self.job() == Some(Job::Identify);
         let facts = &mut self.facts;
+        // Who is asked for right now is decided when all of the answer has come.
+        if facts.state == UnitState::Silent && !identifies {
+            facts.state = UnitState::Unknown;
+        }
         match message {
             Message::Text => facts.unrecognised_lines += u64::from(self.counted),
             Message::Refusal | Message::Prompt(_) => {}

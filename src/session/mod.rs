@@ -180,9 +180,10 @@ impl Session {
             }
             Command::Keys(keys) => return self.keys(&keys),
             Command::Bytes(bytes) => return self.bytes(&bytes),
-            Command::SendFile(_) if self.password_open() => return Err(Refusal::PasswordOpen),
-            Command::SendFile(_) if self.held_since().is_some() && self.waiting() > 0 => return Err(Refusal::Held),
-            Command::SendFile(bytes) => (Job::SendFile, Box::new(sending::SendFile::new(bytes))),
+            Command::SendFile(bytes) => {
+                self.may_send_file()?;
+                (Job::SendFile, Box::new(sending::SendFile::new(bytes)))
+            }
             Command::Identify => (Job::Identify, Box::new(identify::Identify::default())),
             Command::StreamOn { source, period } => {
                 if !(Duration::from_millis(1)..=Duration::from_secs(60)).contains(&period) {
@@ -301,6 +302,18 @@ impl Session {
     /// Whether the unit is asking for the password: what is typed now is secret.
     pub fn password_open(&self) -> bool {
         self.password_asked || self.echo_is_secret
+    }
+
+    /// Whether a file can be sent as it is.
+    ///
+    /// # Errors
+    /// While the unit asks for its password, or holds what waits already.
+    pub fn may_send_file(&self) -> Result<(), Refusal> {
+        match () {
+            () if self.password_open() => Err(Refusal::PasswordOpen),
+            () if self.held_since().is_some() && self.waiting() > 0 => Err(Refusal::Held),
+            () => Ok(()),
+        }
     }
 
     /// Whether all that was typed since the last Enter can be keys of the menu. An `l` in a word is none.

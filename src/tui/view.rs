@@ -365,6 +365,10 @@ impl View {
             facts.version.as_ref().filter(|known| known.origin == Origin::Banner).map(|known| known.span)
         };
         let has_started = banner(facts).is_some() && banner(facts) != banner(&self.facts);
+        let nobody = |notice: &Notice| notice.text == NOBODY;
+        if facts.state != UnitState::Silent && self.notice.as_ref().is_some_and(nobody) {
+            self.notice = None;
+        }
         let was_loader = self.facts.state == UnitState::Loader && facts.state != UnitState::Loader;
         if has_started || was_loader {
             self.monitor.stream.interrupt();
@@ -461,7 +465,7 @@ impl View {
     fn identified(&mut self) {
         let version = self.facts.version.as_ref().map(|known| format!(" {}", known.value)).unwrap_or_default();
         match (self.facts.state, &self.facts.product) {
-            (UnitState::Silent, _) => self.tell(Tone::Bad, "Nobody has answered: check power, cable and port."),
+            (UnitState::Silent, _) => self.tell(Tone::Bad, NOBODY),
             (UnitState::Loader, _) => {
                 let which =
                     self.noted().map_or_else(String::new, |noted| format!(", an {} by our notes,", noted.product));
@@ -477,6 +481,9 @@ impl View {
         }
     }
 }
+
+/// What is told of a unit that says nothing, until it says something.
+const NOBODY: &str = "Nobody has answered: check power, cable and port.";
 
 /// What a job was about, to follow "No answer: waited for ...,".
 pub fn doing(job: Job) -> &'static str {

@@ -32,13 +32,15 @@ impl App {
         if !self.can_send() {
             return false;
         }
-        match self.view.job.filter(|job| *job != Job::Identify) {
-            Some(job) => {
-                self.view.tell(Tone::Bad, format!("Not sent: axcon is still {}. A file goes alone.", doing(job)));
-                false
-            }
-            None => true,
-        }
+        let job = self.view.job.filter(|job| *job != Job::Identify);
+        let refusal = self.session.as_ref().and_then(|session| session.may_send_file().err());
+        let why = match (job, refusal) {
+            (Some(job), _) => format!("axcon is still {}. A file goes alone", doing(job)),
+            (None, Some(refusal)) => refusal.to_string(),
+            (None, None) => return true,
+        };
+        self.view.tell(Tone::Bad, format!("Not sent: {why}."));
+        false
     }
 
     /// A file that the unit shall get has been read: that is asked once more, since nothing of it can be taken back.

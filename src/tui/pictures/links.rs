@@ -120,6 +120,16 @@ fn a_view_opened_by_a_typed_key_is_asked_about_on_every_way_out_and_closed() {
 }
 
 #[test]
+fn nobody_is_there_only_until_somebody_says_something() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0").wait(5_000);
+    assert!(stage.shows("Nobody has answered"), "{}", stage.picture());
+    stage.bytes(b"Supply voltage 24.1 V\r\n");
+    assert!(!stage.shows("Nobody has answered") && !stage.shows("nothing heard yet"), "{}", stage.picture());
+    assert!(stage.shows("talks, in words not known"), "{}", stage.picture());
+}
+
+#[test]
 fn a_silent_unit_holds_a_signal_for_two_seconds_and_q_for_none() {
     let reading = || {
         let mut stage = Stage::connected(SMALL);
@@ -185,4 +195,21 @@ fn a_link_that_takes_long_to_open_is_given_up_by_esc() {
     assert_eq!(stage.asked(), [Effect::CloseLink]);
     stage.press(KeyCode::Down).press(KeyCode::Enter);
     assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB1".into())], "another can be chosen");
+}
+
+#[test]
+fn a_unit_without_a_name_shows_the_channels_of_its_diagnostics_as_they_are_named() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0");
+    let menu = String::from_utf8_lossy(MENU).replace("AXTC4CO V1.1.0", "Scanner");
+    stage.bytes(menu.as_bytes()).wait(3_000).keys("s").wait(2_000);
+    for channel in 1..=8 {
+        stage.bytes(format!(" RTD{channel} {channel}1.5 C raw 1{channel}9.7 ohm\r\n").as_bytes());
+    }
+    stage.wait(2_000).keys("2");
+    let picture = stage.picture();
+    assert!(!picture.contains("AXRTD8CO"), "{picture}");
+    for channel in 1..=8 {
+        assert!(picture.contains(&format!("RTD{channel}       {channel}1.5 °C")), "{picture}");
+    }
 }

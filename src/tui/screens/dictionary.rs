@@ -237,7 +237,7 @@ impl Dictionary {
         };
         let widths = Widths::of(&rows, &factory, self.other.is_some(), columns);
         let mut heads = format!(
-            "    {}{} {} {} ",
+            "    {}{} {}  {} ",
             format::left("Address", 9),
             format::left("Name", widths.name),
             format::left("Value", widths.value),
@@ -360,11 +360,14 @@ impl Widths {
         let value = widest("Value", &mut rows.iter().map(|row| row.cell(most_value))).min(most_value);
         let factory = widest(factory, &mut rows.iter().map(Row::other)).min(most_factory);
         let meaning = columns >= MEANING_AT;
-        let taken = FIXED_COLUMNS + value + factory + 3 + if meaning { MEANING_COLUMNS } else { 0 };
+        let taken =
+            FIXED_COLUMNS + value + factory + 2 + VALUES_APART.len() + if meaning { MEANING_COLUMNS } else { 0 };
         Widths { name: columns.saturating_sub(taken), value, factory, meaning }
     }
 }
 
+/// What stands between two values, which may be of many words.
+const VALUES_APART: &str = "  ";
 /// Columns of a heading's rule beside its texts, and of the blank in its title.
 const RULE_COLUMNS: usize = 11;
 
@@ -462,7 +465,7 @@ impl Row<'_> {
             Span::raw(format::left(&format::keep_ends(&self.name(), widths.name), widths.name)),
             Span::raw(" "),
             Span::styled(format::left(&value, widths.value), value_style),
-            Span::raw(" "),
+            Span::raw(VALUES_APART),
             Span::styled(format::left(&self.other(), widths.factory), theme.quiet()),
             Span::raw(" "),
         ]);

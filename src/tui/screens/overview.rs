@@ -300,30 +300,33 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     shown
 }
 
-/// The channels' temperatures on the newest page of diagnostics: without a stream they are all there is to know.
-fn diagnosed_values(scene: Scene, columns: u16) -> Vec<Line<'static>> {
-    let diagnostics = &scene.view.monitor.diagnostics;
-    let Some(at) = diagnostics.at else { return Vec::new() };
+/// A channel's temperature on the newest page of diagnostics.
+fn diagnosed_value(scene: Scene, name: &str) -> Option<String> {
     let is_celsius = |found: &&Tracked| found.unit.as_deref().is_some_and(|unit| matches!(unit, "C" | "°C" | "degC"));
-    let value = |name: &str| {
-        let found = diagnostics.found.iter().filter(is_celsius).find(|found| found.label == name)?;
-        Some(format!("{} °C", found.text(found.value?)))
-    };
-    // A unit that has not said what it is gives itself away by its channels.
+    let found = scene.view.monitor.diagnostics.found.iter().filter(is_celsius).find(|found| found.label == name)?;
+    Some(format!("{} °C", found.text(found.value?)))
+}
+
+/// The channels of the unit. One that has not said what it is gives itself away by those that it diagnoses.
+fn diagnosed_channels(scene: Scene) -> &'static [String] {
     let has_most = |product: &&Product| {
         let names = &product.stream.channels;
-        names.iter().filter(|name| value(name).is_some()).count() * 2 > names.len()
+        names.iter().filter(|name| diagnosed_value(scene, name).is_some()).count() * 2 > names.len()
     };
-    let Some(product) = scene.view.product().or_else(|| Product::all().iter().find(has_most)) else {
-        return Vec::new();
-    };
-    let names = product.stream.channels.iter();
-    let cells: Vec<String> = names.filter_map(|name| Some(format!("  {name:<6}{:>12}", value(name)?))).collect();
+    let product = scene.view.product().or_else(|| Product::all().iter().find(has_most));
+    product.map_or(&[], |product| &product.stream.channels)
+}
+
+/// The channels' temperatures on the newest page of diagnostics: without a stream they are all there is to know.
+fn diagnosed_values(scene: Scene, columns: u16) -> Vec<Line<'static>> {
+    let Some(at) = scene.view.monitor.diagnostics.at else { return Vec::new() };
+    let cell = |name: &String| Some(format!("  {name:<6}{:>12}", diagnosed_value(scene, name)?));
+    let cells: Vec<String> = diagnosed_channels(scene).iter().filter_map(cell).collect();
     let time = format::time_of_day(scene.start_of_day, at);
     let heading = format!("  On the diagnostics' last page, {time}:");
     let heading = (!cells.is_empty()).then(|| Line::styled(heading, scene.theme.quiet()));
     let in_a_row = (usize::from(columns) / DIAGNOSED_COLUMNS).max(1);
-    let rows = cells.chunks(in_a_row).map(|row| Line::styled(format!("  {}", row.concat()), scene.theme.quiet()));
+    let rows = cells.chunks(in_a_row).map(|row| Line::styled(row.concat(), scene.theme.quiet()));
     heading.into_iter().chain(rows).collect()
 }
 
@@ -333,7 +336,7 @@ fn diagnosed(scene: Scene, columns: u16) -> Option<Line<'static>> {
     let at = view.monitor.diagnostics.at?;
     let of_channel =
         |label: &str| view.monitor.stream.channels.iter().any(|channel| label.starts_with(channel.name.as_str()));
-    let known = view.product().map(|product| product.stream.channels.as_slice()).unwrap_or_default();
+    let known = diagnosed_channels(scene);
     let said =
         view.monitor.diagnostics.found.iter().filter(|found| {
             !of_channel(&found.label) && !known.iter().any(|name| found.label.starts_with(name.as_str()))

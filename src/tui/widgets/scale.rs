@@ -9,6 +9,9 @@ const MARGIN: f64 = 0.05;
 /// Blanks between two times at least.
 const BLANKS: usize = 4;
 
+/// Seconds in a day.
+const DAY: u64 = 86_400;
+
 const MILLISECOND: u64 = 1;
 const SECOND: u64 = 1000 * MILLISECOND;
 const MINUTE: u64 = 60 * SECOND;
@@ -98,12 +101,18 @@ fn multiples(step: f64, low: f64, high: f64) -> Vec<f64> {
 }
 
 /// The round times of day from `from` to `to` that have room for a label in `columns` columns, each with its label;
-/// `start` is the time of day at the start of time.
+/// `start` is the time of day at the start of time. A midnight says how many days later it is: `00:00 +1d`.
 pub fn times(start: Duration, from: Instant, to: Instant, columns: u16) -> Vec<(Instant, String)> {
     let span = to.since(from).as_millis().max(1);
+    let widest = |step: u64| {
+        let midnight = start + to.since_start();
+        let midnight = Duration::from_secs(midnight.as_secs() / DAY * DAY);
+        let of_midnight = if midnight >= start + from.since_start() { time_label(midnight, step).len() } else { 0 };
+        time_label(Duration::ZERO, step).len().max(of_midnight)
+    };
     let has_room = |step: &u64| {
         let room = u128::from(columns) * u128::from(*step) / span;
-        room >= (time_label(Duration::ZERO, *step).len() + BLANKS) as u128
+        room >= (widest(*step) + BLANKS) as u128
     };
     // A scale over days has its labels at midnight, every so many of them.
     let days = (1..12).map(|doublings| (24 * HOUR) << doublings);
@@ -111,20 +120,21 @@ pub fn times(start: Duration, from: Instant, to: Instant, columns: u16) -> Vec<(
     let nanos = u128::from(step) * 1_000_000;
     let begin = (start + from.since_start()).as_nanos().div_ceil(nanos) * nanos;
     let at = |number: u128| {
-        let of_day = Duration::from_nanos(u64::try_from(begin + number * nanos).unwrap_or(u64::MAX));
-        (Instant::ZERO + of_day.saturating_sub(start), time_label(of_day, step))
+        let time = Duration::from_nanos(u64::try_from(begin + number * nanos).unwrap_or(u64::MAX));
+        (Instant::ZERO + time.saturating_sub(start), time_label(time, step))
     };
     (0..u128::from(columns)).map(at).take_while(|(at, _)| *at <= to).collect()
 }
 
-/// A time of day, as finely as the step between two of them needs it.
-fn time_label(of_day: Duration, step: u64) -> String {
-    let seconds = of_day.as_secs() % 86_400;
+/// A time since the first midnight, as finely as the step between two of them needs it.
+fn time_label(time: Duration, step: u64) -> String {
+    let (days, seconds) = (time.as_secs() / DAY, time.as_secs() % DAY);
     let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
     match step {
+        HOUR.. if days > 0 && time.as_secs() % DAY == 0 => format!("00:00 +{days}d"),
         MINUTE.. => format!("{hours:02}:{minutes:02}"),
         SECOND.. => format!("{hours:02}:{minutes:02}:{seconds:02}"),
-        _ => format!("{hours:02}:{minutes:02}:{seconds:02}.{}", of_day.subsec_millis() / 100),
+        _ => format!("{hours:02}:{minutes:02}:{seconds:02}.{}", time.subsec_millis() / 100),
     }
 }
 
@@ -165,7 +175,10 @@ mod tests {
         assert_eq!(shown(33_000, 93_000, 70), "12:00:45 12:01:00 12:01:15 12:01:30");
         assert_eq!(shown(0, 3_600_000, 70), "12:00 12:10 12:20 12:30 12:40 12:50 13:00");
         assert_eq!(shown(0, 1000, 70), "12:00:00.0 12:00:00.2 12:00:00.4 12:00:00.6 12:00:00.8 12:00:01.0");
-        assert_eq!(shown(0, 3 * 86_400_000, 70), "12:00 00:00 12:00 00:00 12:00 00:00 12:00");
+        assert_eq!(shown(0, 43_200_000, 70), "12:00 15:00 18:00 21:00 00:00 +1d");
+        assert_eq!(shown(0, 3 * 86_400_000, 100), "12:00 00:00 +1d 12:00 00:00 +2d 12:00 00:00 +3d 12:00");
+        assert_eq!(shown(0, 3 * 86_400_000, 70), "00:00 +1d 00:00 +2d 00:00 +3d");
+        assert_eq!(shown(86_400_000, 90_000_000, 70), "12:00 12:10 12:20 12:30 12:40 12:50 13:00");
         assert_eq!(shown(0, 60_000, 5), "12:00", "there is room for one");
         assert_eq!(shown(0, 60_000, 0), "");
     }

@@ -75,6 +75,18 @@ fn a_file_goes_alone_and_not_over_a_link_that_is_gone() {
 }
 
 #[test]
+fn no_file_is_offered_to_a_unit_that_waits_for_its_password() {
+    let mut desk = Desk::new();
+    desk.keys("3").key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("3l");
+    desk.run(Duration::from_secs(1));
+    desk.sent.clear();
+    desk.key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("f");
+    let told = desk.picture();
+    assert!(told.contains("Not sent: the unit asks for a password") && !told.contains("Send a file"), "{told}");
+    assert!(desk.sent.is_empty());
+}
+
+#[test]
 fn a_password_in_a_file_is_recorded_by_its_number_only() {
     let mut desk = Desk::new();
     send_file(&mut desk, "load.txt", b"lAXIO-2010\r", "y").run(Duration::from_secs(3));
