@@ -131,7 +131,7 @@ fn time_label(time: Duration, step: u64) -> String {
     let (days, seconds) = (time.as_secs() / DAY, time.as_secs() % DAY);
     let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
     match step {
-        HOUR.. if days > 0 && time.as_secs() % DAY == 0 => format!("00:00 +{days}d"),
+        HOUR.. if days > 0 && time.as_secs().is_multiple_of(DAY) => format!("00:00 +{days}d"),
         MINUTE.. => format!("{hours:02}:{minutes:02}"),
         SECOND.. => format!("{hours:02}:{minutes:02}:{seconds:02}"),
         _ => format!("{hours:02}:{minutes:02}:{seconds:02}.{}", time.subsec_millis() / 100),

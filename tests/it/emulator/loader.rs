@@ -7,40 +7,10 @@ use axcon::rng::Rng;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::version::Version;
 
+use super::sender::{S0, S7, data_records, file, s3, send_obeying, talk_over, upload, without_flow_control};
 use super::{BAUD, Bench, flash_with, old_program, product, program, setup};
 
-pub(super) const S0: &str = "S0110000000050524F4752414D264441544196\r";
-pub(super) const S7: &str = "S70500000000FA\r";
 pub(super) const PROMPT: &str = "Waiting for application S-Record.\r\n";
-/// Data bytes of one record, as CodeWarrior writes them.
-const RECORD_BYTES: usize = 32;
-/// Longer than anything the loader does between two characters of its own.
-const PATIENCE: Duration = Duration::from_secs(1);
-
-/// An S3 record with a CR behind it.
-pub(super) fn s3(address: u32, data: &[u8]) -> String {
-    let mut bytes = vec![(data.len() + 5) as u8];
-    bytes.extend(address.to_be_bytes());
-    bytes.extend(data);
-    let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
-    bytes.push(!sum);
-    let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
-    format!("S3{digits}\r")
-}
-
-/// S3 records for a whole program, words from address 0 on.
-pub(super) fn data_records(program: &[u8], bytes: usize) -> Vec<String> {
-    let numbered = program.chunks(bytes).enumerate();
-    numbered.map(|(number, data)| s3((number * bytes / 2) as u32, data)).collect()
-}
-
-/// A complete file.
-pub(super) fn file(program: &[u8]) -> Vec<String> {
-    let mut records = vec![S0.to_owned()];
-    records.extend(data_records(program, RECORD_BYTES));
-    records.push(S7.to_owned());
-    records
-}
 
 pub(super) fn new_program() -> Vec<u8> {
     program("AXTC4CO", Version::new(1, 3, 0), 1500)
@@ -56,48 +26,6 @@ fn in_loader() -> Bench {
 pub(super) fn enter_loader(bench: &mut Bench) {
     let text = bench.keys(b"lAXIO-2010\r");
     assert!(text.ends_with(PROMPT), "{text}");
-}
-
-/// A sender that obeys: after XOFF nothing but the character on its way, before S7 it waits until the loader is idle.
-/// Ends with the file, with a unit that stays silent for [`PATIENCE`] while it holds, or at `until`.
-pub(super) fn send_obeying(bench: &mut Bench, records: &[String], until: Instant) {
-    let character = character_time(BAUD);
-    for record in records {
-        if record.starts_with("S7") {
-            bench.run_ms(1);
-        }
-        for byte in record.bytes() {
-            let give_up = bench.now + PATIENCE;
-            while bench.is_stopped() && bench.now < give_up {
-                bench.run(Duration::from_micros(100));
-            }
-            if bench.now >= until {
-                return;
-            }
-            bench.send(&[byte]);
-            bench.run(character);
-        }
-    }
-}
-
-/// Sends and gives what the unit has said until half a second later.
-pub(super) fn upload(bench: &mut Bench, records: &[String]) -> String {
-    send_obeying(bench, records, Instant::NEVER);
-    bench.run_ms(500);
-    bench.take()
-}
-
-/// Sends without any regard for what the unit says.
-pub(super) fn talk_over(bench: &mut Bench, text: &str) -> String {
-    bench.send(text.as_bytes());
-    let time = Duration::from_micros(87) * text.len() as u32;
-    bench.run(time);
-    bench.run_ms(500);
-    bench.take()
-}
-
-pub(super) fn without_flow_control(text: &str) -> String {
-    text.replace(['\x11', '\x13'], "")
 }
 
 // B-212, B-213
@@ -367,7 +295,7 @@ fn a_sender_that_goes_on_after_an_error_causes_a_cascade_with_an_end() {
 fn a_record_still_parked_at_s7_is_lost_and_success_is_reported() {
     let mut bench = in_loader();
     let page: Vec<u8> = vec![0x5A; 512];
-    let mut text = S0.to_owned() + &data_records(&page, RECORD_BYTES).concat();
+    let mut text = S0.to_owned() + &data_records(&page, 32).concat();
     text += &s3(0x1000, &[1, 2, 3, 4]);
     text += S7;
     let said = without_flow_control(&talk_over(&mut bench, &text));
@@ -491,17 +419,7 @@ pub(super) fn cut_and_save(loader: LoaderKind, seed: u64, send: impl FnOnce(&mut
     bench.run_ms(20);
     bench.take();
 
-    // A host that died with the power finds the same memory in its files.
-    let (flash, parameters) = (bench.unit().flash().to_vec(), bench.unit().parameters().to_vec());
-    let mut files = (flash_with(&old), vec![0xFF; parameters.len()]);
-    while let Some(store) = bench.unit().poll_store() {
-        let file = match store.area {
-            Area::Flash => &mut files.0,
-            Area::Parameters => &mut files.1,
-        };
-        file[store.offset..store.offset + store.bytes.len()].copy_from_slice(&store.bytes);
-    }
-    assert!(files == (flash.clone(), parameters.clone()), "seed {seed}");
+    let (flash, parameters) = bench.memories_without_power(flash_with(&old));
 
     let mut bench = Bench::new(Setup { seed, loader, flash, parameters, ..setup(Vec::new()) });
     bench.run_ms(500);
@@ -531,17 +449,20 @@ fn a_second_upload_saves_a_unit_cut_off_behind_any_seventh_record() {
     }
 }
 
+/// The same, cut off at a moment that the seed says.
+pub(super) fn cut_and_save_at_any_moment(loader: LoaderKind, seed: u64) {
+    let at = Duration::from_micros(Rng::new(seed).below(450_000));
+    cut_and_save(loader, seed, |bench, file| {
+        let until = bench.now + at;
+        send_obeying(bench, file, until);
+        let rest = until.since(bench.now);
+        bench.run(rest);
+    });
+}
+
 #[test]
 fn a_second_upload_saves_a_unit_cut_off_at_any_moment() {
-    for seed in 0..200 {
-        let at = Duration::from_micros(Rng::new(seed).below(450_000));
-        cut_and_save(LoaderKind::G1, seed, |bench, file| {
-            let until = bench.now + at;
-            send_obeying(bench, file, until);
-            let rest = until.since(bench.now);
-            bench.run(rest);
-        });
-    }
+    (0..200).for_each(|seed| cut_and_save_at_any_moment(LoaderKind::G1, seed));
 }
 
 #[test]

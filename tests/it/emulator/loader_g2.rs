@@ -3,14 +3,11 @@
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::memory::{Defect, StartDelay};
 use axcon::emulator::{Running, Setup};
-use axcon::rng::Rng;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::version::Version;
 
-use super::loader::{
-    PROMPT, S0, S7, cut_and_save, data_records, enter_loader, file, new_program, s3, send_obeying, talk_over, upload,
-    without_flow_control,
-};
+use super::loader::{PROMPT, cut_and_save_at_any_moment, enter_loader, new_program};
+use super::sender::{S0, S7, data_records, file, s3, send_obeying, talk_over, upload, without_flow_control};
 use super::{BAUD, Bench, flash_with, old_program, program, setup};
 
 fn g2(flash: Vec<u8>) -> Bench {
@@ -246,15 +243,7 @@ fn an_upload_that_has_begun_keeps_the_unit_in_its_loader() {
 
 #[test]
 fn a_second_upload_saves_a_unit_cut_off_at_any_moment() {
-    for seed in 0..100 {
-        let at = Duration::from_micros(Rng::new(seed).below(450_000));
-        cut_and_save(LoaderKind::G2, seed, |bench, file| {
-            let until = bench.now + at;
-            send_obeying(bench, file, until);
-            let rest = until.since(bench.now);
-            bench.run(rest);
-        });
-    }
+    (0..100).for_each(|seed| cut_and_save_at_any_moment(LoaderKind::G2, seed));
 }
 
 #[test]

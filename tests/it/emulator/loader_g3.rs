@@ -3,15 +3,14 @@
 
 use axcon::device::{LoaderKind, Product, RING};
 use axcon::emulator::memory::{Defect, StartDelay};
-use axcon::emulator::{Area, Running, Setup};
+use axcon::emulator::{Running, Setup};
 use axcon::rng::Rng;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::version::Version;
 
+use super::sender::{S0, S7, file, record, s3, send_obeying, talk_over, upload, without_flow_control};
 use super::{BAUD, Bench, XOFF, XON, program};
 
-const S0: &str = "S0110000000050524F4752414D264441544196\r";
-const S7: &str = "S70500000000FA\r";
 const HEADER: &str = "\r\n56F83xx Serial Bootloader v2.0\r\nHit any key to continue ";
 const PROMPT: &str = "Waiting for application S-Record\r\n";
 const LOADED: &str = "S-File has been loaded successfully\r\n";
@@ -19,8 +18,6 @@ const LOADED: &str = "S-File has been loaded successfully\r\n";
 const ERASE: Duration = Duration::from_millis(10_240);
 /// Words erased together.
 const SECTOR: u32 = 512;
-/// Longer than the loader holds anybody.
-const PATIENCE: Duration = Duration::from_secs(15);
 
 fn rtd8() -> &'static Product {
     Product::named("AXRTD8CO").expect("built in")
@@ -42,32 +39,6 @@ fn old_program() -> Vec<u8> {
 
 fn new_program() -> Vec<u8> {
     program("AXRTD8CO", Version::new(2, 2, 0), 1500)
-}
-
-/// A record of a type, with a CR behind it.
-fn record(digit: u8, address: u32, data: &[u8]) -> String {
-    let mut bytes = vec![(data.len() + 5) as u8];
-    bytes.extend(address.to_be_bytes());
-    bytes.extend(data);
-    let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
-    bytes.push(!sum);
-    let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
-    format!("S{digit}{digits}\r")
-}
-
-fn s3(address: u32, data: &[u8]) -> String {
-    record(3, address, data)
-}
-
-/// A complete file with records of so many data bytes.
-fn file_of(program: &[u8], bytes: usize) -> Vec<String> {
-    let numbered = program.chunks(bytes).enumerate();
-    let data = numbered.map(|(number, data)| s3((number * bytes / 2) as u32, data));
-    [S0.to_owned()].into_iter().chain(data).chain([S7.to_owned()]).collect()
-}
-
-fn file(program: &[u8]) -> Vec<String> {
-    file_of(program, 32)
 }
 
 fn at_menu() -> Bench {
@@ -95,38 +66,6 @@ fn press_key(bench: &mut Bench) {
     assert!(text.ends_with(PROMPT), "{text}");
 }
 
-/// A sender that obeys like a terminal program: after XOFF nothing but the character on its way. Ends with the file,
-/// with a unit that holds it longer than [`PATIENCE`], or at `until`.
-fn send_obeying(bench: &mut Bench, records: &[String], until: Instant) {
-    let character = character_time(BAUD);
-    for byte in records.concat().bytes() {
-        let give_up = bench.now + PATIENCE;
-        while bench.is_stopped() && bench.now < give_up && bench.now < until {
-            bench.run(Duration::from_micros(100));
-        }
-        if bench.now >= until {
-            return;
-        }
-        bench.send(&[byte]);
-        bench.run(character);
-    }
-}
-
-/// Sends and gives what the unit has said until half a second later.
-fn upload(bench: &mut Bench, records: &[String]) -> String {
-    send_obeying(bench, records, Instant::NEVER);
-    bench.run_ms(500);
-    bench.take()
-}
-
-/// Sends without any regard for what the unit says.
-fn talk_over(bench: &mut Bench, text: &str) -> String {
-    bench.send(text.as_bytes());
-    bench.run(Duration::from_micros(87) * text.len() as u32);
-    bench.run_ms(500);
-    bench.take()
-}
-
 /// A loader that has erased and waits for data.
 fn erased() -> Bench {
     let mut bench = in_loader();
@@ -134,10 +73,6 @@ fn erased() -> Bench {
     bench.run(ERASE + Duration::from_millis(100));
     bench.take();
     bench
-}
-
-fn without_flow_control(text: &str) -> String {
-    text.replace(['\x11', '\x13'], "")
 }
 
 fn complaint(bits: &str) -> String {
@@ -480,17 +415,7 @@ fn cut_and_save(seed: u64, at: Duration) {
     bench.run_ms(20);
     bench.take();
 
-    // A host that died with the power finds the same memory in its files.
-    let (flash, parameters) = (bench.unit().flash().to_vec(), bench.unit().parameters().to_vec());
-    let mut files = (flash_with(&old), vec![0xFF; parameters.len()]);
-    while let Some(store) = bench.unit().poll_store() {
-        let file = match store.area {
-            Area::Flash => &mut files.0,
-            Area::Parameters => &mut files.1,
-        };
-        file[store.offset..store.offset + store.bytes.len()].copy_from_slice(&store.bytes);
-    }
-    assert!(files == (flash.clone(), parameters.clone()), "seed {seed}");
+    let (flash, parameters) = bench.memories_without_power(flash_with(&old));
 
     let mut bench = Bench::new(Setup { seed, flash, parameters, ..setup(Vec::new()) });
     bench.run(Duration::from_secs(12));

@@ -6,12 +6,13 @@ mod loader;
 mod loader_g2;
 mod loader_g3;
 mod rtd;
+mod sender;
 
 use axcon::canopen::{ObjectAddress, Value};
 use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
 use axcon::emulator::knob::Knob;
-use axcon::emulator::{NmtCommand, Refusal, Setup, Unit};
+use axcon::emulator::{Area, NmtCommand, Refusal, Setup, Unit};
 use axcon::image::Identity;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::version::Version;
@@ -143,6 +144,22 @@ impl Bench {
         let now = self.now;
         self.unit().power_off(now);
         self.plugged.to_unit_mut().clear();
+    }
+
+    /// Flash and parameters of a unit that has lost its power; its flash was like this when it got it. A host that died
+    /// with the power has the same memories in its files.
+    fn memories_without_power(&mut self, began_with: Vec<u8>) -> (Vec<u8>, Vec<u8>) {
+        let memories = (self.unit().flash().to_vec(), self.unit().parameters().to_vec());
+        let mut files = (began_with, vec![0xFF; memories.1.len()]);
+        while let Some(store) = self.unit().poll_store() {
+            let file = match store.area {
+                Area::Flash => &mut files.0,
+                Area::Parameters => &mut files.1,
+            };
+            file[store.offset..store.offset + store.bytes.len()].copy_from_slice(&store.bytes);
+        }
+        assert!(files == memories, "a write is missing from the files, or was never made");
+        memories
     }
 
     fn run(&mut self, time: Duration) {
