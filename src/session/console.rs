@@ -3,12 +3,12 @@
 //! Questions are answered by what they offer. Where a question is not understood the job leaves the dialogue, with
 //! Enter and no answer, and says what it was waiting for; it never guesses.
 
-use super::event::{Job, Outcome};
+use super::event::{Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
-use crate::wire::{Message, Prompt, SourceKeys};
+use crate::wire::{Message, Prompt, SourceKeys, Text};
 
 /// How long a unit may take to ask or to answer.
 const ANSWER: Duration = Duration::from_millis(1500);
@@ -20,6 +20,8 @@ const NO_QUESTION: Duration = Duration::from_millis(400);
 const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
 /// How often T is pressed to switch the stream off: it may be lost on the line.
 const MOST_TOGGLES: u32 = 3;
+/// How long behind the repetition time the unit may refuse it, or ask for it once more.
+const TAKEN: Duration = Duration::from_millis(600);
 /// No values come for 3 s after power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO): rows may take that long.
 const FIRST_VALUES: Duration = Duration::from_secs(6);
 /// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
@@ -34,6 +36,8 @@ pub(super) struct StreamOn {
     stage: OnStage,
     deadline: Option<Instant>,
     heard: Option<Span>,
+    /// The question for the repetition time: many a unit names in it what it takes.
+    question: Option<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,13 +46,16 @@ enum OnStage {
     Toggled,
     /// The key for the source is out.
     Source { enter_sent: bool },
-    /// The period is out.
-    Period,
+    /// The period is out; whether the unit has asked for it once more.
+    Period { again: bool },
+    /// Nobody has refused it: the stream is on, and its first row proves that.
+    Row,
 }
 
 impl StreamOn {
     pub(super) fn new(source: Source, period: Duration) -> Self {
-        StreamOn { source, period, was_on: false, stage: OnStage::Toggled, deadline: None, heard: None }
+        let stage = OnStage::Toggled;
+        StreamOn { source, period, was_on: false, stage, deadline: None, heard: None, question: None }
     }
 
     fn toggle(&mut self, desk: &mut Desk<'_>) {
@@ -57,7 +64,8 @@ impl StreamOn {
         self.deadline = Some(desk.now + ANSWER);
     }
 
-    fn heard(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
+    fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.heard = Some(text.span);
         match (self.stage, message) {
             (OnStage::Toggled, Message::Prompt(Prompt::Source(keys))) => {
                 desk.send(key_for(self.source, *keys).encode_utf8(&mut [0; 4]).as_bytes());
@@ -66,8 +74,12 @@ impl StreamOn {
             }
             (OnStage::Source { .. } | OnStage::Toggled, Message::Prompt(Prompt::Period)) => {
                 desk.send(format!("{}\r", self.period.as_millis()).as_bytes());
-                self.stage = OnStage::Period;
-                self.deadline = Some(desk.now + FIRST_VALUES + self.period * 2);
+                self.question = Some(text.text.trim().to_owned());
+                self.stage = OnStage::Period { again: false };
+                self.deadline = Some(desk.now + TAKEN);
+            }
+            (OnStage::Period { .. }, Message::Prompt(Prompt::Period)) => {
+                self.stage = OnStage::Period { again: true };
             }
             (OnStage::Toggled, Message::Prompt(_)) => return Some(self.give_up(desk)),
             (OnStage::Toggled, Message::Row(_)) => {}
@@ -75,13 +87,10 @@ impl StreamOn {
                 let soon = desk.now + NO_QUESTION;
                 self.deadline = self.deadline.map(|deadline| deadline.min(soon));
             }
-            (OnStage::Period, Message::Row(row)) if row.source == self.source => {
+            (OnStage::Period { .. } | OnStage::Row, Message::Row(row)) if row.source == self.source => {
                 return Some(Outcome::StreamRuns { was_on: self.was_on });
             }
-            (OnStage::Period, Message::Refusal) => {
-                let reason = "the unit did not take the repetition time".into();
-                return Some(Outcome::Refused { job: Job::StreamOn, reason, heard: self.heard });
-            }
+            (OnStage::Period { .. } | OnStage::Row, Message::Refusal) => return Some(self.refused(desk)),
             _ => {}
         }
         None
@@ -100,17 +109,44 @@ impl StreamOn {
                 self.deadline = Some(desk.now + ANSWER);
                 None
             }
-            OnStage::Toggled | OnStage::Source { enter_sent: true } | OnStage::Period => Some(self.give_up(desk)),
+            OnStage::Period { again: true } if desk.pending.is_some() => {
+                desk.leave_dialogue();
+                Some(self.refused(desk))
+            }
+            OnStage::Period { .. } => {
+                desk.facts.stream = Some(self.source);
+                desk.events.push_back(Event::FactsChanged);
+                self.stage = OnStage::Row;
+                self.deadline = Some(desk.now + FIRST_VALUES + self.period * 2);
+                None
+            }
+            OnStage::Toggled | OnStage::Source { enter_sent: true } | OnStage::Row => Some(self.give_up(desk)),
         }
+    }
+
+    fn refused(&self, desk: &mut Desk<'_>) -> Outcome {
+        desk.facts.stream = None;
+        let question = self.question.as_ref().map(|question| format!(", asked for with \"{question}\""));
+        let millis = self.period.as_millis();
+        let reason = format!("the unit did not take {millis} ms{}", question.unwrap_or_default());
+        Outcome::Refused { job: Job::StreamOn, reason, heard: self.heard }
+    }
+
+    /// Whether the unit has a question open.
+    fn is_asked(&self) -> bool {
+        !matches!(self.stage, OnStage::Period { again: false } | OnStage::Row)
     }
 
     fn give_up(&mut self, desk: &mut Desk<'_>) -> Outcome {
         let awaited = match self.stage {
             OnStage::Toggled => "the question for the stream's source",
             OnStage::Source { .. } => "the question for the repetition time",
-            OnStage::Period => "a row of the stream",
+            OnStage::Period { .. } | OnStage::Row => {
+                desk.facts.stream = None;
+                "a row of the stream"
+            }
         };
-        if self.stage != OnStage::Period {
+        if self.is_asked() {
             desk.leave_dialogue();
         }
         let heard = desk.pending.map(|text| text.span).or(self.heard);
@@ -125,14 +161,11 @@ impl Work for StreamOn {
                 self.toggle(desk);
                 None
             }
-            Signal::Heard(text, message) => {
-                self.heard = Some(text.span);
-                self.heard(message, desk)
-            }
+            Signal::Heard(text, message) => self.heard(text, message, desk),
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Cancel => {
-                if self.stage != OnStage::Period {
+                if self.is_asked() {
                     desk.leave_dialogue();
                 }
                 Some(Outcome::Cancelled(Job::StreamOn))
@@ -146,11 +179,15 @@ impl Work for StreamOn {
     }
 }
 
-/// Switches the stream off.
+/// Switches the stream off. Silence alone does not show that it is: a unit without power is silent as well.
 #[derive(Debug, Default)]
 pub(super) struct StreamOff {
     toggled_at: Instant,
     toggles: u32,
+    /// Somebody is there: something has come since the first T.
+    heard: bool,
+    /// The menu has been asked for, to see whether somebody is.
+    asked: bool,
     deadline: Option<Instant>,
 }
 
@@ -165,6 +202,7 @@ impl StreamOff {
 
 impl Work for StreamOff {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.heard |= matches!(signal, Signal::Heard(..));
         match signal {
             Signal::Begin => {
                 self.toggle(desk);
@@ -196,9 +234,19 @@ impl Work for StreamOff {
                     let awaited = "that the stream is off";
                     Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: Some(text.span) })
                 }
-                None => {
+                None if self.heard => {
                     desk.facts.stream = None;
                     Some(Outcome::Done(Job::StreamOff))
+                }
+                None if !self.asked => {
+                    desk.send(b"m");
+                    self.asked = true;
+                    self.deadline = Some(desk.now + ANSWER);
+                    None
+                }
+                None => {
+                    let awaited = "that the stream is off";
+                    Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: None })
                 }
             },
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,

@@ -7,7 +7,7 @@ use super::job::{Desk, Signal, Work};
 use crate::device::Product;
 use crate::record::Span;
 use crate::time::Instant;
-use crate::wire::{Message, Prompt, diagnostics};
+use crate::wire::{Message, diagnostics};
 
 /// Reads the entries of the object dictionary that somebody walked through.
 #[derive(Default)]
@@ -68,14 +68,20 @@ impl Work for Dictionary {
     }
 }
 
-/// Reads the pages of diagnostics that came. A page is what comes in one go behind an S, or again with the same
-/// labels: menus and dictionaries have numbers in them as well.
+/// Reads the pages of diagnostics that came. A page is what comes in one go behind an S. Where no key has shown what
+/// goes on it is what comes again with the same labels: menus and dictionaries have numbers in them as well.
 pub(super) struct Diagnostics {
     wanted: Option<u32>,
     taken: u32,
     page: Assembler,
-    /// S has been typed an odd number of times.
+    /// S has been typed an odd number of times since the unit has started.
     switched_on: bool,
+    /// They were switched on when the page under construction began: the key that stops them may come in its middle.
+    begun_on: bool,
+    /// The recording holds keys.
+    has_keys: bool,
+    /// The labels of what was a page before there was a key.
+    known: Option<Vec<String>>,
     /// The page before, and whether it has been given out.
     before: Option<(Page, Vec<String>, bool)>,
     heard: Option<Span>,
@@ -83,15 +89,29 @@ pub(super) struct Diagnostics {
 
 impl Diagnostics {
     pub(super) fn new(wanted: Option<u32>) -> Self {
-        Diagnostics { wanted, taken: 0, page: Assembler::default(), switched_on: false, before: None, heard: None }
+        Diagnostics {
+            wanted,
+            taken: 0,
+            page: Assembler::default(),
+            switched_on: false,
+            begun_on: false,
+            has_keys: false,
+            known: None,
+            before: None,
+            heard: None,
+        }
     }
 
     fn page(&mut self, page: Page, desk: &mut Desk<'_>) -> Option<Outcome> {
         let quantities = page.lines.iter().flat_map(|line| diagnostics::quantities(&line.text));
         let labels: Vec<String> = quantities.map(|quantity| quantity.label).collect();
         let before = self.before.take();
-        let again = before.as_ref().is_some_and(|(_, others, _)| *others == labels);
-        let given = self.switched_on || again;
+        let again = before.as_ref().is_some_and(|(_, others, _)| *others == labels)
+            && (!self.has_keys || self.known.as_ref() == Some(&labels));
+        if again && !self.has_keys {
+            self.known = Some(labels.clone());
+        }
+        let given = self.begun_on || again;
         if let Some((first, _, false)) = before.filter(|_| again) {
             self.give(first, desk);
         }
@@ -114,13 +134,22 @@ impl Work for Diagnostics {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
             Signal::Heard(_, Message::Row(_) | Message::MenuKey(_) | Message::Loader(_)) => None,
-            Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults | Prompt::Source(_))) => None,
+            Signal::Heard(_, Message::Prompt(_)) => None,
+            // No page says the name: the unit has started anew, and shows none any more.
+            Signal::Heard(_, Message::Software(name)) if name.product.is_some() => {
+                self.switched_on = false;
+                None
+            }
             Signal::Heard(text, _) => {
                 self.heard = Some(text.span);
+                if self.page.due().is_none() {
+                    self.begun_on = self.switched_on;
+                }
                 self.page.line(text, desk.now);
                 None
             }
             Signal::Typed(keys) => {
+                self.has_keys = true;
                 for key in keys {
                     match key {
                         b's' | b'S' => self.switched_on = !self.switched_on,
@@ -189,5 +218,75 @@ impl Work for Everything {
 
     fn deadline(&self) -> Option<Instant> {
         self.diagnostics.deadline()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::endpoint::Endpoint;
+    use crate::session::{Command, Event, Session};
+    use crate::time::Instant;
+
+    /// What a recording has to tell: what was sent (`>`) and what came, each so many milliseconds behind the one before.
+    fn pages(story: &[(u64, &str)]) -> Vec<Vec<String>> {
+        let mut session = Session::of_recording(115_200);
+        session.command(Instant::ZERO, Command::Diagnostics { pages: None }).expect("it is free");
+        let mut millis = 0;
+        for (behind, text) in story {
+            // Whatever falls due on the way is looked after when it does.
+            let until = Instant::from_millis(millis + behind);
+            while let Some(due) = session.poll_timeout().filter(|due| *due <= until) {
+                session.handle_timeout(due);
+            }
+            millis += behind;
+            match text.strip_prefix('>') {
+                Some(keys) => session.handle_sent(until, keys.as_bytes()),
+                None => session.handle_bytes(until, text.as_bytes()),
+            }
+        }
+        let end = Instant::from_millis(millis + 5_000);
+        while let Some(due) = session.poll_timeout().filter(|due| *due <= end) {
+            session.handle_timeout(due);
+        }
+        session.recording_over(end);
+        let mut pages = Vec::new();
+        while let Some(event) = session.poll_event() {
+            if let Event::Page { lines, .. } = event {
+                pages.push(lines.into_iter().map(|line| line.text).collect());
+            }
+        }
+        pages
+    }
+
+    const PAGE: &str = "Supply 24.1 V\r\nTC1 100.0 C\r\n";
+    const SWITCH: [(u64, &str); 3] = [(1_000, ">t"), (10, "F - field value, P - process value: "), (500, ">f")];
+    const SWITCHED: [(u64, &str); 3] = [
+        (10, "\r\nRepetition rate in ms (1-60000) [1000]: "),
+        (500, ">30000\r"),
+        (10, "30000\r\nStream is now ON: every 30000 ms.\r\n"),
+    ];
+
+    #[test]
+    fn pages_are_what_comes_behind_the_key_for_them_and_no_dialogue_is_one() {
+        let twice = [SWITCH, SWITCHED, SWITCH, SWITCHED].concat();
+        assert!(pages(&twice).is_empty(), "{:?}", pages(&twice));
+        let story =
+            [&twice[..], &[(1_000, ">s"), (800, PAGE), (1_000, PAGE), (100, ">s"), (900, "Off 1.\r\n")]].concat();
+        assert_eq!(pages(&story).len(), 2, "{:?}", pages(&story));
+    }
+
+    #[test]
+    fn a_unit_that_starts_anew_shows_no_pages_any_more() {
+        let banner = "AXTC4CO V1.1.0\r\nNode-ID: 127\r\n";
+        let story = [(0, ">s"), (500, PAGE), (1_000, PAGE), (5_000, banner), (5_000, "Node-ID: 127\r\n")];
+        assert_eq!(pages(&story).len(), 2, "{:?}", pages(&story));
+    }
+
+    #[test]
+    fn without_keys_pages_are_what_comes_again_and_they_stay_pages_when_a_key_is_pressed() {
+        let story = [(0, PAGE), (1_000, PAGE), (1_000, "Something 1 else\r\n"), (1_000, PAGE)];
+        assert_eq!(pages(&story).len(), 2, "{:?}", pages(&story));
+        let story = [(0, PAGE), (1_000, PAGE), (500, ">m"), (500, PAGE), (1_000, PAGE), (1_000, PAGE)];
+        assert_eq!(pages(&story).len(), 5, "{:?}", pages(&story));
     }
 }

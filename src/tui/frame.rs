@@ -171,6 +171,7 @@ fn activity(view: &View) -> &'static str {
         None if view.load.held_since.is_some() => "held by XOFF",
         None | Some(Job::Overhear) => "",
         Some(Job::Identify) => "asking the unit",
+        Some(Job::StreamOn) if view.awaits_first_row() => "first row awaited",
         Some(Job::StreamOn | Job::StreamOff) => "setting the stream",
         Some(Job::RestoreDefaults) => "restoring defaults",
         Some(Job::ReadDictionary) => "reading the dictionary",

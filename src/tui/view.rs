@@ -11,6 +11,7 @@ use crate::dump::Dump;
 use crate::monitor::{Mark, Monitor};
 use crate::session::{DictionaryReading, Event, Facts, FileEnd, Job, LoadReport, Origin, Outcome, Progress, UnitState};
 use crate::time::{Duration, Instant};
+use crate::wire::{Message, Prompt};
 
 /// Everything a screen may read.
 #[derive(Debug, Default)]
@@ -43,6 +44,8 @@ pub struct View {
     pub wanted_period: Option<Duration>,
     /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
     pub viewing: bool,
+    /// The unit has asked whether it is to restore its defaults: if it starts anew now, it has.
+    defaults_asked: bool,
     /// When the unit said last which CANopen state it is in: it says so on request, and changes it without a word.
     pub nmt_heard: Option<Instant>,
     /// When that has become old enough for another word.
@@ -120,6 +123,8 @@ pub struct DictionaryRead {
     pub reading: DictionaryReading,
     /// When it was complete.
     pub at: Instant,
+    /// The unit has started with other values since: the factory's, or other software's.
+    pub is_outdated: bool,
 }
 
 /// A channel's temperature limits in °C, as far as the unit showed them.
@@ -194,6 +199,7 @@ impl View {
     /// Takes in one event; `facts` are the session's at that moment.
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         match event {
+            Event::Heard { message: Message::Prompt(Prompt::ConfirmDefaults), .. } => self.defaults_asked = true,
             Event::Heard { .. } => {}
             Event::Overheard(reading) => self.dictionary_read(now, reading),
             Event::EntriesRead(count) => self.entries_read = *count,
@@ -279,7 +285,7 @@ impl View {
     pub fn begin_unit(&mut self) {
         self.monitor = Monitor::default();
         (self.dictionary, self.entries_read, self.serial) = (None, 0, None);
-        (self.wanted_period, self.viewing) = (None, false);
+        (self.wanted_period, self.viewing, self.defaults_asked) = (None, false, false);
         self.load.product_unknown = false;
     }
 
@@ -291,7 +297,12 @@ impl View {
     /// Whether a job runs that has to be ended before the unit is left alone. Being asked who it is, or listened to,
     /// leaves a unit as it was.
     pub fn has_job_to_end(&self) -> bool {
-        self.job.is_some_and(|job| !matches!(job, Job::Identify | Job::Overhear))
+        self.job.is_some_and(|job| !matches!(job, Job::Identify | Job::Overhear)) && !self.awaits_first_row()
+    }
+
+    /// Whether the stream is switched on and all that is left to do is to wait for its first row, for minutes perhaps.
+    pub fn awaits_first_row(&self) -> bool {
+        self.job == Some(Job::StreamOn) && self.facts.stream.is_some()
     }
 
     /// Whether something would stay half done if the link were closed now.
@@ -327,7 +338,7 @@ impl View {
     }
 
     fn read_value(&self, index: u16, sub: u8) -> Option<Value> {
-        let entries = &self.dictionary.as_ref()?.reading.entries;
+        let entries = &self.current_dictionary()?.reading.entries;
         entries.iter().find(|read| read.at == ObjectAddress::new(index, sub))?.value
     }
 
@@ -373,6 +384,12 @@ impl View {
         if has_started || was_loader {
             self.monitor.stream.interrupt();
         }
+        if was_loader || has_started && std::mem::take(&mut self.defaults_asked) {
+            self.outdate_dictionary();
+        }
+        if self.job == Some(Job::StreamOn) && facts.stream.is_some() && self.facts.stream.is_none() {
+            self.monitor.stream.set_period(self.wanted_period);
+        }
         let product_before = self.product();
         self.facts = facts.clone();
         let product = self.product();
@@ -389,6 +406,10 @@ impl View {
     fn finished(&mut self, now: Instant, outcome: &Outcome) {
         self.job = None;
         match outcome {
+            Outcome::Done(Job::RestoreDefaults) => {
+                self.outdate_dictionary();
+                self.tell(Tone::Good, done(Job::RestoreDefaults));
+            }
             Outcome::DictionaryRead(reading) => {
                 // Its view was left again.
                 self.viewing = false;
@@ -415,6 +436,9 @@ impl View {
             }
             Outcome::Refused { job, reason, .. } => {
                 self.tell(Tone::Bad, format!("The unit refused, {}: {reason}", doing(*job)));
+            }
+            Outcome::Cancelled(Job::StreamOn) if self.facts.stream.is_some() => {
+                self.tell(Tone::Quiet, "The stream is switched on; its first row has not come yet.");
             }
             Outcome::Cancelled(Job::Diagnostics) => self.tell(Tone::Quiet, done(Job::Diagnostics)),
             Outcome::Cancelled(job) => self.tell(Tone::Quiet, format!("Cancelled, {}.", doing(*job))),
@@ -459,7 +483,19 @@ impl View {
         }
         let serial = reading.entries.iter().find(|read| read.at == SERIAL_NUMBER).and_then(|read| read.value);
         self.serial = serial.and_then(Value::as_integer).and_then(|number| u32::try_from(number).ok());
-        self.dictionary = Some(DictionaryRead { dump, reading: reading.clone(), at: now });
+        self.dictionary = Some(DictionaryRead { dump, reading: reading.clone(), at: now, is_outdated: false });
+    }
+
+    /// The unit has other values now than those that were read.
+    fn outdate_dictionary(&mut self) {
+        if let Some(read) = &mut self.dictionary {
+            read.is_outdated = true;
+        }
+    }
+
+    /// What was read of the unit's object dictionary, as long as it can be what the unit has.
+    pub fn current_dictionary(&self) -> Option<&DictionaryRead> {
+        self.dictionary.as_ref().filter(|read| !read.is_outdated)
     }
 
     fn identified(&mut self) {
@@ -476,7 +512,8 @@ impl View {
                 self.tell(Tone::Good, text);
             }
             (UnitState::Unknown | UnitState::Application, None) => {
-                self.tell(Tone::Quiet, "The unit talks, but has not said what it is; after a power cycle it does.");
+                let text = "The unit talks, but does not say what it is: V reads that, a power cycle shows it.";
+                self.tell(Tone::Quiet, text);
             }
         }
     }

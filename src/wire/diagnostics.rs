@@ -47,6 +47,11 @@ pub fn quantities(line: &str) -> Vec<Quantity> {
         // `TC1 100 C raw 3991 uV` is about TC1; `Supply Voltage=24.1V Source Current=4.0mA` is about two things.
         let first = found.first().map(|quantity| quantity.label.as_str()).filter(|_| label.len() < 2);
         let label: Vec<&str> = first.into_iter().chain(std::mem::take(&mut label)).collect();
+        let has_name = label.iter().any(|word| word.contains(char::is_alphabetic));
+        if !has_name && unit.is_none() {
+            // Numbers among numbers: a row of the stream that has lost its beginning.
+            continue;
+        }
         found.push(Quantity { label: label.join(" "), value, decimals, unit });
         if found.len() == MOST_QUANTITIES {
             break;
@@ -105,6 +110,9 @@ mod tests {
                 "Supply Voltage=24.28V Source Current=4.000mA",
                 vec![quantity("Supply Voltage", 24.28, Some("V")), quantity("Source Current", 4.0, Some("mA"))],
             ),
+            ("7.300;  66.123;  81.685;  24.546", vec![]),
+            ("275 ; 89.947", vec![]),
+            ("1  24.5 C", vec![quantity("1", 24.5, Some("C"))]),
             ("Active Errors              0", vec![quantity("Active Errors", 0.0, None)]),
             ("Cold junction (°C) -12.5", vec![quantity("Cold junction °C", -12.5, None)]),
             (

@@ -39,18 +39,7 @@ impl Alone {
 
     fn end(&mut self, begun: Instant) -> (Outcome, u64) {
         loop {
-            while let Some(piece) = self.session.poll_transmit() {
-                let text = String::from_utf8(piece.bytes).expect("keys").replace('\r', "~");
-                // A piece that is awaited, and everything that is said behind it.
-                if self.script.last().is_some_and(|(awaited, _, _)| !awaited.is_empty() && text.starts_with(awaited)) {
-                    let (_, late, says) = self.script.pop().expect("the last one");
-                    self.says.push((self.now + Duration::from_millis(late), says));
-                    while let Some((_, late, says)) = self.script.pop_if(|(awaited, _, _)| awaited.is_empty()) {
-                        self.says.push((self.now + Duration::from_millis(late), says));
-                    }
-                }
-                self.sent.push((millis(self.now.since(begun)), text));
-            }
+            self.take_sent(begun);
             while let Some(event) = self.session.poll_event() {
                 match event {
                     Event::Finished(outcome) => return (outcome, millis(self.now.since(begun))),
@@ -58,16 +47,38 @@ impl Alone {
                     _ => {}
                 }
             }
-            let due = self.session.poll_timeout();
-            self.says.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
-            let said = self.says.last().map(|(at, _)| *at);
-            let next = due.into_iter().chain(said).min().expect("a job has a deadline");
-            self.now = next.max(self.now);
-            assert!(self.now < Instant::from_millis(120_000), "an end");
-            match self.says.pop_if(|(at, _)| *at <= self.now) {
-                Some((_, text)) => self.session.handle_bytes(self.now, text.as_bytes()),
-                None => self.session.handle_timeout(self.now),
+            self.step();
+        }
+    }
+
+    /// Takes what has been sent, and what is said to it.
+    fn take_sent(&mut self, begun: Instant) {
+        while let Some(piece) = self.session.poll_transmit() {
+            let text = String::from_utf8(piece.bytes).expect("keys").replace('\r', "~");
+            // A piece that is awaited, and everything that is said behind it.
+            if self.script.last().is_some_and(|(awaited, _, _)| !awaited.is_empty() && text.starts_with(awaited)) {
+                let (_, late, says) = self.script.pop().expect("the last one");
+                self.says.push((self.now + Duration::from_millis(late), says));
+                while let Some((_, late, says)) = self.script.pop_if(|(awaited, _, _)| awaited.is_empty()) {
+                    self.says.push((self.now + Duration::from_millis(late), says));
+                }
             }
+            self.sent.push((millis(self.now.since(begun)), text));
+        }
+    }
+
+    /// Goes on to the next moment at which something happens.
+    fn step(&mut self) {
+        self.take_sent(Instant::ZERO);
+        let due = self.session.poll_timeout();
+        self.says.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
+        let said = self.says.last().map(|(at, _)| *at);
+        let next = due.into_iter().chain(said).min().expect("a job has a deadline");
+        self.now = next.max(self.now);
+        assert!(self.now < Instant::from_millis(180_000), "an end");
+        match self.says.pop_if(|(at, _)| *at <= self.now) {
+            Some((_, text)) => self.session.handle_bytes(self.now, text.as_bytes()),
+            None => self.session.handle_timeout(self.now),
         }
     }
 
@@ -95,7 +106,7 @@ fn a_silent_line_ends_every_job_by_its_own_deadlines() {
     let no_answer = |job, awaited| Outcome::NoAnswer { job, awaited, heard: None };
     let table = [
         (on(), no_answer(Job::StreamOn, "the question for the stream's source"), "0:t 1500:t 3000:~", 3000),
-        (Command::StreamOff, Outcome::Done(Job::StreamOff), "0:t", 1500),
+        (Command::StreamOff, no_answer(Job::StreamOff, "that the stream is off"), "0:t 1500:m", 3000),
         (Command::RestoreDefaults, no_answer(Job::RestoreDefaults, "the question for Yes"), "0:d 1500:~", 1500),
         (
             Command::Diagnostics { pages: Some(1) },
@@ -138,18 +149,19 @@ fn rows_behind_the_key_that_stops_them_are_forgiven_for_a_moment_and_it_is_press
 fn what_looked_like_a_page_before_the_key_does_not_keep_anybody_from_pressing_it() {
     let page = "Supply voltage: 24.1 V\r\nInternal temperature: 31.0 C\r\n";
     // Something with numbers comes once, unasked, then nothing: the pages have to be switched on all the same.
-    let mut alone = Alone::with(&[("s", 900, page), ("s", 1000, "")]);
+    let mut alone = Alone::with(&[("s", 900, page), ("s", 1000, ""), ("m", 5, MENU)]);
     alone.says.push((Instant::from_millis(500), page));
     let (outcome, _) = alone.ask(Command::Diagnostics { pages: Some(2) });
     assert_eq!((outcome, alone.pages), (Outcome::Done(Job::Diagnostics), 2), "{}", alone.log());
-    // 500, 200 of silence, 2,500 without a next page; 900, 200, and the key that stops them.
-    assert_eq!(alone.log(), "3200:s 4300:s");
+    // 500, 200 of silence, 2,500 without a next page; 900, 200, and the key that stops them. The menu shows that the
+    // silence behind it is not that of a unit without power.
+    assert_eq!(alone.log(), "3200:s 4300:s 5800:m");
 }
 
 #[test]
 fn a_page_that_was_under_way_is_no_sign_that_the_key_was_lost_and_a_later_one_is() {
     let page = "Supply voltage: 24.1 V\r\n";
-    let script = [("s", 100, page), ("s", 300, page), ("", 1300, page), ("s", 10, "")];
+    let script = [("s", 100, page), ("s", 300, page), ("", 1300, page), ("s", 10, "Off.\r\n")];
     let mut alone = Alone::with(&script);
     let (outcome, time) = alone.ask(Command::Diagnostics { pages: Some(1) });
     assert_eq!((outcome, alone.pages), (Outcome::Done(Job::Diagnostics), 1), "{}", alone.log());
@@ -159,6 +171,48 @@ fn a_page_that_was_under_way_is_no_sign_that_the_key_was_lost_and_a_later_one_is
     let script = [("s", 100, page), ("s", 1000, page), ("s", 1000, page), ("s", 1000, page)];
     let (outcome, _) = Alone::with(&script).ask(Command::Diagnostics { pages: Some(1) });
     assert!(matches!(outcome, Outcome::NoAnswer { awaited: "the end of the diagnostics", .. }), "{outcome:?}");
+}
+
+#[test]
+fn silence_is_no_proof_that_anything_is_off() {
+    // The unit says nothing to T, but is there.
+    let mut alone = Alone::with(&[("m", 5, MENU)]);
+    assert_eq!(alone.ask(Command::StreamOff), (Outcome::Done(Job::StreamOff), 1500 + 5 + 400), "{}", alone.log());
+    assert_eq!(alone.log(), "0:t 1500:m");
+    // Its power goes with the key that stops the pages.
+    let page = "Supply voltage: 24.1 V\r\n";
+    let mut alone = Alone::with(&[("s", 100, page)]);
+    let (outcome, time) = alone.ask(Command::Diagnostics { pages: Some(1) });
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "the end of the diagnostics", .. }), "{outcome:?}");
+    assert_eq!((alone.log().as_str(), time), ("1300:s 1600:s 3100:m", 4600));
+}
+
+#[test]
+fn a_slow_stream_counts_as_on_once_its_time_is_taken_and_a_refused_time_is_told_with_the_question() {
+    let slow = || Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(60_000) };
+    let period = "Every how many ms (100-50000)? ";
+    let dialogue = [("t", 5, "F - field value, P - process value: "), ("f", 5, period)];
+    // Nobody refuses it: on, long before its first row.
+    let mut alone = Alone::with(&[&dialogue[..], &[("60000~", 5, "OK\r\n"), ("", 30_000, ROW)]].concat());
+    alone.session.command(alone.now, slow()).expect("it is free");
+    while alone.session.facts().stream.is_none() {
+        alone.step();
+    }
+    assert!(alone.now < Instant::from_millis(2_000), "{:?}", alone.now);
+    let (outcome, _) = alone.end(Instant::ZERO);
+    assert_eq!(outcome, Outcome::StreamRuns { was_on: false });
+    // It asks once more, which refuses without a word that is known.
+    let mut alone = Alone::with(&[&dialogue[..], &[("60000~", 5, period)]].concat());
+    let (outcome, time) = alone.ask(slow());
+    let Outcome::Refused { reason, .. } = outcome else { panic!("{outcome:?}") };
+    assert_eq!(reason, "the unit did not take 60000 ms, asked for with \"Every how many ms (100-50000)?\"");
+    assert!(time < 2_000 && alone.log().ends_with(":~"), "the question is left: {}", alone.log());
+    assert_eq!(alone.session.facts().stream, None);
+    // No row comes: it was not on after all.
+    let mut alone = Alone::with(&dialogue);
+    let (outcome, _) = alone.ask(slow());
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "a row of the stream", .. }), "{outcome:?}");
+    assert_eq!(alone.session.facts().stream, None);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod returning;
 mod sending;
+mod states;
 mod values;
 
 use std::collections::BTreeMap;

@@ -25,6 +25,8 @@ const NEXT_PAGE: Duration = Duration::from_millis(2500);
 const STOPPED: Duration = Duration::from_millis(1500);
 /// A page that comes so soon behind that key was under way before it.
 const UNDER_WAY: Duration = Duration::from_millis(700);
+/// Silence that ends the menu.
+const MENU: Duration = Duration::from_millis(300);
 /// How often the key is pressed to stop them.
 const MOST_STOPS: u32 = 3;
 
@@ -38,6 +40,8 @@ pub(super) struct Diagnostics {
     page: Assembler,
     deadline: Option<Instant>,
     heard: Option<Span>,
+    /// Something has come since the key was pressed last.
+    answered: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +54,8 @@ enum Stage {
     Reading,
     /// The key is out that stops them, pressed so often.
     Stopping { presses: u32, at: Instant, cancelled: bool },
+    /// They have stopped, and nothing else has come: the menu is asked for, to see whether somebody is there.
+    AskingForMenu { cancelled: bool },
 }
 
 impl Diagnostics {
@@ -61,6 +67,7 @@ impl Diagnostics {
             page: Assembler::default(),
             deadline: None,
             heard: None,
+            answered: false,
         }
     }
 
@@ -81,6 +88,7 @@ impl Diagnostics {
                 self.stop(desk, presses + 1, cancelled);
                 None
             }
+            Stage::AskingForMenu { .. } => None,
             Stage::Watching | Stage::Asked | Stage::Reading => {
                 self.stage = Stage::Reading;
                 self.deadline = Some(desk.now + NEXT_PAGE);
@@ -98,6 +106,7 @@ impl Diagnostics {
         desk.send(b"s");
         self.stage = Stage::Stopping { presses, at: desk.now, cancelled };
         self.deadline = Some(desk.now + STOPPED);
+        self.answered = false;
     }
 
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
@@ -123,14 +132,36 @@ impl Diagnostics {
                 None
             }
             Stage::Reading => Some(Outcome::NoAnswer { job, awaited: "the next page", heard: self.heard }),
-            Stage::Stopping { cancelled: true, .. } => Some(Outcome::Cancelled(job)),
-            Stage::Stopping { .. } => Some(Outcome::Done(job)),
+            Stage::Stopping { cancelled, .. } | Stage::AskingForMenu { cancelled } if self.answered => {
+                Some(if cancelled { Outcome::Cancelled(job) } else { Outcome::Done(job) })
+            }
+            // A unit without power prints no pages either.
+            Stage::Stopping { cancelled, .. } => {
+                desk.send(b"m");
+                self.stage = Stage::AskingForMenu { cancelled };
+                self.deadline = Some(desk.now + STOPPED);
+                None
+            }
+            Stage::AskingForMenu { .. } => {
+                let awaited = "the end of the diagnostics";
+                Some(Outcome::NoAnswer { job, awaited, heard: self.heard })
+            }
         }
     }
 }
 
+/// Whether a line can be one of a page: it has a word, or is a rule of signs.
+fn has_words(line: &str) -> bool {
+    line.contains(char::is_alphabetic) || !line.contains(|sign: char| sign.is_ascii_digit())
+}
+
 impl Work for Diagnostics {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.answered |= matches!(signal, Signal::Heard(..));
+        if matches!((self.stage, &signal), (Stage::AskingForMenu { .. }, Signal::Heard(..))) {
+            self.deadline = Some(desk.now + MENU);
+            return None;
+        }
         match signal {
             Signal::Begin => {
                 self.deadline = Some(desk.now + WATCH);
@@ -143,6 +174,11 @@ impl Work for Diagnostics {
                 Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
             }
             Signal::Heard(_, Message::Row(_) | Message::Prompt(_)) => None,
+            // Of a row that the unit has had no room for there is its end.
+            Signal::Heard(text, _) if !has_words(&text.text) => {
+                self.heard = Some(text.span);
+                None
+            }
             Signal::Heard(text, _) => {
                 self.heard = Some(text.span);
                 self.page.line(text, desk.now);
@@ -160,7 +196,7 @@ impl Work for Diagnostics {
                     self.stop(desk, 1, true);
                     None
                 }
-                Stage::Stopping { .. } => None,
+                Stage::Stopping { .. } | Stage::AskingForMenu { .. } => None,
             },
             Signal::LinkLost => Some(Outcome::Cancelled(Job::Diagnostics)),
         }

@@ -188,6 +188,9 @@ impl App {
             Ok(_) if self.view.dictionary.is_none() => {
                 self.view.tell(Tone::Bad, "Nothing to compare it with yet: V reads the unit's object dictionary.");
             }
+            Ok(_) if self.view.current_dictionary().is_none() => {
+                self.view.tell(Tone::Bad, "What was read is from before the restart: V reads the dictionary again.");
+            }
             Ok(dump) => {
                 let short = path.file_name().map_or(name.clone(), |name| name.to_string_lossy().into_owned());
                 self.dictionary.compare(short, dump);

@@ -312,7 +312,8 @@ impl App {
             return;
         }
         // What cannot be done now is said before anything is asked.
-        let why_not = match (menu, self.view.job, self.view.facts.state) {
+        let job = self.view.job.filter(|_| !self.view.awaits_first_row());
+        let why_not = match (menu, job, self.view.facts.state) {
             (MenuCmd::Diagnostics, Some(Job::Diagnostics), _) | (_, Some(Job::Identify), _) => None,
             (_, Some(Job::SendFile), _) => Some("a file is being sent: Esc on the terminal screen stops it"),
             (_, Some(Job::Diagnostics), _) => Some("the unit prints its diagnostics: S stops them first"),
@@ -327,7 +328,13 @@ impl App {
             return self.view.tell(Tone::Bad, format!("Not sent: {why_not}."));
         }
         match menu {
-            MenuCmd::Menu => self.perform(Action::Command(Command::Identify), effects),
+            MenuCmd::Menu => {
+                // In the view a key may be swallowed, and the unit is halted as long as it is open.
+                if self.view.viewing {
+                    self.perform(Action::Command(Command::Keys(b"x".to_vec())), effects);
+                }
+                self.perform(Action::Command(Command::Identify), effects);
+            }
             MenuCmd::View => self.ask(Question::View),
             MenuCmd::Defaults => {
                 self.ask(Question::Defaults { typed: Default::default(), complaint: None });

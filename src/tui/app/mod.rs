@@ -468,6 +468,10 @@ impl App {
             Command::Keys(keys) if !session.password_open() => opens_view(keys),
             _ => None,
         };
+        // Whoever wants something else need not wait for minutes for a slow stream's first row.
+        if self.view.awaits_first_row() && !matches!(command, Command::Cancel) {
+            let _ = session.command(self.now, Command::Cancel);
+        }
         match session.command(self.now, command) {
             Ok(()) => {
                 if let Some(job) = job {

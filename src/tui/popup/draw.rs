@@ -457,7 +457,7 @@ fn in_the_middle(view: &View) -> [&'static str; 2] {
             "What of it has not left yet stays here: the unit has part of it then.",
         ],
         Some(Job::StreamOn | Job::StreamOff | Job::RestoreDefaults) => {
-            ["The unit is at one of its prompts.", "axcon answers it first, so that the next key is none."]
+            ["The unit is in the middle of its questions.", "axcon ends them first, so that it is at its menu again."]
         }
         None | Some(Job::Identify | Job::Overhear) => [
             "The unit's view is open: temperature scanning and CAN are halted.",

@@ -415,7 +415,7 @@ impl Question {
                     Answer::Act(Action::Command(Command::StreamOn { source: *source, period }))
                 }
                 _ => {
-                    *complaint = Some("The unit takes 1 to 60000 ms.");
+                    *complaint = Some("A whole number of milliseconds from 1 to 60000.");
                     Answer::Stay
                 }
             },

@@ -299,6 +299,7 @@ impl Dictionary {
                 Some(read) => {
                     let time = format::time_of_day(scene.start_of_day, read.at);
                     let compared = match view.product() {
+                        _ if read.is_outdated => "from before the restart".to_owned(),
                         Some(_) => format!("{} not as factory", read.dump.deviations()),
                         // Nobody knows what the factory's values are: none of them differs, and none is the same.
                         None => "compared with nothing".into(),

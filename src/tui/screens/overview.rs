@@ -8,7 +8,7 @@ use ratatui::text::{Line, Span};
 use super::{Scene, terminal};
 use crate::device::Product;
 use crate::monitor::{Channel, Fault, Tracked};
-use crate::session::{Known, Origin, UnitState};
+use crate::session::{Job, Known, Origin, UnitState};
 use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
@@ -156,7 +156,7 @@ impl Overview {
         let remark = format!("{what}, {}, newest {}", format::counted(stream.rows, "row"), newest.unwrap_or_default());
         let mut shown = vec![lines::rule(theme, columns, "Values", &remark)];
         // They are temperatures: beside counts they would say nothing.
-        let has_limits = source == Source::FieldValue && scene.view.dictionary.is_some();
+        let has_limits = source == Source::FieldValue && scene.view.current_dictionary().is_some();
         let has_columns = has_limits && columns >= LIMITS_AT;
         let limit_heads =
             if has_columns { format!("{:>9}{:>9}{:>9}", "Low", "High", "Shutdown") } else { String::new() };
@@ -174,20 +174,13 @@ impl Overview {
         if area.height >= CHART_ROWS {
             shown.extend(averages(scene));
         }
-        if scene.view.facts.stream.is_none() {
-            shown.push(Line::styled(
-                "  The stream is off: these are its last values. T switches it on.",
-                theme.warning(),
-            ));
-        } else if stream.late {
-            shown.push(Line::styled(
-                "  No new row: these values are old. M asks whether the unit still answers.",
-                theme.warning(),
-            ));
-        } else {
-            let chosen = stream.channels.get(self.cursor).map(|channel| channel.name.as_str());
-            shown.push(limits_line(scene, source, chosen.unwrap_or_default(), has_columns));
-        }
+        shown.push(match why_old(scene) {
+            Some(why) => Line::styled(format!("  {why}"), theme.warning()),
+            None => {
+                let chosen = stream.channels.get(self.cursor).map(|channel| channel.name.as_str());
+                limits_line(scene, source, chosen.unwrap_or_default(), has_columns)
+            }
+        });
         shown
     }
 }
@@ -199,15 +192,34 @@ fn page(area: Rect) -> Rect {
 
 /// Whether the values are those of now, so that nothing has to be said about them.
 fn is_current(scene: Scene) -> bool {
-    let stream = &scene.view.monitor.stream;
-    stream.source.is_some() && !stream.late && scene.view.facts.stream.is_some()
+    scene.view.monitor.stream.source.is_some() && why_old(scene).is_none()
+}
+
+/// Why the values that are shown are those of before, if they are, and what to do.
+fn why_old(scene: Scene) -> Option<&'static str> {
+    let view = scene.view;
+    match view.facts.state {
+        UnitState::Loader => Some("The unit is in its loader: these are its last values. L loads software."),
+        _ if view.job == Some(Job::ReadDictionary) => {
+            Some("These values are old: the unit measures nothing while its dictionary is read.")
+        }
+        _ if view.viewing => Some("These values are old: the view is open and halts the unit. M closes it."),
+        _ if view.facts.stream.is_none() => Some("The stream is off: these are its last values. T switches it on."),
+        _ if view.monitor.stream.late => {
+            Some("No new row: these values are old. M asks whether the unit still answers.")
+        }
+        UnitState::Silent | UnitState::Unknown | UnitState::Application => None,
+    }
 }
 
 /// The limits of one channel in a line, or how to see them.
 fn limits_line(scene: Scene, source: Source, channel: &str, has_columns: bool) -> Line<'static> {
     let (theme, view) = (scene.theme, scene.view);
-    let text = match (&view.dictionary, view.limits(channel)) {
+    let text = match (view.current_dictionary(), view.limits(channel)) {
         _ if source != Source::FieldValue => return Line::default(),
+        (None, _) if view.dictionary.is_some() => {
+            "  Limits: those read are from before the restart, V reads them again.".to_owned()
+        }
         (None, _) => "  Limits: not read yet, V reads them.".to_owned(),
         (Some(read), _) if has_columns => {
             format!("  Limits read {}; V reads them again.", format::time_of_day(scene.start_of_day, read.at))
@@ -229,7 +241,7 @@ fn limits_line(scene: Scene, source: Source, channel: &str, has_columns: bool) -
 
 /// The unit's averages, as they were when its dictionary was read.
 fn averages(scene: Scene) -> Option<Line<'static>> {
-    let read = scene.view.dictionary.as_ref()?;
+    let read = scene.view.current_dictionary()?;
     let averages = scene.view.averages();
     let said: Vec<String> = averages.into_iter().map(|(name, value)| format!("{name} {value:.1}")).collect();
     let time = format::time_of_day(scene.start_of_day, read.at);
@@ -239,7 +251,11 @@ fn averages(scene: Scene) -> Option<Line<'static>> {
 
 /// Digits behind the point, as the product prints them.
 pub fn decimals(view: &View, source: Source) -> usize {
-    view.product().map_or_else(
+    // A row that has been understood is one of a product that we know, if the unit has named itself or not.
+    let channels = &view.monitor.stream.channels;
+    let has_these =
+        |product: &&Product| product.stream.channels.iter().eq(channels.iter().map(|channel| &channel.name));
+    view.product().or_else(|| Product::all().iter().find(has_these)).map_or_else(
         || if source == Source::FieldValue { 3 } else { 0 },
         |product| product.stream.format(source).decimals,
     )
@@ -249,6 +265,7 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     let (theme, facts) = (scene.theme, &scene.view.facts);
     let title = scene.view.product().map(|product| product.title.clone()).unwrap_or_default();
     let stream = match (facts.stream, scene.view.monitor.stream.period()) {
+        (None, _) if facts.state == UnitState::Loader => "none, in the loader".to_owned(),
         (None, _) => "off".to_owned(),
         (Some(source), period) => {
             let source = match source {
@@ -266,6 +283,7 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         }
         UnitState::Silent => Span::styled("silent: nothing heard yet", theme.warning()),
         UnitState::Unknown => Span::styled("talks, in words not known", theme.warning()),
+        UnitState::Application if scene.view.viewing => Span::styled("view open, halted", theme.warning()),
         UnitState::Application => Span::styled("application runs", theme.good()),
         UnitState::Loader => Span::styled("waits in its loader", theme.warning()),
     };
@@ -477,7 +495,8 @@ impl Overview {
         let lasting = all.iter().filter(|fault| fault.until.is_none()).count();
         let mut remark = Vec::new();
         if !all.is_empty() {
-            remark.push(format!("{lasting} now, {} since connecting", all.len()));
+            let when = if why_old(scene).is_none() { "now" } else { "when last seen" };
+            remark.push(format!("{lasting} {when}, {} since connecting", all.len()));
         }
         // How far it can be scrolled stands in the heading: a row of its own would take that of a fault.
         remark.extend((first > 0).then(|| format!("↑ {first} more")));
@@ -511,7 +530,7 @@ fn fault_rows(scene: Scene) -> Vec<Line<'static>> {
 /// The errors in the unit's own list, as it was when the dictionary was read.
 fn listed(scene: Scene) -> Vec<Line<'static>> {
     let theme = scene.theme;
-    let Some(read) = &scene.view.dictionary else { return Vec::new() };
+    let Some(read) = scene.view.current_dictionary() else { return Vec::new() };
     let time = format::time_of_day(scene.start_of_day, read.at);
     let row = |words: &str| {
         Line::from(vec![

@@ -31,7 +31,7 @@ fn the_same_unit_behind_a_cable_plugged_in_again_goes_on() {
     let asked = desk.picture();
     assert!(asked.contains("The unit is being asked who it is.") && asked.contains("Below is history"), "{asked}");
     let told = desk.wait_for("The link is back, and the AXTC4CO answers as before.");
-    assert!(told.contains("1 now, 1 since connecting") && !told.contains("Below is history"), "{told}");
+    assert!(told.contains("1 when last seen, 1 since connecting") && !told.contains("Below is history"), "{told}");
     desk.keys("5");
     assert!(desk.picture().contains("0 not as factory"), "{}", desk.picture());
     assert_eq!(desk.marks, [""; 0]);
