@@ -35,7 +35,7 @@ fn unit(world: &World) -> Running {
 }
 
 fn facts(world: &World, link: &str) -> Value {
-    let ran = world.run(&["identify", "--json", "--record", "said.cast", "--port", link], b"");
+    let ran = world.run(&["identify", "--json", "--yes", "--record", "said.cast", "--port", link], b"");
     assert_eq!(ran.code, Some(0), "{}{}", ran.out, ran.err);
     let mut facts: Value = serde_json::from_str(&ran.out).expect("one object");
     assert_eq!((&facts["product"], &facts["version"]), (&"AXTC4CO".into(), &"1.1.0".into()), "{facts}");
