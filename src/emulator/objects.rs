@@ -291,7 +291,7 @@ impl Objects {
 }
 
 /// Whether an entry is kept by 1010h: what can be written, but the list of errors and the two commands.
-fn is_parameter(at: ObjectAddress, entry: &Entry) -> bool {
+pub fn is_parameter(at: ObjectAddress, entry: &Entry) -> bool {
     // The constants follow 3000h and are kept with it, whoever may write them at the moment.
     entry.access == Access::ReadWrite && !matches!(at.index, 0x1003 | 0x1010 | 0x1011) && Group::of(at.index).is_some()
 }
