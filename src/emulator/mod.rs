@@ -261,6 +261,11 @@ impl Unit {
         self.flash.spoil(word, defect);
     }
 
+    /// Number of things that are wrong with words of program flash.
+    pub fn spoiled(&self) -> usize {
+        self.flash.defects()
+    }
+
     /// Makes all words of program flash good again.
     pub fn repair_flash(&mut self) {
         self.flash.repair();

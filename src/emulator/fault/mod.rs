@@ -10,7 +10,7 @@ mod middleman;
 
 use std::fmt;
 
-pub use middleman::{Arrival, Deed, Middleman};
+pub use middleman::{Arrival, Deed, MOST_FAULTS, Middleman};
 
 use super::memory::Defect;
 use super::words::{LONGEST_OFF_S, WordError, Words, unknown};

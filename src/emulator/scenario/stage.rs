@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::{Scenario, Verb};
-use crate::emulator::fault::{Arrival, Deed, Fault, Middleman, Way};
+use crate::emulator::fault::{Arrival, Deed, Fault, MOST_FAULTS, Middleman, Way};
 use crate::emulator::{NetworkState, Running, Store, Unit};
 use crate::endpoint::{Endpoint, Transmit};
 use crate::time::Instant;
@@ -199,6 +199,9 @@ impl Stage {
                 let unit = entry.and_then(|entry| entry.unit.as_deref()).map(|unit| format!(" {unit}"));
                 return Ok(Some(format!("{at} = {value}{}{}", unit.unwrap_or_default(), meaning.unwrap_or_default())));
             }
+            Verb::Fault(_) if self.middleman.faults() + self.unit.spoiled() >= MOST_FAULTS => {
+                return Err(format!("{MOST_FAULTS} faults lie in wait already: 'heal' ends them"));
+            }
             Verb::Fault(fault) => self.suffer(*fault),
             Verb::Heal => {
                 self.middleman.heal();
@@ -371,6 +374,20 @@ mod tests {
         }
         assert!((celsius(&once, 1) - 50.0).abs() < 0.1, "in the fourth round, 5 s after its begin");
         assert_eq!(celsius(&once, 1), celsius(&often, 1));
+    }
+
+    #[test]
+    fn faults_that_a_scenario_orders_again_and_again_have_an_end() {
+        let text = "repeat = 0.1\n[[at]]\nseconds = 0\n\
+                    do = ['fault lost to-unit one in 100', 'fault flash worn-out at word 7']\n";
+        let mut stage = stage(text);
+        stage.handle_timeout(at(200_000));
+        assert_eq!((stage.middleman.faults(), stage.unit.spoiled()), (MOST_FAULTS - 1, 1));
+        let verb = |line: &str| Verb::read(line, product()).expect(line);
+        let refused = stage.perform(at(200_001), &verb("fault lost from-unit at byte 1")).expect_err("too many");
+        assert_eq!(refused, "1000 faults lie in wait already: 'heal' ends them");
+        assert_eq!(stage.perform(at(200_001), &verb("heal")), Ok(None));
+        assert_eq!(stage.perform(at(200_001), &verb("fault lost from-unit at byte 1")), Ok(None));
     }
 
     #[test]
