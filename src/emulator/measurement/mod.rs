@@ -51,6 +51,15 @@ enum Scan {
     Rtds(Rtds),
 }
 
+/// Which channels a reading of the converter is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Updated {
+    All,
+    One(u8),
+    /// It was of the current source, or the first of two that belong together.
+    None,
+}
+
 /// A channel's evaluation.
 #[derive(Clone, Debug)]
 struct Channel {
@@ -143,7 +152,7 @@ impl Measurement {
         }
         let channels = &mut self.channels;
         let mut read = |channel: u8, reading| channels[usize::from(channel) - 1].reading = reading;
-        let changed = match &mut self.scan {
+        let updated = match &mut self.scan {
             Scan::Thermocouples(scan) => scan.step(sensors, objects, &mut read),
             Scan::Rtds(scan) => scan.step(sensors, objects, &mut read),
         };
@@ -157,7 +166,7 @@ impl Measurement {
             if off {
                 channel.reading = Reading::Off;
             }
-            if all || off || changed.is_none_or(|changed| changed == number) {
+            if all || off || updated.includes(number) {
                 channel.evaluate(now, number, objects, faults);
             }
         }
@@ -181,6 +190,16 @@ impl Measurement {
             objects.set(0x2100, sub, average.map_or(Value::NOT_A_NUMBER, |celsius| Value::Real32(celsius as f32)));
             let counts = average.map_or(PV_OFF, |celsius| scaled(celsius, factor, offset));
             objects.set(0x2130, sub, Value::Integer16(counts));
+        }
+    }
+}
+
+impl Updated {
+    fn includes(self, number: u8) -> bool {
+        match self {
+            Updated::All => true,
+            Updated::One(channel) => channel == number,
+            Updated::None => false,
         }
     }
 }

@@ -8,7 +8,7 @@
 use super::super::objects::Objects;
 use super::super::rtd_curve::Curve;
 use super::super::sensors::{Sensors, Wiring};
-use super::Reading;
+use super::{Reading, Updated};
 use crate::canopen::Value;
 use crate::time::{Duration, Instant};
 
@@ -81,13 +81,13 @@ impl Rtds {
         self.reading_at = now + READING_TIME;
     }
 
-    /// Makes one reading. Says which channel has a new value; 0 for none.
+    /// Makes one reading.
     pub(super) fn step(
         &mut self,
         sensors: &Sensors,
         objects: &mut Objects,
         read: &mut impl FnMut(u8, Reading),
-    ) -> Option<u8> {
+    ) -> Updated {
         let now = self.reading_at;
         self.reading_at += READING_TIME;
         self.readings += 1;
@@ -123,7 +123,7 @@ impl Rtds {
             Slot::Current => None,
             Slot::Channel(number) if self.wants_wire(objects, number) => {
                 self.next = Slot::Wire(number);
-                return Some(0);
+                return Updated::None;
             }
             Slot::Channel(number) | Slot::Wire(number) => Some(number),
         };
@@ -132,11 +132,10 @@ impl Rtds {
             self.wire_read = false;
             self.frozen_sweeps += u32::from(sensors.is_frozen());
         }
-        if let Some(number) = channel {
-            let reading = self.evaluate(objects, number);
-            read(number, reading);
-        }
-        Some(channel.unwrap_or(0))
+        let Some(number) = channel else { return Updated::None };
+        let reading = self.evaluate(objects, number);
+        read(number, reading);
+        Updated::One(number)
     }
 
     /// Resistance and temperature from what has been read.
