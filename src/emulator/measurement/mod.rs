@@ -23,7 +23,7 @@ use thermocouples::Thermocouples;
 pub enum Reading {
     /// °C.
     Celsius(f64),
-    /// Switched off (object 6112h).
+    /// Switched off (object 6112h), or not read yet.
     Off,
     /// Open circuit.
     Open,

@@ -21,6 +21,8 @@ const SHORT_BELOW_OHM: f64 = 5.0;
 const OPEN_ABOVE_OHM: f64 = 600.0;
 /// One step of the converter in V: 24 bits over 5 V (a guess, finer than 0.001 ohm).
 const STEP_V: f64 = 5.0 / 8_388_608.0;
+/// Current through the sensors in A, until it has been measured (section 1.2).
+const NOMINAL_AMPERE: f64 = 0.004;
 /// Sweeps without new data that make a frozen converter (errata E-C24).
 const FROZEN_SWEEPS: u32 = 2;
 
@@ -31,7 +33,7 @@ pub(super) struct Rtds {
     next: Slot,
     /// Readings made so far.
     readings: u64,
-    /// Current through the sensors in A, as last measured.
+    /// Current through the sensors in A, as last measured. Never 0: the wires' resistance is kept for a minute.
     ampere: f64,
     /// A wire has been read in this sweep already.
     wire_read: bool,
@@ -49,10 +51,20 @@ enum Slot {
     Wire(u8),
 }
 
+/// The voltage of a sensor, as last read.
+#[derive(Clone, Copy, Debug, Default)]
+enum Sensor {
+    #[default]
+    Unread,
+    /// The converter is at the end of its range.
+    Saturated,
+    /// In V.
+    Volts(f64),
+}
+
 #[derive(Clone, Debug, Default)]
 struct Input {
-    /// Voltage of the sensor in V; `None` while the input is saturated.
-    volts: Option<f64>,
+    sensor: Sensor,
     wire_ohm: f64,
     /// The reading at which the wires were read.
     wires_at: Option<u64>,
@@ -66,7 +78,7 @@ impl Rtds {
             reading_at: now + READING_TIME,
             next: Slot::Current,
             readings: 0,
-            ampere: 0.0,
+            ampere: NOMINAL_AMPERE,
             wire_read: false,
             frozen_sweeps: 0,
             channels: vec![Input::default(); usize::from(channels)],
@@ -102,10 +114,10 @@ impl Rtds {
                 }
                 Slot::Channel(number) => {
                     let terminals = sensors.rtd(now, number, wiring(objects, number), curve(objects, number));
-                    self.input(number).volts = terminals.main.map(quantised);
-                    if let Some(volts) = terminals.main {
-                        let microvolts = (quantised(volts) * 1e6).round() as i32;
-                        objects.set(0x2010, number, Value::Integer32(microvolts));
+                    let volts = terminals.main.map(quantised);
+                    self.input(number).sensor = volts.map_or(Sensor::Saturated, Sensor::Volts);
+                    if let Some(volts) = volts {
+                        objects.set(0x2010, number, Value::Integer32((volts * 1e6).round() as i32));
                     }
                 }
                 Slot::Wire(number) => {
@@ -144,10 +156,15 @@ impl Rtds {
             return Reading::Frozen;
         }
         let (ampere, wiring, curve) = (self.ampere, wiring(objects, number), curve(objects, number));
-        let Input { volts, wire_ohm, .. } = *self.input(number);
-        let Some(volts) = volts else {
-            objects.set(0x2000, number, Value::NOT_A_NUMBER);
-            return Reading::Open;
+        let Input { sensor, wire_ohm, .. } = *self.input(number);
+        let volts = match sensor {
+            Sensor::Volts(volts) => volts,
+            Sensor::Saturated => {
+                objects.set(0x2000, number, Value::NOT_A_NUMBER);
+                return Reading::Open;
+            }
+            // Its wires have been read, by a converter that stood still before.
+            Sensor::Unread => return Reading::Off,
         };
         let wires = match wiring {
             Wiring::Two => 0.0,

@@ -509,6 +509,29 @@ fn a_frozen_converter_is_flagged_on_every_channel_that_is_on() {
     assert_eq!(bench.errors(), [0x0202_F001], "what was there before is seen again");
 }
 
+#[test]
+fn a_converter_that_wakes_up_in_the_middle_of_its_first_sweep_reads_no_nonsense() {
+    let product = Product::named("AXRTD8CO").expect("built in");
+    for thaw_ms in (5_050..7_000).step_by(100) {
+        let mut objects = Objects::factory(product, 127);
+        let measurement = Measurement::start(Instant::ZERO, product, &mut objects);
+        let sensors = Sensors::new(product, 1);
+        let mut bench = Bench { now: Instant::ZERO, sensors, objects, faults: Faults::default(), measurement };
+        bench.turn(Knob::Freeze(true));
+        bench.run_ms(thaw_ms);
+        assert_eq!([1, 8].map(|channel| bench.status(channel)), [0x81, 0x81]);
+        bench.turn(Knob::Freeze(false));
+        for _ in 0..50 {
+            bench.run_ms(100);
+            for channel in 1..=8 {
+                let status = bench.status(channel);
+                assert!(matches!(status, 0x00 | 0x81), "{status:02X}h of channel {channel}, thawed at {thaw_ms} ms");
+            }
+        }
+        assert_eq!((bench.status(1), bench.status(8), bench.errors()), (0, 0, vec![]));
+    }
+}
+
 // B-45
 #[test]
 fn constants_without_a_solution_are_a_math_error() {
