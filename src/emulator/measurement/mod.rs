@@ -118,7 +118,7 @@ impl Measurement {
             objects.set(0x6100, channel, Value::NOT_A_NUMBER);
             objects.set(0x7130, channel, Value::Integer16(PV_OFF));
         }
-        Measurement {
+        let measurement = Measurement {
             scan: match product.measurement.sensors {
                 SensorKind::Thermocouple => Scan::Thermocouples(Thermocouples::start(now, channels)),
                 SensorKind::Rtd => Scan::Rtds(Rtds::start(now, channels)),
@@ -126,7 +126,9 @@ impl Measurement {
             channels: vec![channel; usize::from(channels)],
             first_data_at: now + Duration::from_millis(u64::from(product.measurement.first_data_ms)),
             published: false,
-        }
+        };
+        measurement.average(objects);
+        measurement
     }
 
     /// When the next reading is due.
@@ -311,12 +313,14 @@ pub fn row(objects: &Objects, source: Source) -> Row {
         readings.push(Field::Value(objects.number(index, 0)));
     }
     readings.extend((1..=product.measurement.channels).map(|channel| {
-        let failed = matches!(objects.integer(0x6150, channel), 0x09 | 0x81);
-        match objects.integer(0x6150, channel) {
-            _ if objects.integer(0x6112, channel) == 0 => Field::Disabled,
+        let status = objects.integer(0x6150, channel);
+        // One that has just been switched on has the value of one that is off until it is read.
+        let unread = status == 0 && objects.number(0x6100, channel).is_nan();
+        match status {
+            _ if unread || objects.integer(0x6112, channel) == 0 => Field::Disabled,
             0x03 => Field::Open,
             0x05 => Field::Short,
-            _ if failed && source == Source::FieldValue => Field::Error,
+            0x09 | 0x81 if source == Source::FieldValue => Field::Error,
             _ => Field::Value(objects.number(value_index, channel)),
         }
     }));

@@ -146,6 +146,8 @@ fn all_thermocouples_are_read_together_and_nothing_is_said_before_its_time() {
         assert!(!measurement.step(now, &sensors, &mut objects, &mut faults));
     }
     assert_eq!((objects.get(0x6100, 1), faults.count()), (Value::NOT_A_NUMBER, 0));
+    let averages = [1, 2, 3].map(|sub| (objects.get(0x2100, sub), objects.integer(0x2130, sub)));
+    assert_eq!(averages, [(Value::NOT_A_NUMBER, -1); 3], "no average of nothing");
     assert_eq!(measurement.deadline(), Instant::from_millis(3_000));
     assert!(measurement.step(Instant::from_millis(3_000), &sensors, &mut objects, &mut faults));
     assert!(objects.number(0x6100, 1) > 20.0 && objects.number(0x6100, 4) > 20.0);
@@ -557,6 +559,14 @@ fn a_row_says_why_a_value_is_missing() {
     let field_values = row(&bench.objects, Source::FieldValue);
     assert_eq!(field_values.readings[..3], [Field::Disabled, Field::Open, Field::Short]);
     assert!(matches!(field_values.readings[3], Field::Value(celsius) if (celsius - 20.0).abs() < 0.1));
+    bench.write(0x6112, 1, 1.0);
+    for _ in 0..12 {
+        let reading = row(&bench.objects, Source::FieldValue).readings[0];
+        let is_read = matches!(reading, Field::Value(celsius) if (celsius - 20.0).abs() < 0.1);
+        assert!(is_read || reading == Field::Disabled, "{reading:?} of a channel that has just been switched on");
+        bench.run_ms(100);
+    }
+    assert!(matches!(row(&bench.objects, Source::ProcessValue).readings[0], Field::Value(4_688.0)));
     let bench = Bench::tc4();
     let process_values = row(&bench.objects, Source::ProcessValue);
     assert_eq!(process_values.readings.len(), 5);
