@@ -11,8 +11,8 @@
 mod bootloader;
 pub mod cable;
 mod dialect;
+pub mod errors;
 pub mod fault;
-pub mod faults;
 mod firmware;
 pub mod its90;
 pub mod knob;

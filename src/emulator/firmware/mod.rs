@@ -11,7 +11,7 @@ mod view;
 use std::collections::VecDeque;
 
 use super::dialect::{ChannelDiagnosis, Diagnosis, Dialect, Sentence};
-use super::faults::{FaultEvent, Faults};
+use super::errors::{ActiveErrors, Class, ErrorEvent};
 use super::measurement::{self, Measurement};
 use super::memory::StreamSetting;
 use super::network::{Network, NetworkState, NmtCommand};
@@ -55,7 +55,7 @@ pub struct Firmware {
     after_return: bool,
     objects: Objects,
     measurement: Measurement,
-    faults: Faults,
+    errors: ActiveErrors,
     network: Network,
     /// When the next row is due, if the stream is on.
     row_at: Option<Instant>,
@@ -106,7 +106,7 @@ impl Firmware {
             after_return: false,
             measurement: Measurement::start(board.now, board.product, &mut objects),
             objects,
-            faults: Faults::default(),
+            errors: ActiveErrors::default(),
             network: Network::start(board.now, board.product, autonomous),
             row_at: None,
             row: None,
@@ -153,7 +153,7 @@ impl Firmware {
         let now = board.now;
         if !self.is_viewing() {
             self.network.step(now);
-            if self.measurement.step(now, board.sensors, &mut self.objects, &mut self.faults) {
+            if self.measurement.step(now, board.sensors, &mut self.objects, &mut self.errors) {
                 self.row = None;
             }
             self.react();
@@ -178,9 +178,9 @@ impl Firmware {
 
     /// Object 1029h: what an error that has become active does to the node's state.
     fn react(&mut self) {
-        while let Some(event) = self.faults.poll_event() {
-            if let FaultEvent::Raised(fault) = event {
-                let class = fault.class(self.objects.product().measurement.sensors);
+        while let Some(event) = self.errors.poll_event() {
+            if let ErrorEvent::Raised(error) = event {
+                let class = Class::of(error, self.objects.product().measurement.sensors);
                 let reaction = self.objects.integer(0x1029, class.sub_index());
                 self.network.react(reaction);
             }
@@ -227,7 +227,7 @@ impl Firmware {
             Effect::None => {}
             Effect::Save(group) => board.parameters.save(board.stores, group, &self.objects),
             Effect::Restore(group) => board.parameters.restore(board.stores, group),
-            Effect::ClearErrors => self.faults.clear_list(&mut self.objects),
+            Effect::ClearErrors => self.errors.clear_list(&mut self.objects),
         }
         Ok(())
     }
@@ -478,7 +478,7 @@ impl Firmware {
         Diagnosis {
             unit,
             channels: channels.collect(),
-            errors: self.faults.count(),
+            errors: self.errors.count(),
             uptime: board.now.since(self.started_at),
             network: self.network.state(),
         }

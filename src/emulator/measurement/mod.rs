@@ -8,10 +8,11 @@
 mod rtds;
 mod thermocouples;
 
-use super::faults::{DEVICE_SPECIFIC, Fault, Faults, INPUT_OVERLOAD, LIMIT_EXCEEDED};
+use super::errors::{ActiveErrors, DEVICE_SPECIFIC, INPUT_OVERLOAD, LIMIT_EXCEEDED};
 use super::objects::Objects;
 use super::sensors::Sensors;
 use crate::canopen::Value;
+use crate::device::emergency::Emergency;
 use crate::device::{Product, SensorKind};
 use crate::time::{Duration, Instant};
 use crate::wire::stream::{Reading as Field, Row, Source};
@@ -67,7 +68,7 @@ struct Channel {
     thresholds: [Threshold; 3],
     /// Thresholds and delay of the last evaluation: a change restarts what was pending (errata E-D20).
     settings: [i64; 4],
-    sensor_fault: Option<Fault>,
+    sensor_error: Option<Emergency>,
 }
 
 /// One threshold of a channel.
@@ -112,7 +113,7 @@ impl Measurement {
     /// Begins at the unit's start.
     pub fn start(now: Instant, product: &Product, objects: &mut Objects) -> Self {
         let channel =
-            Channel { reading: Reading::Off, thresholds: [Threshold::Kept; 3], settings: [0; 4], sensor_fault: None };
+            Channel { reading: Reading::Off, thresholds: [Threshold::Kept; 3], settings: [0; 4], sensor_error: None };
         let channels = product.measurement.channels;
         for channel in 1..=channels {
             objects.set(0x6100, channel, Value::NOT_A_NUMBER);
@@ -148,7 +149,7 @@ impl Measurement {
     }
 
     /// Takes the reading that is due. Says whether anything new has been published.
-    pub fn step(&mut self, now: Instant, sensors: &Sensors, objects: &mut Objects, faults: &mut Faults) -> bool {
+    pub fn step(&mut self, now: Instant, sensors: &Sensors, objects: &mut Objects, errors: &mut ActiveErrors) -> bool {
         if self.deadline() > now {
             return false;
         }
@@ -169,7 +170,7 @@ impl Measurement {
                 channel.reading = Reading::Off;
             }
             if all || off || updated.includes(number) {
-                channel.evaluate(now, number, objects, faults);
+                channel.evaluate(now, number, objects, errors);
             }
         }
         objects.set(0x5000, 0, Value::Real32(sensors.supply(now) as f32));
@@ -207,22 +208,22 @@ impl Updated {
 }
 
 impl Channel {
-    fn evaluate(&mut self, now: Instant, number: u8, objects: &mut Objects, faults: &mut Faults) {
-        self.watch(now, number, objects, faults);
-        let sensor_fault = match self.reading {
+    fn evaluate(&mut self, now: Instant, number: u8, objects: &mut Objects, errors: &mut ActiveErrors) {
+        self.watch(now, number, objects, errors);
+        let sensor_error = match self.reading {
             Reading::Celsius(_) | Reading::Off => None,
-            Reading::Open => Some(Fault { code: INPUT_OVERLOAD, channel: number, description: 0x02 }),
-            Reading::Short => Some(Fault { code: INPUT_OVERLOAD, channel: number, description: 0x04 }),
-            Reading::MathError => Some(Fault { code: DEVICE_SPECIFIC, channel: number, description: 0x08 }),
-            Reading::Frozen => Some(Fault { code: DEVICE_SPECIFIC, channel: number, description: 0x80 }),
+            Reading::Open => Some(Emergency { code: INPUT_OVERLOAD, channel: number, description: 0x02 }),
+            Reading::Short => Some(Emergency { code: INPUT_OVERLOAD, channel: number, description: 0x04 }),
+            Reading::MathError => Some(Emergency { code: DEVICE_SPECIFIC, channel: number, description: 0x08 }),
+            Reading::Frozen => Some(Emergency { code: DEVICE_SPECIFIC, channel: number, description: 0x80 }),
         };
-        if self.sensor_fault != sensor_fault {
+        if self.sensor_error != sensor_error {
             // The new one first, so that the unit is at no moment without an error.
-            if let Some(fault) = sensor_fault {
-                faults.raise(fault, objects);
+            if let Some(error) = sensor_error {
+                errors.raise(error, objects);
             }
-            if let Some(fault) = std::mem::replace(&mut self.sensor_fault, sensor_fault) {
-                faults.clear(fault, objects);
+            if let Some(error) = std::mem::replace(&mut self.sensor_error, sensor_error) {
+                errors.clear(error, objects);
             }
         }
         let (factor, offset) = (objects.number(0x6126, number), objects.number(0x6127, number));
@@ -241,12 +242,12 @@ impl Channel {
 
     /// Compares with the thresholds: only what is exceeded for the reaction delay without a break counts, and what
     /// counts goes at once when it has cleared by the hysteresis (section 1.2).
-    fn watch(&mut self, now: Instant, number: u8, objects: &mut Objects, faults: &mut Faults) {
+    fn watch(&mut self, now: Instant, number: u8, objects: &mut Objects, errors: &mut ActiveErrors) {
         let settings = [0x4000, 0x4010, 0x4020, 0x4030].map(|index| objects.integer(index, number));
         let unchanged = std::mem::replace(&mut self.settings, settings) == settings;
         let delay = Duration::from_millis(settings[3] as u64);
         for (threshold, (watch, tenths)) in self.thresholds.iter_mut().zip(WATCHES.iter().zip(settings)) {
-            let fault = Fault { code: LIMIT_EXCEEDED, channel: number, description: watch.description };
+            let error = Emergency { code: LIMIT_EXCEEDED, channel: number, description: watch.description };
             let limit = tenths as f64 / 10.0;
             let was_exceeded = *threshold == Threshold::Exceeded;
             *threshold = match (self.reading, *threshold) {
@@ -272,9 +273,9 @@ impl Channel {
             };
             let is_exceeded = *threshold == Threshold::Exceeded;
             if is_exceeded && !was_exceeded {
-                faults.raise(fault, objects);
+                errors.raise(error, objects);
             } else if was_exceeded && !is_exceeded {
-                faults.clear(fault, objects);
+                errors.clear(error, objects);
             }
         }
     }

@@ -10,7 +10,7 @@ struct Bench {
     now: Instant,
     sensors: Sensors,
     objects: Objects,
-    faults: Faults,
+    active: ActiveErrors,
     measurement: Measurement,
 }
 
@@ -21,8 +21,8 @@ impl Bench {
         let mut objects = Objects::factory(product, 127);
         let measurement = Measurement::start(Instant::ZERO, product, &mut objects);
         let sensors = Sensors::new(product, 1);
-        let faults = Faults::default();
-        let mut bench = Bench { now: Instant::ZERO, sensors, objects, faults, measurement };
+        let active = ActiveErrors::default();
+        let mut bench = Bench { now: Instant::ZERO, sensors, objects, active, measurement };
         for channel in 1..=product.measurement.channels {
             bench.turn(Knob::Temperature(channel, 20.0));
         }
@@ -59,7 +59,7 @@ impl Bench {
         let end = self.now + Duration::from_millis(millis);
         while self.measurement.deadline() <= end {
             self.now = self.measurement.deadline();
-            self.measurement.step(self.now, &self.sensors, &mut self.objects, &mut self.faults);
+            self.measurement.step(self.now, &self.sensors, &mut self.objects, &mut self.active);
         }
         self.now = end;
     }
@@ -140,18 +140,18 @@ fn all_thermocouples_are_read_together_and_nothing_is_said_before_its_time() {
     let mut measurement = Measurement::start(Instant::ZERO, product, &mut objects);
     let mut sensors = Sensors::new(product, 1);
     sensors.turn(Knob::Open(3, None)).expect("an input");
-    let mut faults = Faults::default();
+    let mut errors = ActiveErrors::default();
     while measurement.deadline() < Instant::from_millis(3_000) {
         let now = measurement.deadline();
-        assert!(!measurement.step(now, &sensors, &mut objects, &mut faults));
+        assert!(!measurement.step(now, &sensors, &mut objects, &mut errors));
     }
-    assert_eq!((objects.get(0x6100, 1), faults.count()), (Value::NOT_A_NUMBER, 0));
+    assert_eq!((objects.get(0x6100, 1), errors.count()), (Value::NOT_A_NUMBER, 0));
     let averages = [1, 2, 3].map(|sub| (objects.get(0x2100, sub), objects.integer(0x2130, sub)));
     assert_eq!(averages, [(Value::NOT_A_NUMBER, -1); 3], "no average of nothing");
     assert_eq!(measurement.deadline(), Instant::from_millis(3_000));
-    assert!(measurement.step(Instant::from_millis(3_000), &sensors, &mut objects, &mut faults));
+    assert!(measurement.step(Instant::from_millis(3_000), &sensors, &mut objects, &mut errors));
     assert!(objects.number(0x6100, 1) > 20.0 && objects.number(0x6100, 4) > 20.0);
-    assert_eq!((objects.integer(0x6150, 3), faults.count()), (0x03, 1));
+    assert_eq!((objects.integer(0x6150, 3), errors.count()), (0x03, 1));
     assert_eq!(measurement.deadline(), Instant::from_millis(3_200));
 }
 
@@ -518,7 +518,7 @@ fn a_converter_that_wakes_up_in_the_middle_of_its_first_sweep_reads_no_nonsense(
         let mut objects = Objects::factory(product, 127);
         let measurement = Measurement::start(Instant::ZERO, product, &mut objects);
         let sensors = Sensors::new(product, 1);
-        let mut bench = Bench { now: Instant::ZERO, sensors, objects, faults: Faults::default(), measurement };
+        let mut bench = Bench { now: Instant::ZERO, sensors, objects, active: ActiveErrors::default(), measurement };
         bench.turn(Knob::Freeze(true));
         bench.run_ms(thaw_ms);
         assert_eq!([1, 8].map(|channel| bench.status(channel)), [0x81, 0x81]);
