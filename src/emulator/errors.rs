@@ -80,24 +80,25 @@ impl Class {
 }
 
 impl ActiveErrors {
-    /// An error becomes active; nothing happens if it is.
-    pub fn raise(&mut self, error: Emergency, objects: &mut Objects) {
-        if self.active.contains(&error) {
+    /// Errors become active, and others clear, at one and the same moment: the list never holds both, and the unit is
+    /// never without an error in between. What is active already, or is not, is passed over.
+    pub fn change(&mut self, raised: &[Emergency], cleared: &[Emergency], objects: &mut Objects) {
+        let raised: Vec<Emergency> = raised.iter().copied().filter(|error| !self.active.contains(error)).collect();
+        let cleared: Vec<Emergency> = cleared.iter().copied().filter(|error| self.active.contains(error)).collect();
+        if raised.is_empty() && cleared.is_empty() {
             return;
         }
-        self.active.push(error);
-        self.listed.push_front(error);
+        self.active.retain(|active| !cleared.contains(active));
+        self.listed.retain(|listed| !cleared.contains(listed));
+        for &error in &raised {
+            self.active.push(error);
+            self.listed.push_front(error);
+            self.note(ErrorEvent::Raised(error));
+        }
         self.publish(objects);
-        self.note(ErrorEvent::Raised(error));
-    }
-
-    /// An error clears; nothing happens if it is not active.
-    pub fn clear(&mut self, error: Emergency, objects: &mut Objects) {
-        let Some(place) = self.active.iter().position(|active| *active == error) else { return };
-        self.active.remove(place);
-        self.listed.retain(|listed| *listed != error);
-        self.publish(objects);
-        self.note(ErrorEvent::Cleared { error, last: self.active.is_empty() });
+        for (left, &error) in (0..cleared.len()).rev().zip(&cleared) {
+            self.note(ErrorEvent::Cleared { error, last: left == 0 && self.active.is_empty() });
+        }
     }
 
     /// Empties the list, not the errors.
@@ -158,15 +159,15 @@ mod tests {
     fn the_list_holds_what_is_active_newest_first() {
         let (mut objects, mut errors) = (objects("AXTC4CO"), ActiveErrors::default());
         let (low, high) = (threshold(1, 0x10), threshold(3, 0x20));
-        errors.raise(low, &mut objects);
-        errors.raise(high, &mut objects);
-        errors.raise(high, &mut objects);
+        errors.change(&[low], &[], &mut objects);
+        errors.change(&[high], &[], &mut objects);
+        errors.change(&[high], &[], &mut objects);
         assert_eq!(list(&objects), [0x2003_F011, 0x1001_F011]);
         assert_eq!(objects.get(0x1001, 0), Value::Unsigned8(1));
         assert_eq!(objects.get(0x1003, 3), Value::Unsigned32(0), "beyond the count");
-        errors.clear(low, &mut objects);
+        errors.change(&[], &[low], &mut objects);
         assert_eq!(list(&objects), [0x2003_F011]);
-        errors.clear(high, &mut objects);
+        errors.change(&[], &[high], &mut objects);
         assert_eq!((list(&objects), objects.get(0x1001, 0)), (vec![], Value::Unsigned8(0)));
         let events: Vec<ErrorEvent> = std::iter::from_fn(|| errors.poll_event()).collect();
         let expected = [
@@ -178,17 +179,44 @@ mod tests {
         assert_eq!(events, expected);
     }
 
+    #[test]
+    fn an_error_takes_the_place_of_others_without_a_moment_of_none_or_of_both() {
+        let (mut objects, mut errors) = (objects("AXTC4CO"), ActiveErrors::default());
+        let open = Emergency { code: INPUT_OVERLOAD, channel: 4, description: 0x02 };
+        for channel in 1..=4 {
+            errors.change(&[threshold(channel, 0x20), threshold(channel, 0x40)], &[], &mut objects);
+        }
+        errors.change(&[Emergency { code: 0x8130, channel: 5, description: 0x80 }], &[], &mut objects);
+        errors.change(&[open], &[threshold(4, 0x20), threshold(4, 0x40)], &mut objects);
+        assert_eq!((list(&objects).len(), list(&objects)[7]), (8, 0x2001_F011), "the full list has lost nothing");
+        let all = errors.active.clone();
+        errors.change(&[], &all[1..], &mut objects);
+        errors.change(&[open], &all, &mut objects);
+        errors.events.clear();
+        errors.change(&[threshold(1, 0x20), threshold(1, 0x40)], &[open], &mut objects);
+        errors.change(&[], &[open, threshold(1, 0x20), threshold(1, 0x40)], &mut objects);
+        let events: Vec<ErrorEvent> = std::iter::from_fn(|| errors.poll_event()).collect();
+        let expected = [
+            ErrorEvent::Raised(threshold(1, 0x20)),
+            ErrorEvent::Raised(threshold(1, 0x40)),
+            ErrorEvent::Cleared { error: open, last: false },
+            ErrorEvent::Cleared { error: threshold(1, 0x20), last: false },
+            ErrorEvent::Cleared { error: threshold(1, 0x40), last: true },
+        ];
+        assert_eq!(events, expected);
+    }
+
     // B-113, B-73
     #[test]
     fn a_list_emptied_by_hand_stays_so_until_an_error_comes_again() {
         let (mut objects, mut errors) = (objects("AXRTD8CO"), ActiveErrors::default());
-        errors.raise(threshold(2, 0x20), &mut objects);
+        errors.change(&[threshold(2, 0x20)], &[], &mut objects);
         errors.clear_list(&mut objects);
         assert_eq!((list(&objects), objects.get(0x1001, 0)), (vec![], Value::Unsigned8(1)));
-        errors.raise(threshold(2, 0x20), &mut objects);
+        errors.change(&[threshold(2, 0x20)], &[], &mut objects);
         assert!(list(&objects).is_empty(), "it has never gone");
-        errors.clear(threshold(2, 0x20), &mut objects);
-        errors.raise(threshold(2, 0x20), &mut objects);
+        errors.change(&[], &[threshold(2, 0x20)], &mut objects);
+        errors.change(&[threshold(2, 0x20)], &[], &mut objects);
         assert_eq!(list(&objects), [0x2002_F011]);
     }
 
@@ -198,11 +226,11 @@ mod tests {
         for (name, channels, room) in [("AXTC4CO", 4, 9), ("AXRTD8CO", 8, 17)] {
             let (mut objects, mut errors) = (objects(name), ActiveErrors::default());
             for channel in 1..=channels {
-                errors.raise(threshold(channel, 0x20), &mut objects);
-                errors.raise(threshold(channel, 0x40), &mut objects);
+                errors.change(&[threshold(channel, 0x20)], &[], &mut objects);
+                errors.change(&[threshold(channel, 0x40)], &[], &mut objects);
             }
             for node in [5, 6] {
-                errors.raise(Emergency { code: 0x8130, channel: node, description: 0x80 }, &mut objects);
+                errors.change(&[Emergency { code: 0x8130, channel: node, description: 0x80 }], &[], &mut objects);
             }
             let list = list(&objects);
             assert_eq!(list.len(), room, "{name}");

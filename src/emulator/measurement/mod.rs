@@ -209,7 +209,7 @@ impl Updated {
 
 impl Channel {
     fn evaluate(&mut self, now: Instant, number: u8, objects: &mut Objects, errors: &mut ActiveErrors) {
-        self.watch(now, number, objects, errors);
+        let (mut raised, mut cleared) = self.watch(now, number, objects);
         let sensor_error = match self.reading {
             Reading::Celsius(_) | Reading::Off => None,
             Reading::Open => Some(Emergency { code: INPUT_OVERLOAD, channel: number, description: 0x02 }),
@@ -218,14 +218,10 @@ impl Channel {
             Reading::Frozen => Some(Emergency { code: DEVICE_SPECIFIC, channel: number, description: 0x80 }),
         };
         if self.sensor_error != sensor_error {
-            // The new one first, so that the unit is at no moment without an error.
-            if let Some(error) = sensor_error {
-                errors.raise(error, objects);
-            }
-            if let Some(error) = std::mem::replace(&mut self.sensor_error, sensor_error) {
-                errors.clear(error, objects);
-            }
+            raised.extend(sensor_error);
+            cleared.extend(std::mem::replace(&mut self.sensor_error, sensor_error));
         }
+        errors.change(&raised, &cleared, objects);
         let (factor, offset) = (objects.number(0x6126, number), objects.number(0x6127, number));
         let (field_value, process_value) = match self.reading {
             Reading::Celsius(celsius) => (Value::Real32(celsius as f32), scaled(celsius, factor, offset)),
@@ -241,13 +237,14 @@ impl Channel {
     }
 
     /// Compares with the thresholds: only what is exceeded for the reaction delay without a break counts, and what
-    /// counts goes at once when it has cleared by the hysteresis (section 1.2).
-    fn watch(&mut self, now: Instant, number: u8, objects: &mut Objects, errors: &mut ActiveErrors) {
+    /// counts goes at once when it has cleared by the hysteresis (section 1.2). Gives the errors that count from now
+    /// on, and those that no longer do.
+    fn watch(&mut self, now: Instant, number: u8, objects: &Objects) -> (Vec<Emergency>, Vec<Emergency>) {
         let settings = [0x4000, 0x4010, 0x4020, 0x4030].map(|index| objects.integer(index, number));
         let unchanged = std::mem::replace(&mut self.settings, settings) == settings;
         let delay = Duration::from_millis(settings[3] as u64);
+        let (mut raised, mut cleared) = (Vec::new(), Vec::new());
         for (threshold, (watch, tenths)) in self.thresholds.iter_mut().zip(WATCHES.iter().zip(settings)) {
-            let error = Emergency { code: LIMIT_EXCEEDED, channel: number, description: watch.description };
             let limit = tenths as f64 / 10.0;
             let was_exceeded = *threshold == Threshold::Exceeded;
             *threshold = match (self.reading, *threshold) {
@@ -271,13 +268,14 @@ impl Channel {
                 // Without a temperature there is nothing to compare (errata E-75).
                 (_, _) => Threshold::Kept,
             };
-            let is_exceeded = *threshold == Threshold::Exceeded;
-            if is_exceeded && !was_exceeded {
-                errors.raise(error, objects);
-            } else if was_exceeded && !is_exceeded {
-                errors.clear(error, objects);
+            let error = Emergency { code: LIMIT_EXCEEDED, channel: number, description: watch.description };
+            match (was_exceeded, *threshold == Threshold::Exceeded) {
+                (false, true) => raised.push(error),
+                (true, false) => cleared.push(error),
+                (false, false) | (true, true) => {}
             }
         }
+        (raised, cleared)
     }
 
     /// Object 6150h.

@@ -1,5 +1,6 @@
 //! What both products make of their inputs, in virtual time, against the acceptance items.
 
+use super::super::errors::ErrorEvent;
 use super::super::knob::{Knob, Lead};
 use super::super::rtd_curve::R0;
 use super::*;
@@ -226,6 +227,9 @@ fn an_open_circuit_takes_the_place_of_threshold_errors() {
     bench.turn(Knob::Repair(1));
     bench.run_ms(200);
     assert_eq!((bench.status(1), bench.errors()), (0x41, vec![0x4001_F011, 0x2001_F011]));
+    let events = std::iter::from_fn(|| bench.active.poll_event());
+    let without = events.filter(|event| matches!(event, ErrorEvent::Cleared { last: true, .. })).count();
+    assert_eq!(without, 0, "at no moment is there no error");
 }
 
 // B-073
