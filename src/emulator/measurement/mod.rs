@@ -66,9 +66,20 @@ enum Updated {
 struct Channel {
     reading: Reading,
     thresholds: [Threshold; 3],
-    /// Thresholds and delay of the last evaluation: a change restarts what was pending (errata E-D20).
-    settings: [i64; 4],
+    /// What the last evaluation rested on: a change restarts what was pending (errata E-D20).
+    settings: Settings,
     sensor_error: Option<Emergency>,
+}
+
+/// What a channel's evaluation rests on besides its reading.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Settings {
+    /// Objects 4000h, 4010h and 4020h, in 0.1 °C.
+    thresholds: [i64; 3],
+    /// Object 4030h.
+    delay_ms: u16,
+    /// Object 6110h, and 3000h of an RTD: another sensor or curve has another temperature.
+    sensor: (i64, Option<i64>),
 }
 
 /// One threshold of a channel.
@@ -112,8 +123,12 @@ const PV_FROZEN: i16 = -384;
 impl Measurement {
     /// Begins at the unit's start.
     pub fn start(now: Instant, product: &Product, objects: &mut Objects) -> Self {
-        let channel =
-            Channel { reading: Reading::Off, thresholds: [Threshold::Kept; 3], settings: [0; 4], sensor_error: None };
+        let channel = Channel {
+            reading: Reading::Off,
+            thresholds: [Threshold::Kept; 3],
+            settings: Settings::default(),
+            sensor_error: None,
+        };
         let channels = product.measurement.channels;
         for channel in 1..=channels {
             objects.set(0x6100, channel, Value::NOT_A_NUMBER);
@@ -207,6 +222,20 @@ impl Updated {
     }
 }
 
+impl Settings {
+    fn of(objects: &Objects, number: u8) -> Self {
+        let curve = match objects.product().measurement.sensors {
+            SensorKind::Thermocouple => None,
+            SensorKind::Rtd => Some(objects.integer(0x3000, number)),
+        };
+        Settings {
+            thresholds: WATCHES.map(|watch| objects.integer(watch.index, number)),
+            delay_ms: objects.integer(0x4030, number) as u16,
+            sensor: (objects.integer(0x6110, number), curve),
+        }
+    }
+}
+
 impl Channel {
     fn evaluate(&mut self, now: Instant, number: u8, objects: &mut Objects, errors: &mut ActiveErrors) {
         let (mut raised, mut cleared) = self.watch(now, number, objects);
@@ -240,11 +269,11 @@ impl Channel {
     /// counts goes at once when it has cleared by the hysteresis (section 1.2). Gives the errors that count from now
     /// on, and those that no longer do.
     fn watch(&mut self, now: Instant, number: u8, objects: &Objects) -> (Vec<Emergency>, Vec<Emergency>) {
-        let settings = [0x4000, 0x4010, 0x4020, 0x4030].map(|index| objects.integer(index, number));
+        let settings = Settings::of(objects, number);
         let unchanged = std::mem::replace(&mut self.settings, settings) == settings;
-        let delay = Duration::from_millis(settings[3] as u64);
+        let delay = Duration::from_millis(u64::from(settings.delay_ms));
         let (mut raised, mut cleared) = (Vec::new(), Vec::new());
-        for (threshold, (watch, tenths)) in self.thresholds.iter_mut().zip(WATCHES.iter().zip(settings)) {
+        for (threshold, (watch, tenths)) in self.thresholds.iter_mut().zip(WATCHES.iter().zip(settings.thresholds)) {
             let limit = tenths as f64 / 10.0;
             let was_exceeded = *threshold == Threshold::Exceeded;
             *threshold = match (self.reading, *threshold) {

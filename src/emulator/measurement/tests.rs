@@ -298,6 +298,27 @@ fn a_threshold_counts_when_it_was_exceeded_without_a_break_for_the_delay() {
     }
 }
 
+// Errata E-D20.
+#[test]
+fn a_setting_that_changes_restarts_the_delay() {
+    let changes: [(&str, u16, f64); 5] = [
+        ("AXTC4CO", 0x4010, 1_240.0),
+        ("AXTC4CO", 0x4030, 4_999.0),
+        ("AXTC4CO", 0x6110, 2.0),
+        ("AXRTD8CO", 0x6110, 10_000.0),
+        ("AXRTD8CO", 0x3000, 4.0),
+    ];
+    for (name, index, number) in changes {
+        let mut bench = Bench::new(name);
+        bench.celsius(1, 200.0, 4_000);
+        bench.write(index, 1, number);
+        bench.run_ms(4_000);
+        assert_eq!(bench.status(1), 0x00, "{name} {index:04X}h");
+        bench.run_ms(3_000);
+        assert_eq!(bench.status(1), 0x20, "{name} {index:04X}h");
+    }
+}
+
 // B-097, B-098, B-49, B-50, B-51, B-115, B-75, B-76
 #[test]
 fn a_shutdown_is_listed_with_its_warning_and_shown_alone() {
