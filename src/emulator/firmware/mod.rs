@@ -83,9 +83,10 @@ enum Dialogue {
     Password {
         line: Line,
     },
-    /// The object dictionary is shown up to this place of the walk.
+    /// The object dictionary is shown up to this place of the walk; scanning and CAN are halted since then.
     View {
         place: usize,
+        since: Instant,
     },
     /// The reset follows when the last text has left.
     Leaving,
@@ -280,7 +281,7 @@ impl Firmware {
             Dialogue::Password { line } => {
                 self.line_key(board, key, line, |line| Dialogue::Password { line }, Firmware::enter_loader)
             }
-            Dialogue::View { place } => self.view_key(board, key, place),
+            Dialogue::View { place, since } => self.view_key(board, key, place, since),
             Dialogue::Leaving => Dialogue::Leaving,
         };
     }
@@ -403,23 +404,24 @@ impl Firmware {
         self.print(board, Sentence::ViewTitle);
         self.say_objects(board, view::pdo_block(board.product));
         self.print(board, Sentence::ViewNext);
-        Dialogue::View { place: 0 }
+        Dialogue::View { place: 0, since: board.now }
     }
 
-    fn view_key(&mut self, board: &mut Board<'_>, key: u8, place: usize) -> Dialogue {
+    fn view_key(&mut self, board: &mut Board<'_>, key: u8, place: usize, since: Instant) -> Dialogue {
         let next = match key {
             b'\r' => view::object(board.product, place),
             b'x' | b'X' => None,
-            _ => return Dialogue::View { place },
+            _ => return Dialogue::View { place, since },
         };
         let Some(object) = next else {
             self.measurement.resume(board.now);
+            self.network.resume(board.now.since(since));
             self.print(board, Sentence::ViewEnd);
             self.print_menu(board);
             return Dialogue::Menu;
         };
         self.say_objects(board, std::iter::once(object));
-        Dialogue::View { place: place + 1 }
+        Dialogue::View { place: place + 1, since }
     }
 
     fn ask(&mut self, board: &mut Board<'_>, prompt: Sentence, dialogue: Dialogue) -> Dialogue {

@@ -150,6 +150,26 @@ fn the_node_starts_by_itself_if_it_was_told_to() {
     }
 }
 
+// Errata E-110: behind the view the node is pre-operational.
+#[test]
+fn a_start_that_is_due_while_the_view_is_open_comes_later() {
+    for name in PRODUCTS {
+        let mut bench = measuring(name);
+        assert_eq!(bench.write("5555", 1.0), Ok(()));
+        bench.save();
+        bench.power_off();
+        bench.power_on();
+        bench.run_ms(3_000);
+        bench.keys(b"v");
+        bench.run_ms(20_000);
+        bench.keys(b"x");
+        bench.run_ms(1_500);
+        assert_eq!(bench.unit().network_state(), Some(NetworkState::PreOperational), "{name}");
+        bench.run_ms(500);
+        assert_eq!(bench.unit().network_state(), Some(NetworkState::Operational), "{name}: 5 s without the view");
+    }
+}
+
 // B-126, B-127, B-84, B-83
 #[test]
 fn errors_move_the_node_as_1029h_says() {
