@@ -47,9 +47,6 @@ use uart::Uart;
 /// From power or reset to the first program's first character; keys are lost meanwhile. A guess.
 pub const START_TIME: Duration = Duration::from_millis(50);
 
-/// The longest a powered unit asks to be left alone: its watchdog has to be served.
-const WATCHDOG_TIME: Duration = Duration::from_secs(1);
-
 /// What a unit is made of before power comes.
 #[derive(Clone, Debug)]
 pub struct Setup {
@@ -132,7 +129,6 @@ enum Power {
     Off,
     On {
         program: Program,
-        watchdog_at: Instant,
         /// A program has asked for it; it happens when the last text has left.
         reset: Option<Reset>,
     },
@@ -195,7 +191,7 @@ impl Unit {
         if matches!(self.power, Power::Off) {
             self.uart.reset();
             let program = Program::Starting { until: now + START_TIME, reset: Reset::Start };
-            self.power = Power::On { program, watchdog_at: now + WATCHDOG_TIME, reset: None };
+            self.power = Power::On { program, reset: None };
         }
     }
 
@@ -203,7 +199,7 @@ impl Unit {
     pub fn power_off(&mut self, now: Instant) {
         if matches!(self.power, Power::On { .. }) {
             self.run_until(now);
-            self.uart.power_lost(now);
+            self.uart.cut(now);
             self.flash.power_lost(now, &mut self.stores);
             self.power = Power::Off;
         }
@@ -294,6 +290,7 @@ impl Unit {
                 firmware.nmt(board, command);
             }
         });
+        self.reset_if_asked(now);
     }
 
     /// The network reads an entry of the object dictionary.
@@ -345,21 +342,22 @@ impl Unit {
             Program::Loader(loader) => loader.step(board),
             Program::Application(firmware) => firmware.step(board),
         });
-        let Power::On { program, watchdog_at, reset } = &mut self.power else { return };
-        if *watchdog_at <= now {
-            *watchdog_at = now + WATCHDOG_TIME;
+        self.reset_if_asked(now);
+        if let Power::On { program: Program::Starting { until, reset }, .. } = self.power
+            && until <= now
+        {
+            self.start_program(now, reset);
         }
-        // A reset waits for the last text: the programs print it before they let go.
-        if self.uart.backlog() == 0
+    }
+
+    /// Starts anew if the program has asked for it. The last text leaves first: the programs print it before they let go.
+    fn reset_if_asked(&mut self, now: Instant) {
+        if let Power::On { program, reset } = &mut self.power
+            && self.uart.backlog() == 0
             && let Some(reset) = reset.take()
         {
             self.uart.reset();
             *program = Program::Starting { until: now + START_TIME, reset };
-        }
-        if let Program::Starting { until, reset } = *program
-            && until <= now
-        {
-            self.start_program(now, reset);
         }
     }
 
@@ -386,7 +384,7 @@ impl Unit {
 
     /// Lets the running program do something with the board.
     fn with_program(&mut self, now: Instant, act: impl FnOnce(&mut Program, &mut Board<'_>)) {
-        let Power::On { program, reset, .. } = &mut self.power else { return };
+        let Power::On { program, reset } = &mut self.power else { return };
         let mut board = Board {
             now,
             product: self.product,
@@ -411,6 +409,7 @@ impl Endpoint for Unit {
                 Program::Loader(loader) => loader.receive(board, byte),
                 Program::Application(firmware) => firmware.receive(board, byte),
             });
+            self.reset_if_asked(now);
         }
     }
 
@@ -423,13 +422,14 @@ impl Endpoint for Unit {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let Power::On { program, watchdog_at, .. } = &self.power else { return None };
+        let Power::On { program, .. } = &self.power else { return None };
         // Asked for some thousand times in each second of a unit that talks: plain comparisons, no list of what may be due.
         let program_due = match program {
             Program::Starting { until, .. } => *until,
             Program::Loader(loader) => loader.deadline(&self.flash).unwrap_or(Instant::NEVER),
             Program::Application(firmware) => firmware.deadline(),
         };
-        Some(program_due.min(*watchdog_at).min(self.uart.deadline().unwrap_or(Instant::NEVER)))
+        let due = program_due.min(self.uart.deadline().unwrap_or(Instant::NEVER));
+        (due < Instant::NEVER).then_some(due)
     }
 }

@@ -201,6 +201,8 @@ impl Firmware {
         self.network.command(board.now, command);
         match command {
             NmtCommand::ResetNode => {
+                // The network does not wait for a terminal, which may have sent XOFF.
+                board.uart.cut(board.now);
                 self.dialogue = Dialogue::Leaving;
                 *board.reset = Some(Reset::Start);
             }

@@ -469,6 +469,33 @@ fn keys_pressed_while_the_output_is_stopped_are_not_forgotten_and_not_without_li
 }
 
 #[test]
+fn a_reset_by_the_network_does_not_wait_for_the_terminal() {
+    for held in [false, true] {
+        let mut bench = Bench::at_menu();
+        bench.send(b"m");
+        bench.run_ms(10);
+        if held {
+            bench.send(&[XOFF]);
+            bench.run_ms(1_000);
+        }
+        bench.nmt(NmtCommand::ResetNode);
+        assert_eq!(bench.unit().running(), Running::Starting);
+        bench.run_ms(500);
+        let text = bench.take();
+        let menus = (text.matches("Main Menu").count(), text.matches("L - Load").count());
+        assert_eq!(menus, (2, 1), "half a menu, and a new start: {text}");
+        assert!(text.ends_with("State Pre-Operational\r\n") && text.contains("V1.2.3, built"), "{text}");
+    }
+}
+
+#[test]
+fn a_unit_that_waits_for_a_file_asks_for_nothing() {
+    let mut bench = Bench::at_menu();
+    bench.keys(b"lAXIO-2010\r");
+    assert_eq!((bench.unit().running(), bench.unit().poll_timeout()), (Running::Loader, None));
+}
+
+#[test]
 fn power_can_go_at_any_moment_and_what_was_typed_is_forgotten() {
     for cut_ms in (0..1_000).step_by(37) {
         let mut bench = Bench::new(setup(flash_with(&old_program())));
