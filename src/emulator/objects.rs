@@ -92,6 +92,16 @@ impl Objects {
         changed.map(|(_, &kept)| kept).collect()
     }
 
+    /// Takes the parameters of a group over from others of the same product.
+    pub fn take_over(&mut self, group: Group, from: &Objects) {
+        let entries = self.product.dictionary.entries();
+        for ((at, _, entry), (present, kept)) in entries.zip(self.values.iter_mut().zip(&from.values)) {
+            if is_parameter(at, entry) && Group::of(at.index) == Some(group) {
+                *present = *kept;
+            }
+        }
+    }
+
     /// The product they are of.
     pub fn product(&self) -> &'static Product {
         self.product

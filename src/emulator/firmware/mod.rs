@@ -21,7 +21,7 @@ use super::uart::{XOFF, XON};
 use super::{Board, Refusal, Reset};
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::SensorKind;
-use crate::device::dictionary::Object;
+use crate::device::dictionary::{Group, Object};
 use crate::image::Identity;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::{Reading, Row, Source};
@@ -206,7 +206,10 @@ impl Firmware {
                 self.dialogue = Dialogue::Leaving;
                 *board.reset = Some(Reset::Start);
             }
-            NmtCommand::ResetCommunication => self.reload_communication(board),
+            // Errata E-93, E-G4.
+            NmtCommand::ResetCommunication => {
+                self.objects.take_over(Group::Communication, &board.parameters.objects());
+            }
             NmtCommand::Start | NmtCommand::Stop | NmtCommand::PreOperational => {}
         }
     }
@@ -241,17 +244,6 @@ impl Firmware {
             || matches!(self.dialogue, Dialogue::Leaving)
             || self.network.state() == NetworkState::Stopped;
         if silent { Err(Refusal::NoAnswer) } else { Ok(()) }
-    }
-
-    /// The communication parameters as they are kept (errata E-93, E-G4).
-    fn reload_communication(&mut self, board: &mut Board<'_>) {
-        let kept = board.parameters.objects();
-        for (at, _, entry) in board.product.dictionary.entries() {
-            let is_parameter = entry.access == crate::device::dictionary::Access::ReadWrite && at.index != 0x1003;
-            if at.index < 0x2000 && is_parameter {
-                self.objects.set(at.index, at.sub, kept.get(at.index, at.sub));
-            }
-        }
     }
 
     fn take_keys(&mut self, board: &mut Board<'_>) {
