@@ -13,6 +13,7 @@ pub use verb::{HELP, Verb};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::sensors::Sensors;
 use crate::device::{Complaint, Complaints, Product};
 use crate::time::Duration;
 
@@ -88,11 +89,13 @@ impl Scenario {
                 Some(_) => {}
             }
         }
+        // A file for units of several products may turn what some of them have not.
+        let mut terminals = raw.product.as_ref().map(|_| Sensors::new(product, 0));
         let mut deeds = Vec::new();
         for moment in &raw.at {
-            let at = seconds(&moment.seconds, "at.seconds", &mut complaints);
+            let at = seconds(&moment.seconds, "at.seconds", &mut complaints).unwrap_or_default();
             for deed in &moment.deeds {
-                match act(deed.get_ref(), product) {
+                match act(deed.get_ref(), product, terminals.as_mut()) {
                     Ok(verb) => deeds.push((at, verb)),
                     Err(error) => complaints.add(place_of(text, deed, error.column), "at.do", error.message),
                 }
@@ -101,6 +104,7 @@ impl Scenario {
         for ramp in &raw.ramp {
             let from = seconds(&ramp.from, "ramp.from", &mut complaints);
             let to = seconds(&ramp.to, "ramp.to", &mut complaints);
+            let (Some(from), Some(to)) = (from, to) else { continue };
             if to <= from {
                 complaints.add(ramp.to.span().start, "ramp.to", "a ramp ends later than it begins");
                 continue;
@@ -109,7 +113,7 @@ impl Scenario {
             for step in 0..=steps {
                 let part = f64::from(step) / f64::from(steps);
                 let value = ramp.start + (ramp.end - ramp.start) * part;
-                match act(&format!("set {} {value}", ramp.what.get_ref()), product) {
+                match act(&format!("set {} {value}", ramp.what.get_ref()), product, terminals.as_mut()) {
                     Ok(verb) => deeds.push((from + (to - from).mul_f64(part), verb)),
                     Err(error) => {
                         complaints.add(ramp.what.span().start, "ramp.what", error.message);
@@ -124,8 +128,8 @@ impl Scenario {
         }
         deeds.sort_by_key(|(at, _)| *at);
         let last = deeds.last().map_or(Duration::ZERO, |(at, _)| *at);
-        let repeat = raw.repeat.as_ref().map(|repeat| {
-            let after = seconds(repeat, "repeat", &mut complaints);
+        let repeat = raw.repeat.as_ref().and_then(|repeat| {
+            let after = seconds(repeat, "repeat", &mut complaints)?;
             if after < last {
                 let message = format!("{} s is before the last deed, at {} s", repeat.get_ref(), last.as_secs_f64());
                 complaints.add(repeat.span().start, "repeat", message);
@@ -133,7 +137,7 @@ impl Scenario {
                 let message = format!("{} s is less than {} s", repeat.get_ref(), SHORTEST_ROUND.as_secs_f64());
                 complaints.add(repeat.span().start, "repeat", message);
             }
-            after
+            Some(after)
         });
         complaints.or(Some(Scenario { deeds, repeat }))
     }
@@ -154,20 +158,25 @@ fn ramp_steps(length: Duration) -> u32 {
     (length.as_nanos() / RAMP_STEP.as_nanos()).clamp(1, u128::from(u32::MAX)) as u32
 }
 
-fn seconds(raw: &Spanned<f64>, key: &str, complaints: &mut Complaints<'_>) -> Duration {
+fn seconds(raw: &Spanned<f64>, key: &str, complaints: &mut Complaints<'_>) -> Option<Duration> {
     let value = *raw.get_ref();
     if !(0.0..=LONGEST_S).contains(&value) {
         complaints.add(raw.span().start, key, format!("{value} is not 0 to {LONGEST_S} seconds"));
-        return Duration::ZERO;
+        return None;
     }
-    Duration::from_secs_f64(value)
+    Some(Duration::from_secs_f64(value))
 }
 
-/// A verb that does something; a file has nobody to answer.
-fn act(line: &str, product: &Product) -> Result<Verb, WordError> {
+/// A verb that does something, as a file has nobody to answer; at the terminals, where they are given, something that
+/// can be done there.
+fn act(line: &str, product: &Product, terminals: Option<&mut Sensors>) -> Result<Verb, WordError> {
     match Verb::read(line, product)? {
         Verb::Read(_) | Verb::Status => {
             Err(WordError { column: 1, message: "a scenario does things; nobody would hear the answer".into() })
+        }
+        Verb::Turn(knob) => {
+            let turned = terminals.map_or(Ok(()), |terminals| terminals.turn(knob));
+            turned.map(|()| Verb::Turn(knob)).map_err(|error| WordError { column: 1, message: error.to_string() })
         }
         verb => Ok(verb),
     }
@@ -213,6 +222,18 @@ mod tests {
                 "repeat = 1\n[[at]]\nseconds = 2\ndo = []\n[[at]]\nseconds = 3\ndo = ['freeze']",
                 "test.toml:1:10: repeat: 1 s is",
             ),
+            (
+                "product = 'axtc4co'\n[[at]]\nseconds = 1\ndo = ['open 5']",
+                "test.toml:4:8: at.do: there is no input 5: this unit has inputs 1 to 4",
+            ),
+            (
+                "product = 'axtc4co'\n[[at]]\nseconds = 1\ndo = ['set 1 temperature 9999']",
+                "test.toml:4:8: at.do: a temperature cannot be 9999: it is from -273.15 to 3000",
+            ),
+            (
+                "product = 'axtc4co'\n[[ramp]]\nfrom = 1\nto = 2\nwhat = '1 resistance'\nstart = 1\nend = 2",
+                "test.toml:5:8: ramp.what: a unit with thermocouples has no resistance",
+            ),
             ("repeat = 0.000000001", "test.toml:1:10: repeat: 0.000000001 s is less than 0.1 s"),
             // Blanks of two bytes; one written as an escape; a deed on a line of its own.
             ("[[at]]\nseconds = 1\ndo = ['open\u{a0}\u{a0}3\u{a0}X']", "test.toml:3:16: at.do: 'X' is not known"),
@@ -227,6 +248,15 @@ mod tests {
         }
         let two = Scenario::read("test.toml", "[[at]]\nseconds = -1\ndo = ['x', 'y']", product()).expect_err("three");
         assert_eq!(two.len(), 3, "none hides another");
+        for text in [
+            "repeat = 1e9\n[[at]]\nseconds = 2\ndo = ['freeze']",
+            "[[ramp]]\nfrom = 5\nto = 1e9\nwhat = 'supply'\nstart = 1\nend = 2",
+        ] {
+            let complaints = Scenario::read("test.toml", text, product()).expect_err(text);
+            assert_eq!(complaints.len(), 1, "and none has a second that says something else: {complaints:?}");
+        }
+        let for_all = "[[at]]\nseconds = 1\ndo = ['set 8 temperature 20']";
+        assert!(Scenario::read("test.toml", for_all, product()).is_ok(), "another product has that input");
         assert_eq!(Scenario::read("test.toml", "product = 'axrtd8co'", product()), Ok(None), "for another product");
     }
 }
