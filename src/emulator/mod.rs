@@ -3,7 +3,7 @@
 //! Here are power and reset: which program runs, and when. The loader lives in flash of its own and runs first; it
 //! starts the application if the program in flash is intact and made for this product, unless it has been told to
 //! wait for a file. What the programs say and do is in `firmware` and `bootloader`; the port they talk through
-//! in `uart`; what outlives the power in [`memory`]; what they measure in [`sensors`].
+//! in `uart`; what outlives the power in [`memory`]; what they measure in `sensors`.
 //!
 //! Deterministic: the same setup and the same inputs at the same times give the same bytes, however often
 //! [`handle_timeout`](Endpoint::handle_timeout) is called in between, because things happen only when they are due.
@@ -11,18 +11,18 @@
 mod bootloader;
 pub mod cable;
 mod dialect;
-pub mod errors;
+mod errors;
 pub mod fault;
 mod firmware;
-pub mod its90;
+mod its90;
 pub mod knob;
-pub mod measurement;
+mod measurement;
 pub mod memory;
-pub mod network;
-pub mod objects;
-pub mod rtd_curve;
+mod network;
+mod objects;
+mod rtd_curve;
 pub mod scenario;
-pub mod sensors;
+mod sensors;
 mod uart;
 pub mod words;
 
