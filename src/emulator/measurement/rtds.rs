@@ -66,10 +66,10 @@ enum Sensor {
 struct Input {
     sensor: Sensor,
     wire_ohm: f64,
-    /// The reading at which the wires were read.
+    /// The reading at which the wires were read, if that still counts.
     wires_at: Option<u64>,
-    /// Type and mode of that time.
-    settings: (i64, i64),
+    /// Object 6110h at that time.
+    wires_of: i64,
 }
 
 impl Rtds {
@@ -122,11 +122,11 @@ impl Rtds {
                 }
                 Slot::Wire(number) => {
                     let terminals = sensors.rtd(now, number, wiring(objects, number), curve(objects, number));
-                    let (readings, ampere, settings) = (self.readings, self.ampere, settings(objects, number));
+                    let (readings, ampere) = (self.readings, self.ampere);
                     let input = self.input(number);
                     input.wire_ohm = quantised(terminals.wire) / ampere;
                     input.wires_at = Some(readings);
-                    input.settings = settings;
+                    input.wires_of = objects.integer(0x6110, number);
                     self.wire_read = true;
                 }
             }
@@ -183,21 +183,28 @@ impl Rtds {
     }
 
     /// Whether the wires of a channel are due.
-    fn wants_wire(&self, objects: &Objects, number: u8) -> bool {
-        let input = &self.channels[usize::from(number) - 1];
+    fn wants_wire(&mut self, objects: &Objects, number: u8) -> bool {
+        let (readings, wire_read) = (self.readings, self.wire_read);
+        let input = self.input(number);
+        if wiring(objects, number) == Wiring::Two || input.wires_of != objects.integer(0x6110, number) {
+            input.wires_at = None;
+        }
         match input.wires_at {
-            _ if wiring(objects, number) == Wiring::Two => false,
-            None => true,
-            Some(_) if input.settings != settings(objects, number) => true,
-            Some(at) => !self.wire_read && self.readings - at >= READINGS_BETWEEN_WIRES,
+            None => wiring(objects, number) != Wiring::Two,
+            Some(at) => !wire_read && readings - at >= READINGS_BETWEEN_WIRES,
         }
     }
 
-    /// The next channel that is on, or the current source: the sweep is over.
-    fn following(&self, objects: &Objects, number: u8) -> Slot {
-        let channels = self.channels.len() as u8;
-        let next = (number + 1..=channels).find(|&next| objects.integer(0x6112, next) != 0);
-        next.map_or(Slot::Current, Slot::Channel)
+    /// The next channel that is on, or the current source: the sweep is over. Channels that are off are passed over, and
+    /// their wires are read anew when they are on again.
+    fn following(&mut self, objects: &Objects, number: u8) -> Slot {
+        for next in number + 1..=self.channels.len() as u8 {
+            if objects.integer(0x6112, next) != 0 {
+                return Slot::Channel(next);
+            }
+            self.input(next).wires_at = None;
+        }
+        Slot::Current
     }
 
     fn input(&mut self, number: u8) -> &mut Input {
@@ -216,11 +223,6 @@ fn wiring(objects: &Objects, number: u8) -> Wiring {
         10_002 => Wiring::Four,
         _ => Wiring::Three,
     }
-}
-
-/// Type and mode of a channel: after a change its wires are read anew.
-fn settings(objects: &Objects, number: u8) -> (i64, i64) {
-    (objects.integer(0x6110, number), objects.integer(0x6112, number))
 }
 
 /// Objects 3010h, 3020h and 3030h.

@@ -484,6 +484,23 @@ fn the_wires_are_measured_once_a_minute() {
     assert!(waited > 5_000, "not in every sweep");
 }
 
+// Errata E-C6.
+#[test]
+fn the_wires_are_measured_anew_when_a_channel_has_another_type_or_is_switched_on() {
+    let mut bench = Bench::rtd8();
+    bench.turn(Knob::Resistance(1, 100.0));
+    for (lead, index, number, back) in
+        [(2.0, 0x6110, 10_002.0, 10_001.0), (3.0, 0x6110, 10_000.0, 10_001.0), (4.0, 0x6112, 0.0, 1.0)]
+    {
+        bench.write(index, 1, number);
+        bench.run_ms(2_000);
+        bench.turn(Knob::LeadResistance(1, lead));
+        bench.write(index, 1, back);
+        bench.run_ms(2_000);
+        bench.assert_celsius(1, 0.0, 0.1);
+    }
+}
+
 // B-41, B-42, B-43, B-52, B-61
 #[test]
 fn open_and_short_circuits_of_an_rtd_are_seen_in_the_sweep_that_finds_them() {
