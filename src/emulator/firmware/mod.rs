@@ -1,9 +1,8 @@
 //! The application: banner, main menu and its dialogues, data stream, diagnostics (manuals, chapter 4).
 //!
 //! What it says is worded by [`Dialect`]; who it is stands in the program flash it was started from; what it measures and
-//! is set to lies in its object dictionary ([`Objects`]). Keys come one by
-//! one; while the port has more to send than [`BLOCKED_AT`] characters, the program is stuck in printing and keys
-//! wait, as many as the receiver can keep.
+//! is set to lies in its object dictionary ([`Objects`]). Keys come one by one; while the port has more to send than
+//! [`BLOCKED_AT`] characters, the program is stuck in printing and keys wait, as many as the receiver can keep.
 
 mod about;
 mod prompt;
@@ -36,9 +35,12 @@ pub const DEFAULT_PERIOD_MS: u16 = 1_000;
 const BLOCKED_AT: usize = 2_048;
 /// Keys the receiver keeps meanwhile; further ones are lost.
 const KEYS_KEPT: usize = 64;
-/// Room for rows and pages waiting to be sent. What does not fit is dropped whole: the line is behind (errata E-105,
-/// E-119). Enough for a diagnostics page and some rows, less than a tenth of a second of the line.
-const ROW_BUFFER: usize = 1_024;
+/// Characters that may wait to be sent together with a row. What does not fit is dropped whole: the line is behind
+/// (errata E-105, E-119).
+const ROW_BUFFER: usize = 512;
+/// The same with a page of diagnostics: it has room behind any number of rows, and all that waits is less than a tenth of
+/// a second of the line.
+const PAGE_BUFFER: usize = 1_024;
 
 /// The password for new software. Real ones come from Axiomatic; this is the emulator's build setting (errata E-112).
 const PASSWORD: &str = "AXIO-2010";
@@ -167,13 +169,13 @@ impl Firmware {
                 let row = board.product.stream.emit(&measurement::row(objects, stream.source));
                 row + self.dialect.line_end()
             });
-            self.repeat(board, &row);
+            self.repeat(board, &row, ROW_BUFFER);
             self.row = Some(row);
         }
         if self.page_at.is_some_and(|due| due <= now) {
             self.page_at = self.page_at.map(|due| due + DIAGNOSTICS_PERIOD);
             let page = self.with_line_ends(self.dialect.diagnostics(&self.diagnosis(board)));
-            self.repeat(board, &page);
+            self.repeat(board, &page, PAGE_BUFFER);
         }
     }
 
@@ -440,10 +442,10 @@ impl Firmware {
         self.started_at + Duration::from_millis(u64::from(board.product.measurement.first_data_ms))
     }
 
-    /// A row or page: only while nothing else is asked or shown (errata E-117) and the line keeps up; otherwise it is
-    /// dropped whole.
-    fn repeat(&mut self, board: &mut Board<'_>, text: &str) {
-        if matches!(self.dialogue, Dialogue::Menu) && board.uart.backlog() + text.len() <= ROW_BUFFER {
+    /// A row or page: only while nothing else is asked or shown (errata E-117) and no more than `room` waits with it;
+    /// otherwise it is dropped whole.
+    fn repeat(&mut self, board: &mut Board<'_>, text: &str, room: usize) {
+        if matches!(self.dialogue, Dialogue::Menu) && board.uart.backlog() + text.len() <= room {
             board.uart.send(board.now, text.as_bytes());
         }
     }

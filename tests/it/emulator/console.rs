@@ -213,6 +213,19 @@ fn a_line_that_is_too_slow_loses_whole_rows() {
     assert!(menu.contains("V - View Object Dictionary\r\n  D - Default"), "the menu comes whole: {menu}");
 }
 
+// B-197
+#[test]
+fn a_stream_that_fills_the_line_leaves_room_for_the_diagnostics() {
+    let mut bench = Bench::at_menu();
+    bench.keys(b"tf1\rs");
+    bench.run_ms(4_000);
+    bench.take();
+    bench.run_ms(5_000);
+    let text = bench.take();
+    assert_eq!(text.matches("Supply Voltage").count(), 5, "a page a second");
+    assert!(rows(&text).len() > 1_100, "and rows in between: {}", rows(&text).len());
+}
+
 // B-191, B-197, B-157
 #[test]
 fn the_stream_comes_back_after_a_power_cycle_and_diagnostics_do_not() {
