@@ -255,6 +255,10 @@ mod tests {
             let complaints = Scenario::read("test.toml", text, product()).expect_err(text);
             assert_eq!(complaints.len(), 1, "and none has a second that says something else: {complaints:?}");
         }
+        let many = format!("[[at]]\nseconds = 1\ndo = [{}]", "\n'x',".repeat(100_000));
+        let complaints = Scenario::read("test.toml", &many, product()).expect_err("no verbs");
+        assert_eq!(complaints.len(), 101);
+        assert_eq!(complaints[100].to_string(), "test.toml:104:2: and more is wrong");
         let for_all = "[[at]]\nseconds = 1\ndo = ['set 8 temperature 20']";
         assert!(Scenario::read("test.toml", for_all, product()).is_ok(), "another product has that input");
         assert_eq!(Scenario::read("test.toml", "product = 'axrtd8co'", product()), Ok(None), "for another product");
