@@ -32,6 +32,9 @@ impl fmt::Display for Complaint {
     }
 }
 
+/// Complaints about one file that are told: more help nobody, and each is looked up in the text.
+const MOST_COMPLAINTS: usize = 100;
+
 /// The complaints about one file.
 #[derive(Debug)]
 pub struct Complaints<'a> {
@@ -46,16 +49,24 @@ impl<'a> Complaints<'a> {
         Complaints { file, text, found: Vec::new() }
     }
 
-    /// One more, about what stands at a byte of the text.
+    /// One more, about what stands at a byte of the text. What comes behind the last one that is told is only said to be.
     pub fn add(&mut self, at: usize, key: impl Into<String>, message: impl Into<String>) {
+        match self.found.len() {
+            0..MOST_COMPLAINTS => self.put(at, key.into(), message.into()),
+            MOST_COMPLAINTS => self.put(at, String::new(), "and more is wrong".into()),
+            _ => {}
+        }
+    }
+
+    fn put(&mut self, at: usize, key: String, message: String) {
         let before = self.text.get(..at).unwrap_or_default();
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
         self.found.push(Complaint {
             file: self.file.to_owned(),
             line: before.matches('\n').count() + 1,
             column: before[line_start..].chars().count() + 1,
-            key: key.into(),
-            message: message.into(),
+            key,
+            message,
         });
     }
 

@@ -18,8 +18,6 @@ const CREATED: [&str; 2] = ["11-24-2026", "12:00PM"];
 const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 /// Objects that no configuration is written back to: their values are commands (CiA 306, ObjFlags).
 const NEVER_RESTORED: [u16; 4] = [0x1010, 0x1011, 0x5E00, 0x6125];
-/// Bit rates an EDS names, in kbit/s; the units have them all (section 3.1.2).
-const BIT_RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 
 /// A unit as a device configuration file describes it.
 #[derive(Clone, Debug)]
@@ -74,7 +72,7 @@ fn file(product: &Product, configuration: Option<&Configuration>) -> String {
     eds.line("ProductNumber", format!("0x{:08X}", product.can.product_code));
     eds.line("RevisionNumber", "0");
     eds.line("OrderCode", name);
-    for kbps in BIT_RATES {
+    for kbps in super::BIT_RATES_KBPS {
         eds.line(&format!("BaudRate_{kbps}"), 1);
     }
     eds.line("SimpleBootUpMaster", 0);

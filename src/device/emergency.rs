@@ -23,6 +23,13 @@ impl From<u32> for Emergency {
     }
 }
 
+impl From<Emergency> for u32 {
+    fn from(Emergency { code, channel, description }: Emergency) -> u32 {
+        let [high, low] = code.to_be_bytes();
+        u32::from_be_bytes([description, channel, high, low])
+    }
+}
+
 impl fmt::Display for Emergency {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:02X}{:02X}{:04X}h", self.description, self.channel, self.code)
@@ -86,6 +93,7 @@ mod tests {
             ("AXRTD8CO", 0x0800_FF00, "channel 0: math error"),
         ] {
             assert_eq!(words(product, entry), expected, "{entry:08X}");
+            assert_eq!(u32::from(Emergency::from(entry)), entry, "there and back");
         }
     }
 }

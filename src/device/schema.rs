@@ -9,7 +9,7 @@ use toml::{Spanned, Value as Toml};
 
 use super::complaint::{Complaint, Complaints};
 use super::dictionary::{Access, Bound, Dictionary, Entry, FactoryValue, Limits, Meaning, Object, ObjectKind};
-use super::{BootFlash, Cable, Can, Console, Loader, Measurement, Product};
+use super::{BIT_RATES_KBPS, BootFlash, Cable, Can, Console, Loader, Measurement, Product};
 use crate::canopen::{DataType, ObjectAddress, Value};
 use crate::image::FlashMap;
 use crate::image::identity::LONGEST_NAME;
@@ -177,8 +177,8 @@ impl Reader<'_> {
         if !(1..=127).contains(&node_id) {
             self.complain(can.span().start, "can.node_id", format!("{node_id} is not 1 to 127"));
         }
-        if !BIT_RATES.contains(&kbps) {
-            let allowed = BIT_RATES.map(|rate| rate.to_string()).join(", ");
+        if !BIT_RATES_KBPS.contains(&kbps) {
+            let allowed = BIT_RATES_KBPS.map(|rate| rate.to_string()).join(", ");
             self.complain(can.span().start, "can.kbps", format!("{kbps} is none of {allowed}"));
         }
     }
@@ -562,9 +562,6 @@ fn shown(raw: &Toml) -> String {
         other => format!("a value of type {}", other.type_str()),
     }
 }
-
-/// Bit rates of the units in kbit/s (AXTC4CO manual, section 3.1.2).
-const BIT_RATES: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 
 #[cfg(test)]
 mod tests {

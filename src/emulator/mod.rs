@@ -3,7 +3,7 @@
 //! Here are power and reset: which program runs, and when. The loader lives in flash of its own and runs first; it
 //! starts the application if the program in flash is intact and made for this product, unless it has been told to
 //! wait for a file. What the programs say and do is in `firmware` and `bootloader`; the port they talk through
-//! in `uart`; what outlives the power in [`memory`]; what they measure in [`sensors`].
+//! in `uart`; what outlives the power in [`memory`]; what they measure in `sensors`.
 //!
 //! Deterministic: the same setup and the same inputs at the same times give the same bytes, however often
 //! [`handle_timeout`](Endpoint::handle_timeout) is called in between, because things happen only when they are due.
@@ -11,18 +11,18 @@
 mod bootloader;
 pub mod cable;
 mod dialect;
+mod errors;
 pub mod fault;
-pub mod faults;
 mod firmware;
-pub mod its90;
+mod its90;
 pub mod knob;
-pub mod measurement;
+mod measurement;
 pub mod memory;
-pub mod network;
-pub mod objects;
-pub mod rtd_curve;
+mod network;
+mod objects;
+mod rtd_curve;
 pub mod scenario;
-pub mod sensors;
+mod sensors;
 mod uart;
 pub mod words;
 
@@ -46,9 +46,6 @@ use uart::Uart;
 
 /// From power or reset to the first program's first character; keys are lost meanwhile. A guess.
 pub const START_TIME: Duration = Duration::from_millis(50);
-
-/// The longest a powered unit asks to be left alone: its watchdog has to be served.
-const WATCHDOG_TIME: Duration = Duration::from_secs(1);
 
 /// What a unit is made of before power comes.
 #[derive(Clone, Debug)]
@@ -132,7 +129,6 @@ enum Power {
     Off,
     On {
         program: Program,
-        watchdog_at: Instant,
         /// A program has asked for it; it happens when the last text has left.
         reset: Option<Reset>,
     },
@@ -195,7 +191,7 @@ impl Unit {
         if matches!(self.power, Power::Off) {
             self.uart.reset();
             let program = Program::Starting { until: now + START_TIME, reset: Reset::Start };
-            self.power = Power::On { program, watchdog_at: now + WATCHDOG_TIME, reset: None };
+            self.power = Power::On { program, reset: None };
         }
     }
 
@@ -203,7 +199,7 @@ impl Unit {
     pub fn power_off(&mut self, now: Instant) {
         if matches!(self.power, Power::On { .. }) {
             self.run_until(now);
-            self.uart.power_lost(now);
+            self.uart.cut(now);
             self.flash.power_lost(now, &mut self.stores);
             self.power = Power::Off;
         }
@@ -261,6 +257,11 @@ impl Unit {
         self.flash.spoil(word, defect);
     }
 
+    /// Number of things that are wrong with words of program flash.
+    pub fn spoiled(&self) -> usize {
+        self.flash.defects()
+    }
+
     /// Makes all words of program flash good again.
     pub fn repair_flash(&mut self) {
         self.flash.repair();
@@ -289,6 +290,7 @@ impl Unit {
                 firmware.nmt(board, command);
             }
         });
+        self.reset_if_asked(now);
     }
 
     /// The network reads an entry of the object dictionary.
@@ -340,21 +342,22 @@ impl Unit {
             Program::Loader(loader) => loader.step(board),
             Program::Application(firmware) => firmware.step(board),
         });
-        let Power::On { program, watchdog_at, reset } = &mut self.power else { return };
-        if *watchdog_at <= now {
-            *watchdog_at = now + WATCHDOG_TIME;
+        self.reset_if_asked(now);
+        if let Power::On { program: Program::Starting { until, reset }, .. } = self.power
+            && until <= now
+        {
+            self.start_program(now, reset);
         }
-        // A reset waits for the last text: the programs print it before they let go.
-        if self.uart.backlog() == 0
+    }
+
+    /// Starts anew if the program has asked for it. The last text leaves first: the programs print it before they let go.
+    fn reset_if_asked(&mut self, now: Instant) {
+        if let Power::On { program, reset } = &mut self.power
+            && self.uart.backlog() == 0
             && let Some(reset) = reset.take()
         {
             self.uart.reset();
             *program = Program::Starting { until: now + START_TIME, reset };
-        }
-        if let Program::Starting { until, reset } = *program
-            && until <= now
-        {
-            self.start_program(now, reset);
         }
     }
 
@@ -381,7 +384,7 @@ impl Unit {
 
     /// Lets the running program do something with the board.
     fn with_program(&mut self, now: Instant, act: impl FnOnce(&mut Program, &mut Board<'_>)) {
-        let Power::On { program, reset, .. } = &mut self.power else { return };
+        let Power::On { program, reset } = &mut self.power else { return };
         let mut board = Board {
             now,
             product: self.product,
@@ -406,6 +409,7 @@ impl Endpoint for Unit {
                 Program::Loader(loader) => loader.receive(board, byte),
                 Program::Application(firmware) => firmware.receive(board, byte),
             });
+            self.reset_if_asked(now);
         }
     }
 
@@ -418,13 +422,14 @@ impl Endpoint for Unit {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let Power::On { program, watchdog_at, .. } = &self.power else { return None };
+        let Power::On { program, .. } = &self.power else { return None };
         // Asked for some thousand times in each second of a unit that talks: plain comparisons, no list of what may be due.
         let program_due = match program {
             Program::Starting { until, .. } => *until,
             Program::Loader(loader) => loader.deadline(&self.flash).unwrap_or(Instant::NEVER),
             Program::Application(firmware) => firmware.deadline(),
         };
-        Some(program_due.min(*watchdog_at).min(self.uart.deadline().unwrap_or(Instant::NEVER)))
+        let due = program_due.min(self.uart.deadline().unwrap_or(Instant::NEVER));
+        (due < Instant::NEVER).then_some(due)
     }
 }

@@ -75,6 +75,11 @@ impl Network {
         }
     }
 
+    /// Goes on after it was halted for a time: what was planned comes that much later.
+    pub fn resume(&mut self, halted: Duration) {
+        self.start_at = self.start_at.map(|due| due + halted);
+    }
+
     /// Carries out an order; resets are the application's affair and only end what was planned.
     pub fn command(&mut self, now: Instant, command: NmtCommand) {
         match command {
@@ -96,14 +101,16 @@ impl Network {
         }
     }
 
-    /// An error has become active: object 1029h says what the node does. It stays there until a master says otherwise
-    /// (errata E-72, E-D15).
+    /// An error has become active: object 1029h says what the node does. Where that puts it it stays until a master says
+    /// otherwise (errata E-72, E-D15): what was planned no longer counts.
     pub fn react(&mut self, reaction: i64) {
-        match (reaction, self.state) {
-            (0, NetworkState::Operational) => self.state = NetworkState::PreOperational,
-            (2, _) => self.state = NetworkState::Stopped,
-            _ => {}
-        }
+        let state = match (reaction, self.state) {
+            (0, NetworkState::Operational) => NetworkState::PreOperational,
+            (2, _) => NetworkState::Stopped,
+            _ => return,
+        };
+        self.state = state;
+        self.start_at = None;
     }
 }
 
@@ -155,6 +162,16 @@ mod tests {
         network.command(at(4_000), NmtCommand::Stop);
         network.step(at(6_000));
         assert_eq!(network.state(), NetworkState::Stopped, "an order cancels it");
+    }
+
+    #[test]
+    fn an_error_that_stops_the_node_cancels_its_start() {
+        let mut network = network("AXTC4CO", true);
+        network.react(0);
+        assert_eq!(network.deadline(), Some(at(5_000)), "it was not operational: errata E-74");
+        network.react(2);
+        network.step(at(6_000));
+        assert_eq!((network.state(), network.deadline()), (NetworkState::Stopped, None));
     }
 
     // B-029, B-110

@@ -45,11 +45,6 @@ impl Curve {
         Curve { a: a * SCALE[0], b: b * SCALE[1], c: c * SCALE[2] }
     }
 
-    /// IEC 751, what a sensor on the bench follows unless its channel is set to another curve.
-    pub fn iec() -> Self {
-        Curve::from_objects(COEFFICIENTS[0].map(f64::from))
-    }
-
     /// Resistance in ohm at a temperature in °C.
     pub fn resistance(self, celsius: f64) -> f64 {
         R0 * self.ratio(celsius)

@@ -101,8 +101,8 @@ impl Uart {
         self.plan();
     }
 
-    /// Power is gone: like a reset, but what the line has carried by now has arrived.
-    pub fn power_lost(&mut self, now: Instant) {
+    /// A reset in the middle of a text, or the end of power: what the line has carried by now has arrived.
+    pub fn cut(&mut self, now: Instant) {
         self.release(self.finished_by(now));
         self.reset();
     }

@@ -7,13 +7,13 @@
 //! product is an error, and nothing in it is touched.
 
 use std::fs::{self, File, TryLockError};
-use std::io;
+use std::io::{self, Read};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 use super::save::{self, SaveError};
 use crate::device::Product;
-use crate::emulator::memory::{Parameters, ParametersError};
+use crate::emulator::memory::{IMAGE_BYTES, Parameters, ParametersError};
 use crate::emulator::{Area, Store};
 
 /// A unit's state directory, locked for this process.
@@ -112,21 +112,29 @@ impl State {
         fs::create_dir_all(folder).map_err(failed("create", folder))?;
         let lock = lock(folder)?;
         let (flash_file, parameters_file) = (folder.join(FLASH), folder.join(PARAMETERS));
-        let (flash, parameters) = (read(&flash_file)?, read(&parameters_file)?);
-        let unfit = match parameters.as_deref().map(|bytes| Parameters::read(product, bytes)) {
-            Some(Err(found @ ParametersError::Product { .. })) => {
-                return Err(StateError::OtherProduct { folder: folder.to_owned(), found });
+        let (name, size) = (&product.name, initial.flash.len());
+        let flash = match read(&flash_file, size)? {
+            None => Ok(None),
+            Some(Found::Whole(bytes)) if bytes.len() == size => Ok(Some(bytes)),
+            Some(Found::Whole(bytes)) => {
+                Err(format!("it has {} bytes, the program flash of an {name} has {size}", bytes.len()))
             }
-            Some(Err(error)) => Some(error.to_string()),
-            Some(Ok(_)) | None => None,
+            Some(Found::Longer) => Err(format!("it has more than the {size} bytes of an {name}'s program flash")),
+        };
+        let parameters = match read(&parameters_file, IMAGE_BYTES)? {
+            None => Ok(None),
+            Some(Found::Whole(bytes)) => match Parameters::read(product, &bytes) {
+                Ok(_) => Ok(Some(bytes)),
+                Err(found @ ParametersError::Product { .. }) => {
+                    return Err(StateError::OtherProduct { folder: folder.to_owned(), found });
+                }
+                Err(error) => Err(error.to_string()),
+            },
+            Some(Found::Longer) => Err(format!("it has more than the {IMAGE_BYTES} bytes of the parameter memory")),
         };
         let mut damaged = Vec::new();
-        let expected = initial.flash.len();
-        let wrong_size = flash.as_ref().filter(|bytes| bytes.len() != expected).map(|bytes| {
-            format!("it has {} bytes, the program flash of an {} has {expected}", bytes.len(), product.name)
-        });
-        let flash = settle(&flash_file, flash, wrong_size, &initial.flash, &mut damaged)?;
-        let parameters = settle(&parameters_file, parameters, unfit, &initial.parameters, &mut damaged)?;
+        let flash = settle(&flash_file, flash, &initial.flash, &mut damaged)?;
+        let parameters = settle(&parameters_file, parameters, &initial.parameters, &mut damaged)?;
         let open = File::options().read(true).write(true).open(&flash_file).map_err(failed("write", &flash_file))?;
         let state = State { folder: folder.to_owned(), flash: open, parameters: parameters.clone(), _lock: lock };
         Ok(Opened { state, contents: Contents { flash, parameters }, damaged })
@@ -170,29 +178,44 @@ fn lock(folder: &Path) -> Result<File, StateError> {
     }
 }
 
-fn read(file: &Path) -> Result<Option<Vec<u8>>, StateError> {
-    match fs::read(file) {
-        Ok(bytes) => Ok(Some(bytes)),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(failed("read", file)(error)),
-    }
+/// What lies in a file.
+enum Found {
+    /// This, and nothing behind it.
+    Whole(Vec<u8>),
+    /// More than there may be.
+    Longer,
 }
 
-/// What lies in the file; if there is none, or something is wrong with it, `initial` from now on.
+/// Reads a file, but no more of it than a memory has bytes: whatever its name leads to need not have an end.
+fn read(file: &Path, most: usize) -> Result<Option<Found>, StateError> {
+    match fs::metadata(file) {
+        // Opening a pipe would wait for somebody at its other end.
+        Ok(found) if !found.is_file() => return Err(failed("read", file)(io::Error::other(SaveError::NotAFile))),
+        Ok(_) => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(failed("read", file)(error)),
+    }
+    let mut bytes = Vec::new();
+    File::open(file)
+        .and_then(|file| file.take(most as u64 + 1).read_to_end(&mut bytes))
+        .map_err(failed("read", file))?;
+    Ok(Some(if bytes.len() > most { Found::Longer } else { Found::Whole(bytes) }))
+}
+
+/// What lies in the file; `initial` from now on if there is none, or something is wrong with it.
 fn settle(
     file: &Path,
-    found: Option<Vec<u8>>,
-    wrong: Option<String>,
+    found: Result<Option<Vec<u8>>, String>,
     initial: &[u8],
     damaged: &mut Vec<Damaged>,
 ) -> Result<Vec<u8>, StateError> {
-    match (found, wrong) {
-        (Some(bytes), None) => return Ok(bytes),
-        (Some(_), Some(what)) => {
+    match found {
+        Ok(Some(bytes)) => return Ok(bytes),
+        Ok(None) => {}
+        Err(what) => {
             let kept = keep_aside(file)?;
             damaged.push(Damaged { file: file.to_owned(), what, kept });
         }
-        (None, _) => {}
     }
     replace(file, initial)?;
     Ok(initial.to_vec())
@@ -288,6 +311,33 @@ mod tests {
             assert!(texts[0].contains(&format!("{FLASH}.damaged-{round}")), "{}", texts[0]);
             assert_eq!(fs::read(&flash).expect("new"), initial("AXTC4CO").flash);
         }
+    }
+
+    #[test]
+    fn no_more_is_read_of_a_file_than_a_memory_has() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, complaint) in [
+            (FLASH, "it has more than the 131072 bytes of an AXTC4CO's program flash"),
+            (PARAMETERS, "it has more than the 4096 bytes of the parameter memory"),
+        ] {
+            // Larger than all memory, and blank as far as it is looked at.
+            let file = File::create(folder.path().join(name)).expect("created");
+            file.write_all_at(&[0xFF; 200_000], 0).and_then(|()| file.set_len(1 << 42)).expect("a sparse file");
+            let Opened { contents, damaged, .. } = open(folder.path(), "AXTC4CO").expect("opened all the same");
+            assert_eq!((contents, damaged.len()), (initial("AXTC4CO"), 1), "{name}");
+            assert!(damaged[0].to_string().contains(complaint), "{}", damaged[0]);
+        }
+    }
+
+    #[test]
+    fn what_is_no_file_is_not_waited_for() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pipe = folder.path().join(FLASH);
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("a program of every Unix");
+        assert!(made.success());
+        let error = open(folder.path(), "AXTC4CO").expect_err("nobody writes into it");
+        assert!(matches!(error, StateError::Io { operation: "read", .. }), "{error}");
+        assert!(pipe.exists(), "it is left alone");
     }
 
     #[test]

@@ -57,6 +57,14 @@ struct Ordered {
     chance: Rng,
 }
 
+/// Faults that lie in wait at most; an order beyond them is refused. A scenario that begins anew orders its own each
+/// time.
+pub const MOST_FAULTS: usize = 1_000;
+
+/// Bytes under way at most, on one way: more than the line carries in the longest lateness. What comes beyond is lost, as
+/// in an adapter that is full; only faults that add up get there, such as every byte doubled.
+const MOST_UNDER_WAY: usize = 1 << 20;
+
 /// Bytes on one way.
 #[derive(Debug, Default)]
 struct Delayed {
@@ -116,6 +124,11 @@ impl Middleman {
                 self.faults.push(Ordered { fault, seen: 0, chance });
             }
         }
+    }
+
+    /// Faults that lie in wait.
+    pub fn faults(&self) -> usize {
+        self.faults.len()
     }
 
     /// Ends all faults, and plugs the cable in. What is late stays late.
@@ -325,7 +338,7 @@ impl Fate {
         match mishap {
             Mishap::Lost => self.copies = 0,
             // What is lost cannot be doubled, in whatever order the two were said.
-            Mishap::Doubled => self.copies *= 2,
+            Mishap::Doubled => self.copies = self.copies.saturating_mul(2),
             Mishap::Corrupted => self.flipped ^= 1 << chance.below(8),
             Mishap::Unreadable => self.unreadable = true,
             Mishap::Late(late) => self.late += late,
@@ -335,6 +348,9 @@ impl Fate {
 
 impl Delayed {
     fn push(&mut self, at: Instant, arrival: Arrival) {
+        if self.pending.len() == MOST_UNDER_WAY {
+            return;
+        }
         self.last = if self.last > at { self.last + character_time(BAUD) } else { at };
         self.pending.push_back((self.last, arrival));
     }
@@ -398,6 +414,16 @@ mod tests {
         assert_eq!(text(&carried(&mut cable, Way::FromUnit, b"abcde")), "abcde");
         assert_eq!(text(&carried(&mut cable, Way::ToUnit, b"abcdeabcde")), "acc?eabcde");
         assert!(cable.is_idle(), "all has happened");
+    }
+
+    #[test]
+    fn a_byte_that_is_doubled_again_and_again_has_an_end() {
+        let mut cable = middleman(&["doubled to-unit one in 1"; 9]);
+        assert_eq!(carried(&mut cable, Way::ToUnit, b"a").len(), 255);
+        for _ in 0..MOST_UNDER_WAY / 255 + 2 {
+            cable.carry(Instant::ZERO, Way::ToUnit, b'a');
+        }
+        assert_eq!(cable.to_unit.pending.len(), MOST_UNDER_WAY);
     }
 
     #[test]

@@ -4,13 +4,13 @@
 //! unit is done by the stage (`scenario`). Numbers count from 1, and from the moment the fault is ordered. Chance comes
 //! from a seed, a stream of its own for each fault, so one fault more does not move the others.
 //!
-//! Not to be mixed up with `faults`: those are what the unit itself finds and tells the network.
+//! What the unit itself finds and tells the network is called an error, as in its manual, and is in `errors`.
 
 mod middleman;
 
 use std::fmt;
 
-pub use middleman::{Arrival, Deed, Middleman};
+pub use middleman::{Arrival, Deed, MOST_FAULTS, Middleman};
 
 use super::memory::Defect;
 use super::words::{LONGEST_OFF_S, WordError, Words, unknown};

@@ -1,17 +1,17 @@
 //! The application: banner, main menu and its dialogues, data stream, diagnostics (manuals, chapter 4).
 //!
 //! What it says is worded by [`Dialect`]; who it is stands in the program flash it was started from; what it measures and
-//! is set to lies in its object dictionary ([`Objects`]). Keys come one by
-//! one; while the port has more to send than [`BLOCKED_AT`] characters, the program is stuck in printing and keys
-//! wait, as many as the receiver can keep.
+//! is set to lies in its object dictionary ([`Objects`]). Keys come one by one; while the port has more to send than
+//! [`BLOCKED_AT`] characters, the program is stuck in printing and keys wait, as many as the receiver can keep.
 
+mod about;
 mod prompt;
 mod view;
 
 use std::collections::VecDeque;
 
 use super::dialect::{ChannelDiagnosis, Diagnosis, Dialect, Sentence};
-use super::faults::{FaultEvent, Faults};
+use super::errors::{ActiveErrors, Class, ErrorEvent};
 use super::measurement::{self, Measurement};
 use super::memory::StreamSetting;
 use super::network::{Network, NetworkState, NmtCommand};
@@ -20,12 +20,11 @@ use super::uart::{XOFF, XON};
 use super::{Board, Refusal, Reset};
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::SensorKind;
-use crate::device::dictionary::Object;
+use crate::device::dictionary::{Group, Object};
 use crate::image::Identity;
 use crate::time::{Duration, Instant};
-use crate::version::Version;
 use crate::wire::stream::{Reading, Row, Source};
-use prompt::{Echo, Line, Typed};
+use prompt::{ESCAPE, Echo, Line, Typed};
 
 /// A diagnostics page comes at this interval (section 4.1.4).
 pub const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
@@ -36,9 +35,12 @@ pub const DEFAULT_PERIOD_MS: u16 = 1_000;
 const BLOCKED_AT: usize = 2_048;
 /// Keys the receiver keeps meanwhile; further ones are lost.
 const KEYS_KEPT: usize = 64;
-/// Room for rows and pages waiting to be sent. What does not fit is dropped whole: the line is behind (errata E-105,
-/// E-119). Enough for a diagnostics page and some rows, less than a tenth of a second of the line.
-const ROW_BUFFER: usize = 1_024;
+/// Characters that may wait to be sent together with a row. What does not fit is dropped whole: the line is behind
+/// (errata E-105, E-119).
+const ROW_BUFFER: usize = 512;
+/// The same with a page of diagnostics: it has room behind any number of rows, and all that waits is less than a tenth of
+/// a second of the line.
+const PAGE_BUFFER: usize = 1_024;
 
 /// The password for new software. Real ones come from Axiomatic; this is the emulator's build setting (errata E-112).
 const PASSWORD: &str = "AXIO-2010";
@@ -55,7 +57,7 @@ pub struct Firmware {
     after_return: bool,
     objects: Objects,
     measurement: Measurement,
-    faults: Faults,
+    errors: ActiveErrors,
     network: Network,
     /// When the next row is due, if the stream is on.
     row_at: Option<Instant>,
@@ -83,9 +85,10 @@ enum Dialogue {
     Password {
         line: Line,
     },
-    /// The object dictionary is shown up to this place of the walk.
+    /// The object dictionary is shown up to this place of the walk; scanning and CAN are halted since then.
     View {
         place: usize,
+        since: Instant,
     },
     /// The reset follows when the last text has left.
     Leaving,
@@ -95,7 +98,7 @@ impl Firmware {
     /// Starts the application that lies in flash: first-start text if it is new, banner, menu.
     pub fn start(board: &mut Board<'_>, identity: Identity, dialect: Dialect) -> Self {
         let mut objects = board.parameters.objects();
-        identify(&mut objects, &identity, board.serial_number);
+        about::put(&mut objects, &identity, board.serial_number);
         let autonomous = objects.get(0x5555, 0) == Value::Boolean(true);
         let mut firmware = Firmware {
             dialect,
@@ -106,7 +109,7 @@ impl Firmware {
             after_return: false,
             measurement: Measurement::start(board.now, board.product, &mut objects),
             objects,
-            faults: Faults::default(),
+            errors: ActiveErrors::default(),
             network: Network::start(board.now, board.product, autonomous),
             row_at: None,
             row: None,
@@ -153,7 +156,7 @@ impl Firmware {
         let now = board.now;
         if !self.is_viewing() {
             self.network.step(now);
-            if self.measurement.step(now, board.sensors, &mut self.objects, &mut self.faults) {
+            if self.measurement.step(now, board.sensors, &mut self.objects, &mut self.errors) {
                 self.row = None;
             }
             self.react();
@@ -166,21 +169,21 @@ impl Firmware {
                 let row = board.product.stream.emit(&measurement::row(objects, stream.source));
                 row + self.dialect.line_end()
             });
-            self.repeat(board, &row);
+            self.repeat(board, &row, ROW_BUFFER);
             self.row = Some(row);
         }
         if self.page_at.is_some_and(|due| due <= now) {
             self.page_at = self.page_at.map(|due| due + DIAGNOSTICS_PERIOD);
             let page = self.with_line_ends(self.dialect.diagnostics(&self.diagnosis(board)));
-            self.repeat(board, &page);
+            self.repeat(board, &page, PAGE_BUFFER);
         }
     }
 
     /// Object 1029h: what an error that has become active does to the node's state.
     fn react(&mut self) {
-        while let Some(event) = self.faults.poll_event() {
-            if let FaultEvent::Raised(fault) = event {
-                let class = fault.class(self.objects.product().measurement.sensors);
+        while let Some(event) = self.errors.poll_event() {
+            if let ErrorEvent::Raised(error) = event {
+                let class = Class::of(error, self.objects.product().measurement.sensors);
                 let reaction = self.objects.integer(0x1029, class.sub_index());
                 self.network.react(reaction);
             }
@@ -200,10 +203,15 @@ impl Firmware {
         self.network.command(board.now, command);
         match command {
             NmtCommand::ResetNode => {
+                // The network does not wait for a terminal, which may have sent XOFF.
+                board.uart.cut(board.now);
                 self.dialogue = Dialogue::Leaving;
                 *board.reset = Some(Reset::Start);
             }
-            NmtCommand::ResetCommunication => self.reload_communication(board),
+            // Errata E-93, E-G4.
+            NmtCommand::ResetCommunication => {
+                self.objects.take_over(Group::Communication, &board.parameters.objects());
+            }
             NmtCommand::Start | NmtCommand::Stop | NmtCommand::PreOperational => {}
         }
     }
@@ -227,7 +235,7 @@ impl Firmware {
             Effect::None => {}
             Effect::Save(group) => board.parameters.save(board.stores, group, &self.objects),
             Effect::Restore(group) => board.parameters.restore(board.stores, group),
-            Effect::ClearErrors => self.faults.clear_list(&mut self.objects),
+            Effect::ClearErrors => self.errors.clear_list(&mut self.objects),
         }
         Ok(())
     }
@@ -238,17 +246,6 @@ impl Firmware {
             || matches!(self.dialogue, Dialogue::Leaving)
             || self.network.state() == NetworkState::Stopped;
         if silent { Err(Refusal::NoAnswer) } else { Ok(()) }
-    }
-
-    /// The communication parameters as they are kept (errata E-93, E-G4).
-    fn reload_communication(&mut self, board: &mut Board<'_>) {
-        let kept = board.parameters.objects();
-        for (at, _, entry) in board.product.dictionary.entries() {
-            let is_parameter = entry.access == crate::device::dictionary::Access::ReadWrite && at.index != 0x1003;
-            if at.index < 0x2000 && is_parameter {
-                self.objects.set(at.index, at.sub, kept.get(at.index, at.sub));
-            }
-        }
     }
 
     fn take_keys(&mut self, board: &mut Board<'_>) {
@@ -280,7 +277,7 @@ impl Firmware {
             Dialogue::Password { line } => {
                 self.line_key(board, key, line, |line| Dialogue::Password { line }, Firmware::enter_loader)
             }
-            Dialogue::View { place } => self.view_key(board, key, place),
+            Dialogue::View { place, since } => self.view_key(board, key, place, since),
             Dialogue::Leaving => Dialogue::Leaving,
         };
     }
@@ -403,23 +400,24 @@ impl Firmware {
         self.print(board, Sentence::ViewTitle);
         self.say_objects(board, view::pdo_block(board.product));
         self.print(board, Sentence::ViewNext);
-        Dialogue::View { place: 0 }
+        Dialogue::View { place: 0, since: board.now }
     }
 
-    fn view_key(&mut self, board: &mut Board<'_>, key: u8, place: usize) -> Dialogue {
+    fn view_key(&mut self, board: &mut Board<'_>, key: u8, place: usize, since: Instant) -> Dialogue {
         let next = match key {
             b'\r' => view::object(board.product, place),
             b'x' | b'X' => None,
-            _ => return Dialogue::View { place },
+            _ => return Dialogue::View { place, since },
         };
         let Some(object) = next else {
             self.measurement.resume(board.now);
+            self.network.resume(board.now.since(since));
             self.print(board, Sentence::ViewEnd);
             self.print_menu(board);
             return Dialogue::Menu;
         };
         self.say_objects(board, std::iter::once(object));
-        Dialogue::View { place: place + 1 }
+        Dialogue::View { place: place + 1, since }
     }
 
     fn ask(&mut self, board: &mut Board<'_>, prompt: Sentence, dialogue: Dialogue) -> Dialogue {
@@ -444,10 +442,10 @@ impl Firmware {
         self.started_at + Duration::from_millis(u64::from(board.product.measurement.first_data_ms))
     }
 
-    /// A row or page: only while nothing else is asked or shown (errata E-117) and the line keeps up; otherwise it is
-    /// dropped whole.
-    fn repeat(&mut self, board: &mut Board<'_>, text: &str) {
-        if matches!(self.dialogue, Dialogue::Menu) && board.uart.backlog() + text.len() <= ROW_BUFFER {
+    /// A row or page: only while nothing else is asked or shown (errata E-117) and no more than `room` waits with it;
+    /// otherwise it is dropped whole.
+    fn repeat(&mut self, board: &mut Board<'_>, text: &str, room: usize) {
+        if matches!(self.dialogue, Dialogue::Menu) && board.uart.backlog() + text.len() <= room {
             board.uart.send(board.now, text.as_bytes());
         }
     }
@@ -478,7 +476,7 @@ impl Firmware {
         Diagnosis {
             unit,
             channels: channels.collect(),
-            errors: self.faults.count(),
+            errors: self.errors.count(),
             uptime: board.now.since(self.started_at),
             network: self.network.state(),
         }
@@ -518,47 +516,10 @@ impl Firmware {
     }
 }
 
-/// What the software knows of itself: objects 1018h and 1020h (sections 3.2.11 and 3.2.12).
-fn identify(objects: &mut Objects, identity: &Identity, serial_number: u32) {
-    objects.set(0x1018, 3, Value::Unsigned32(revision(identity.version)));
-    objects.set(0x1018, 4, Value::Unsigned32(serial_number));
-    objects.set(0x1020, 1, Value::Unsigned32(build_date(identity)));
-    objects.set(0x1020, 2, Value::Unsigned32(build_time(identity)));
-}
-
-/// 1018h:3, bits 31-16: revision of the object dictionary, and bits 15-8: of the hardware (errata E-21).
-const DICTIONARY_AND_HARDWARE_REVISION: u32 = 0x0001_0100;
-
-/// 1018h:3: software version in the lowest byte, a digit for the major and one for the minor number.
-fn revision(version: Version) -> u32 {
-    DICTIONARY_AND_HARDWARE_REVISION | u32::from(version.major & 0xF) << 4 | u32::from(version.minor & 0xF)
-}
-
-/// 1020h:1: day, month and year, their decimal digits read as hexadecimal ones (errata E-22).
-fn build_date(identity: &Identity) -> u32 {
-    let mut parts = identity.build_date.split('-');
-    let mut next = || digits(parts.next());
-    let (year, month, day) = (next(), next(), next());
-    day << 24 | month << 16 | year
-}
-
-/// 1020h:2: hour and minute in the same way.
-fn build_time(identity: &Identity) -> u32 {
-    let mut parts = identity.build_time.split(':');
-    let mut next = || digits(parts.next());
-    next() << 8 | next()
-}
-
-fn digits(text: Option<&str>) -> u32 {
-    text.and_then(|text| u32::from_str_radix(text, 16).ok()).unwrap_or_default()
-}
-
 /// A row of one field.
 fn one(reading: Reading) -> Row {
     Row { source: Source::FieldValue, readings: vec![reading] }
 }
-
-const ESCAPE: u8 = 0x1B;
 
 fn period(stream: StreamSetting) -> Duration {
     Duration::from_millis(u64::from(stream.period_ms))
@@ -585,29 +546,6 @@ mod tests {
         }
         for answer in ["0", "60001", "-5", "1.5", "x", "99999999999", "1 0"] {
             assert_eq!(parse_period(answer, (1, 60_000)), None, "{answer:?}");
-        }
-    }
-
-    // B-006, B-007, B-5, B-4, B-005
-    #[test]
-    fn the_software_says_itself_when_it_was_compiled_and_which_version_it_is() {
-        for product in crate::device::Product::all() {
-            let mut objects = Objects::factory(product, 127);
-            let identity = Identity {
-                product: product.name.clone(),
-                version: Version::new(1, 2, 3),
-                build_date: "2010-08-10".into(),
-                build_time: "16:20:00".into(),
-                program_words: 0,
-                crc: 0,
-            };
-            identify(&mut objects, &identity, 7);
-            assert_eq!(objects.get(0x1020, 1), Value::Unsigned32(0x1008_2010));
-            assert_eq!(objects.get(0x1020, 2), Value::Unsigned32(0x0000_1620));
-            assert_eq!(objects.get(0x1018, 3), Value::Unsigned32(0x0001_0112));
-            assert_eq!(objects.get(0x1018, 4), Value::Unsigned32(7));
-            assert_eq!(objects.get(0x1018, 1), Value::Unsigned32(0x55));
-            assert_eq!(objects.get(0x1018, 2), Value::Unsigned32(product.can.product_code));
         }
     }
 }

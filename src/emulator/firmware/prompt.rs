@@ -5,7 +5,8 @@ pub const LINE_LIMIT: usize = 32;
 
 const BACKSPACE: u8 = 0x08;
 const DELETE: u8 = 0x7F;
-const ESCAPE: u8 = 0x1B;
+/// Leaves a question.
+pub const ESCAPE: u8 = 0x1B;
 
 /// What comes back for a character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

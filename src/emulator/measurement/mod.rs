@@ -8,10 +8,11 @@
 mod rtds;
 mod thermocouples;
 
-use super::faults::{DEVICE_SPECIFIC, Fault, Faults, INPUT_OVERLOAD, LIMIT_EXCEEDED};
+use super::errors::{ActiveErrors, DEVICE_SPECIFIC, INPUT_OVERLOAD, LIMIT_EXCEEDED};
 use super::objects::Objects;
 use super::sensors::Sensors;
 use crate::canopen::Value;
+use crate::device::emergency::Emergency;
 use crate::device::{Product, SensorKind};
 use crate::time::{Duration, Instant};
 use crate::wire::stream::{Reading as Field, Row, Source};
@@ -23,7 +24,7 @@ use thermocouples::Thermocouples;
 pub enum Reading {
     /// °C.
     Celsius(f64),
-    /// Switched off (object 6112h).
+    /// Switched off (object 6112h), or not read yet.
     Off,
     /// Open circuit.
     Open,
@@ -51,14 +52,34 @@ enum Scan {
     Rtds(Rtds),
 }
 
+/// Which channels a reading of the converter is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Updated {
+    All,
+    One(u8),
+    /// It was of the current source, or the first of two that belong together.
+    None,
+}
+
 /// A channel's evaluation.
 #[derive(Clone, Debug)]
 struct Channel {
     reading: Reading,
     thresholds: [Threshold; 3],
-    /// Thresholds and delay of the last evaluation: a change restarts what was pending (errata E-D20).
-    settings: [i64; 4],
-    sensor_fault: Option<Fault>,
+    /// What the last evaluation rested on: a change restarts what was pending (errata E-D20).
+    settings: Settings,
+    sensor_error: Option<Emergency>,
+}
+
+/// What a channel's evaluation rests on besides its reading.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Settings {
+    /// Objects 4000h, 4010h and 4020h, in 0.1 °C.
+    thresholds: [i64; 3],
+    /// Object 4030h.
+    delay_ms: u16,
+    /// Object 6110h, and 3000h of an RTD: another sensor or curve has another temperature.
+    sensor: (i64, Option<i64>),
 }
 
 /// One threshold of a channel.
@@ -102,14 +123,18 @@ const PV_FROZEN: i16 = -384;
 impl Measurement {
     /// Begins at the unit's start.
     pub fn start(now: Instant, product: &Product, objects: &mut Objects) -> Self {
-        let channel =
-            Channel { reading: Reading::Off, thresholds: [Threshold::Kept; 3], settings: [0; 4], sensor_fault: None };
+        let channel = Channel {
+            reading: Reading::Off,
+            thresholds: [Threshold::Kept; 3],
+            settings: Settings::default(),
+            sensor_error: None,
+        };
         let channels = product.measurement.channels;
         for channel in 1..=channels {
             objects.set(0x6100, channel, Value::NOT_A_NUMBER);
             objects.set(0x7130, channel, Value::Integer16(PV_OFF));
         }
-        Measurement {
+        let measurement = Measurement {
             scan: match product.measurement.sensors {
                 SensorKind::Thermocouple => Scan::Thermocouples(Thermocouples::start(now, channels)),
                 SensorKind::Rtd => Scan::Rtds(Rtds::start(now, channels)),
@@ -117,7 +142,9 @@ impl Measurement {
             channels: vec![channel; usize::from(channels)],
             first_data_at: now + Duration::from_millis(u64::from(product.measurement.first_data_ms)),
             published: false,
-        }
+        };
+        measurement.average(objects);
+        measurement
     }
 
     /// When the next reading is due.
@@ -137,13 +164,13 @@ impl Measurement {
     }
 
     /// Takes the reading that is due. Says whether anything new has been published.
-    pub fn step(&mut self, now: Instant, sensors: &Sensors, objects: &mut Objects, faults: &mut Faults) -> bool {
+    pub fn step(&mut self, now: Instant, sensors: &Sensors, objects: &mut Objects, errors: &mut ActiveErrors) -> bool {
         if self.deadline() > now {
             return false;
         }
         let channels = &mut self.channels;
         let mut read = |channel: u8, reading| channels[usize::from(channel) - 1].reading = reading;
-        let changed = match &mut self.scan {
+        let updated = match &mut self.scan {
             Scan::Thermocouples(scan) => scan.step(sensors, objects, &mut read),
             Scan::Rtds(scan) => scan.step(sensors, objects, &mut read),
         };
@@ -157,8 +184,8 @@ impl Measurement {
             if off {
                 channel.reading = Reading::Off;
             }
-            if all || off || changed.is_none_or(|changed| changed == number) {
-                channel.evaluate(now, number, objects, faults);
+            if all || off || updated.includes(number) {
+                channel.evaluate(now, number, objects, errors);
             }
         }
         objects.set(0x5000, 0, Value::Real32(sensors.supply(now) as f32));
@@ -185,25 +212,45 @@ impl Measurement {
     }
 }
 
-impl Channel {
-    fn evaluate(&mut self, now: Instant, number: u8, objects: &mut Objects, faults: &mut Faults) {
-        self.watch(now, number, objects, faults);
-        let sensor_fault = match self.reading {
-            Reading::Celsius(_) | Reading::Off => None,
-            Reading::Open => Some(Fault { code: INPUT_OVERLOAD, channel: number, description: 0x02 }),
-            Reading::Short => Some(Fault { code: INPUT_OVERLOAD, channel: number, description: 0x04 }),
-            Reading::MathError => Some(Fault { code: DEVICE_SPECIFIC, channel: number, description: 0x08 }),
-            Reading::Frozen => Some(Fault { code: DEVICE_SPECIFIC, channel: number, description: 0x80 }),
-        };
-        if self.sensor_fault != sensor_fault {
-            // The new one first, so that the unit is at no moment without an error.
-            if let Some(fault) = sensor_fault {
-                faults.raise(fault, objects);
-            }
-            if let Some(fault) = std::mem::replace(&mut self.sensor_fault, sensor_fault) {
-                faults.clear(fault, objects);
-            }
+impl Updated {
+    fn includes(self, number: u8) -> bool {
+        match self {
+            Updated::All => true,
+            Updated::One(channel) => channel == number,
+            Updated::None => false,
         }
+    }
+}
+
+impl Settings {
+    fn of(objects: &Objects, number: u8) -> Self {
+        let curve = match objects.product().measurement.sensors {
+            SensorKind::Thermocouple => None,
+            SensorKind::Rtd => Some(objects.integer(0x3000, number)),
+        };
+        Settings {
+            thresholds: WATCHES.map(|watch| objects.integer(watch.index, number)),
+            delay_ms: objects.integer(0x4030, number) as u16,
+            sensor: (objects.integer(0x6110, number), curve),
+        }
+    }
+}
+
+impl Channel {
+    fn evaluate(&mut self, now: Instant, number: u8, objects: &mut Objects, errors: &mut ActiveErrors) {
+        let (mut raised, mut cleared) = self.watch(now, number, objects);
+        let sensor_error = match self.reading {
+            Reading::Celsius(_) | Reading::Off => None,
+            Reading::Open => Some(Emergency { code: INPUT_OVERLOAD, channel: number, description: 0x02 }),
+            Reading::Short => Some(Emergency { code: INPUT_OVERLOAD, channel: number, description: 0x04 }),
+            Reading::MathError => Some(Emergency { code: DEVICE_SPECIFIC, channel: number, description: 0x08 }),
+            Reading::Frozen => Some(Emergency { code: DEVICE_SPECIFIC, channel: number, description: 0x80 }),
+        };
+        if self.sensor_error != sensor_error {
+            raised.extend(sensor_error);
+            cleared.extend(std::mem::replace(&mut self.sensor_error, sensor_error));
+        }
+        errors.change(&raised, &cleared, objects);
         let (factor, offset) = (objects.number(0x6126, number), objects.number(0x6127, number));
         let (field_value, process_value) = match self.reading {
             Reading::Celsius(celsius) => (Value::Real32(celsius as f32), scaled(celsius, factor, offset)),
@@ -219,13 +266,14 @@ impl Channel {
     }
 
     /// Compares with the thresholds: only what is exceeded for the reaction delay without a break counts, and what
-    /// counts goes at once when it has cleared by the hysteresis (section 1.2).
-    fn watch(&mut self, now: Instant, number: u8, objects: &mut Objects, faults: &mut Faults) {
-        let settings = [0x4000, 0x4010, 0x4020, 0x4030].map(|index| objects.integer(index, number));
+    /// counts goes at once when it has cleared by the hysteresis (section 1.2). Gives the errors that count from now
+    /// on, and those that no longer do.
+    fn watch(&mut self, now: Instant, number: u8, objects: &Objects) -> (Vec<Emergency>, Vec<Emergency>) {
+        let settings = Settings::of(objects, number);
         let unchanged = std::mem::replace(&mut self.settings, settings) == settings;
-        let delay = Duration::from_millis(settings[3] as u64);
-        for (threshold, (watch, tenths)) in self.thresholds.iter_mut().zip(WATCHES.iter().zip(settings)) {
-            let fault = Fault { code: LIMIT_EXCEEDED, channel: number, description: watch.description };
+        let delay = Duration::from_millis(u64::from(settings.delay_ms));
+        let (mut raised, mut cleared) = (Vec::new(), Vec::new());
+        for (threshold, (watch, tenths)) in self.thresholds.iter_mut().zip(WATCHES.iter().zip(settings.thresholds)) {
             let limit = tenths as f64 / 10.0;
             let was_exceeded = *threshold == Threshold::Exceeded;
             *threshold = match (self.reading, *threshold) {
@@ -249,13 +297,14 @@ impl Channel {
                 // Without a temperature there is nothing to compare (errata E-75).
                 (_, _) => Threshold::Kept,
             };
-            let is_exceeded = *threshold == Threshold::Exceeded;
-            if is_exceeded && !was_exceeded {
-                faults.raise(fault, objects);
-            } else if was_exceeded && !is_exceeded {
-                faults.clear(fault, objects);
+            let error = Emergency { code: LIMIT_EXCEEDED, channel: number, description: watch.description };
+            match (was_exceeded, *threshold == Threshold::Exceeded) {
+                (false, true) => raised.push(error),
+                (true, false) => cleared.push(error),
+                (false, false) | (true, true) => {}
             }
         }
+        (raised, cleared)
     }
 
     /// Object 6150h.
@@ -292,12 +341,14 @@ pub fn row(objects: &Objects, source: Source) -> Row {
         readings.push(Field::Value(objects.number(index, 0)));
     }
     readings.extend((1..=product.measurement.channels).map(|channel| {
-        let failed = matches!(objects.integer(0x6150, channel), 0x09 | 0x81);
-        match objects.integer(0x6150, channel) {
-            _ if objects.integer(0x6112, channel) == 0 => Field::Disabled,
+        let status = objects.integer(0x6150, channel);
+        // One that has just been switched on has the value of one that is off until it is read.
+        let unread = status == 0 && objects.number(0x6100, channel).is_nan();
+        match status {
+            _ if unread || objects.integer(0x6112, channel) == 0 => Field::Disabled,
             0x03 => Field::Open,
             0x05 => Field::Short,
-            _ if failed && source == Source::FieldValue => Field::Error,
+            0x09 | 0x81 if source == Source::FieldValue => Field::Error,
             _ => Field::Value(objects.number(value_index, channel)),
         }
     }));

@@ -8,7 +8,7 @@
 use super::super::objects::Objects;
 use super::super::rtd_curve::Curve;
 use super::super::sensors::{Sensors, Wiring};
-use super::Reading;
+use super::{Reading, Updated};
 use crate::canopen::Value;
 use crate::time::{Duration, Instant};
 
@@ -21,6 +21,8 @@ const SHORT_BELOW_OHM: f64 = 5.0;
 const OPEN_ABOVE_OHM: f64 = 600.0;
 /// One step of the converter in V: 24 bits over 5 V (a guess, finer than 0.001 ohm).
 const STEP_V: f64 = 5.0 / 8_388_608.0;
+/// Current through the sensors in A, until it has been measured (section 1.2).
+const NOMINAL_AMPERE: f64 = 0.004;
 /// Sweeps without new data that make a frozen converter (errata E-C24).
 const FROZEN_SWEEPS: u32 = 2;
 
@@ -31,7 +33,7 @@ pub(super) struct Rtds {
     next: Slot,
     /// Readings made so far.
     readings: u64,
-    /// Current through the sensors in A, as last measured.
+    /// Current through the sensors in A, as last measured. Never 0: the wires' resistance is kept for a minute.
     ampere: f64,
     /// A wire has been read in this sweep already.
     wire_read: bool,
@@ -49,15 +51,25 @@ enum Slot {
     Wire(u8),
 }
 
+/// The voltage of a sensor, as last read.
+#[derive(Clone, Copy, Debug, Default)]
+enum Sensor {
+    #[default]
+    Unread,
+    /// The converter is at the end of its range.
+    Saturated,
+    /// In V.
+    Volts(f64),
+}
+
 #[derive(Clone, Debug, Default)]
 struct Input {
-    /// Voltage of the sensor in V; `None` while the input is saturated.
-    volts: Option<f64>,
+    sensor: Sensor,
     wire_ohm: f64,
-    /// The reading at which the wires were read.
+    /// The reading at which the wires were read, if that still counts.
     wires_at: Option<u64>,
-    /// Type and mode of that time.
-    settings: (i64, i64),
+    /// Object 6110h at that time.
+    wires_of: i64,
 }
 
 impl Rtds {
@@ -66,7 +78,7 @@ impl Rtds {
             reading_at: now + READING_TIME,
             next: Slot::Current,
             readings: 0,
-            ampere: 0.0,
+            ampere: NOMINAL_AMPERE,
             wire_read: false,
             frozen_sweeps: 0,
             channels: vec![Input::default(); usize::from(channels)],
@@ -81,13 +93,13 @@ impl Rtds {
         self.reading_at = now + READING_TIME;
     }
 
-    /// Makes one reading. Says which channel has a new value; 0 for none.
+    /// Makes one reading.
     pub(super) fn step(
         &mut self,
         sensors: &Sensors,
         objects: &mut Objects,
         read: &mut impl FnMut(u8, Reading),
-    ) -> Option<u8> {
+    ) -> Updated {
         let now = self.reading_at;
         self.reading_at += READING_TIME;
         self.readings += 1;
@@ -102,19 +114,19 @@ impl Rtds {
                 }
                 Slot::Channel(number) => {
                     let terminals = sensors.rtd(now, number, wiring(objects, number), curve(objects, number));
-                    self.input(number).volts = terminals.main.map(quantised);
-                    if let Some(volts) = terminals.main {
-                        let microvolts = (quantised(volts) * 1e6).round() as i32;
-                        objects.set(0x2010, number, Value::Integer32(microvolts));
+                    let volts = terminals.main.map(quantised);
+                    self.input(number).sensor = volts.map_or(Sensor::Saturated, Sensor::Volts);
+                    if let Some(volts) = volts {
+                        objects.set(0x2010, number, Value::Integer32((volts * 1e6).round() as i32));
                     }
                 }
                 Slot::Wire(number) => {
                     let terminals = sensors.rtd(now, number, wiring(objects, number), curve(objects, number));
-                    let (readings, ampere, settings) = (self.readings, self.ampere, settings(objects, number));
+                    let (readings, ampere) = (self.readings, self.ampere);
                     let input = self.input(number);
                     input.wire_ohm = quantised(terminals.wire) / ampere;
                     input.wires_at = Some(readings);
-                    input.settings = settings;
+                    input.wires_of = objects.integer(0x6110, number);
                     self.wire_read = true;
                 }
             }
@@ -123,7 +135,7 @@ impl Rtds {
             Slot::Current => None,
             Slot::Channel(number) if self.wants_wire(objects, number) => {
                 self.next = Slot::Wire(number);
-                return Some(0);
+                return Updated::None;
             }
             Slot::Channel(number) | Slot::Wire(number) => Some(number),
         };
@@ -132,11 +144,10 @@ impl Rtds {
             self.wire_read = false;
             self.frozen_sweeps += u32::from(sensors.is_frozen());
         }
-        if let Some(number) = channel {
-            let reading = self.evaluate(objects, number);
-            read(number, reading);
-        }
-        Some(channel.unwrap_or(0))
+        let Some(number) = channel else { return Updated::None };
+        let reading = self.evaluate(objects, number);
+        read(number, reading);
+        Updated::One(number)
     }
 
     /// Resistance and temperature from what has been read.
@@ -145,10 +156,15 @@ impl Rtds {
             return Reading::Frozen;
         }
         let (ampere, wiring, curve) = (self.ampere, wiring(objects, number), curve(objects, number));
-        let Input { volts, wire_ohm, .. } = *self.input(number);
-        let Some(volts) = volts else {
-            objects.set(0x2000, number, Value::NOT_A_NUMBER);
-            return Reading::Open;
+        let Input { sensor, wire_ohm, .. } = *self.input(number);
+        let volts = match sensor {
+            Sensor::Volts(volts) => volts,
+            Sensor::Saturated => {
+                objects.set(0x2000, number, Value::NOT_A_NUMBER);
+                return Reading::Open;
+            }
+            // Its wires have been read, by a converter that stood still before.
+            Sensor::Unread => return Reading::Off,
         };
         let wires = match wiring {
             Wiring::Two => 0.0,
@@ -167,21 +183,28 @@ impl Rtds {
     }
 
     /// Whether the wires of a channel are due.
-    fn wants_wire(&self, objects: &Objects, number: u8) -> bool {
-        let input = &self.channels[usize::from(number) - 1];
+    fn wants_wire(&mut self, objects: &Objects, number: u8) -> bool {
+        let (readings, wire_read) = (self.readings, self.wire_read);
+        let input = self.input(number);
+        if wiring(objects, number) == Wiring::Two || input.wires_of != objects.integer(0x6110, number) {
+            input.wires_at = None;
+        }
         match input.wires_at {
-            _ if wiring(objects, number) == Wiring::Two => false,
-            None => true,
-            Some(_) if input.settings != settings(objects, number) => true,
-            Some(at) => !self.wire_read && self.readings - at >= READINGS_BETWEEN_WIRES,
+            None => wiring(objects, number) != Wiring::Two,
+            Some(at) => !wire_read && readings - at >= READINGS_BETWEEN_WIRES,
         }
     }
 
-    /// The next channel that is on, or the current source: the sweep is over.
-    fn following(&self, objects: &Objects, number: u8) -> Slot {
-        let channels = self.channels.len() as u8;
-        let next = (number + 1..=channels).find(|&next| objects.integer(0x6112, next) != 0);
-        next.map_or(Slot::Current, Slot::Channel)
+    /// The next channel that is on, or the current source: the sweep is over. Channels that are off are passed over, and
+    /// their wires are read anew when they are on again.
+    fn following(&mut self, objects: &Objects, number: u8) -> Slot {
+        for next in number + 1..=self.channels.len() as u8 {
+            if objects.integer(0x6112, next) != 0 {
+                return Slot::Channel(next);
+            }
+            self.input(next).wires_at = None;
+        }
+        Slot::Current
     }
 
     fn input(&mut self, number: u8) -> &mut Input {
@@ -200,11 +223,6 @@ fn wiring(objects: &Objects, number: u8) -> Wiring {
         10_002 => Wiring::Four,
         _ => Wiring::Three,
     }
-}
-
-/// Type and mode of a channel: after a change its wires are read anew.
-fn settings(objects: &Objects, number: u8) -> (i64, i64) {
-    (objects.integer(0x6110, number), objects.integer(0x6112, number))
 }
 
 /// Objects 3010h, 3020h and 3030h.

@@ -1,5 +1,6 @@
 //! What both products make of their inputs, in virtual time, against the acceptance items.
 
+use super::super::errors::ErrorEvent;
 use super::super::knob::{Knob, Lead};
 use super::super::rtd_curve::R0;
 use super::*;
@@ -10,7 +11,7 @@ struct Bench {
     now: Instant,
     sensors: Sensors,
     objects: Objects,
-    faults: Faults,
+    active: ActiveErrors,
     measurement: Measurement,
 }
 
@@ -21,8 +22,8 @@ impl Bench {
         let mut objects = Objects::factory(product, 127);
         let measurement = Measurement::start(Instant::ZERO, product, &mut objects);
         let sensors = Sensors::new(product, 1);
-        let faults = Faults::default();
-        let mut bench = Bench { now: Instant::ZERO, sensors, objects, faults, measurement };
+        let active = ActiveErrors::default();
+        let mut bench = Bench { now: Instant::ZERO, sensors, objects, active, measurement };
         for channel in 1..=product.measurement.channels {
             bench.turn(Knob::Temperature(channel, 20.0));
         }
@@ -59,7 +60,7 @@ impl Bench {
         let end = self.now + Duration::from_millis(millis);
         while self.measurement.deadline() <= end {
             self.now = self.measurement.deadline();
-            self.measurement.step(self.now, &self.sensors, &mut self.objects, &mut self.faults);
+            self.measurement.step(self.now, &self.sensors, &mut self.objects, &mut self.active);
         }
         self.now = end;
     }
@@ -140,16 +141,18 @@ fn all_thermocouples_are_read_together_and_nothing_is_said_before_its_time() {
     let mut measurement = Measurement::start(Instant::ZERO, product, &mut objects);
     let mut sensors = Sensors::new(product, 1);
     sensors.turn(Knob::Open(3, None)).expect("an input");
-    let mut faults = Faults::default();
+    let mut errors = ActiveErrors::default();
     while measurement.deadline() < Instant::from_millis(3_000) {
         let now = measurement.deadline();
-        assert!(!measurement.step(now, &sensors, &mut objects, &mut faults));
+        assert!(!measurement.step(now, &sensors, &mut objects, &mut errors));
     }
-    assert_eq!((objects.get(0x6100, 1), faults.count()), (Value::NOT_A_NUMBER, 0));
+    assert_eq!((objects.get(0x6100, 1), errors.count()), (Value::NOT_A_NUMBER, 0));
+    let averages = [1, 2, 3].map(|sub| (objects.get(0x2100, sub), objects.integer(0x2130, sub)));
+    assert_eq!(averages, [(Value::NOT_A_NUMBER, -1); 3], "no average of nothing");
     assert_eq!(measurement.deadline(), Instant::from_millis(3_000));
-    assert!(measurement.step(Instant::from_millis(3_000), &sensors, &mut objects, &mut faults));
+    assert!(measurement.step(Instant::from_millis(3_000), &sensors, &mut objects, &mut errors));
     assert!(objects.number(0x6100, 1) > 20.0 && objects.number(0x6100, 4) > 20.0);
-    assert_eq!((objects.integer(0x6150, 3), faults.count()), (0x03, 1));
+    assert_eq!((objects.integer(0x6150, 3), errors.count()), (0x03, 1));
     assert_eq!(measurement.deadline(), Instant::from_millis(3_200));
 }
 
@@ -224,6 +227,9 @@ fn an_open_circuit_takes_the_place_of_threshold_errors() {
     bench.turn(Knob::Repair(1));
     bench.run_ms(200);
     assert_eq!((bench.status(1), bench.errors()), (0x41, vec![0x4001_F011, 0x2001_F011]));
+    let events = std::iter::from_fn(|| bench.active.poll_event());
+    let without = events.filter(|event| matches!(event, ErrorEvent::Cleared { last: true, .. })).count();
+    assert_eq!(without, 0, "at no moment is there no error");
 }
 
 // B-073
@@ -289,6 +295,27 @@ fn a_threshold_counts_when_it_was_exceeded_without_a_break_for_the_delay() {
         assert_eq!(bench.status(1), 0x00, "the time began anew");
         bench.run_ms(1_000 + 2 * sweep);
         assert_eq!(bench.status(1), 0x20);
+    }
+}
+
+// Errata E-D20.
+#[test]
+fn a_setting_that_changes_restarts_the_delay() {
+    let changes: [(&str, u16, f64); 5] = [
+        ("AXTC4CO", 0x4010, 1_240.0),
+        ("AXTC4CO", 0x4030, 4_999.0),
+        ("AXTC4CO", 0x6110, 2.0),
+        ("AXRTD8CO", 0x6110, 10_000.0),
+        ("AXRTD8CO", 0x3000, 4.0),
+    ];
+    for (name, index, number) in changes {
+        let mut bench = Bench::new(name);
+        bench.celsius(1, 200.0, 4_000);
+        bench.write(index, 1, number);
+        bench.run_ms(4_000);
+        assert_eq!(bench.status(1), 0x00, "{name} {index:04X}h");
+        bench.run_ms(3_000);
+        assert_eq!(bench.status(1), 0x20, "{name} {index:04X}h");
     }
 }
 
@@ -457,6 +484,23 @@ fn the_wires_are_measured_once_a_minute() {
     assert!(waited > 5_000, "not in every sweep");
 }
 
+// Errata E-C6.
+#[test]
+fn the_wires_are_measured_anew_when_a_channel_has_another_type_or_is_switched_on() {
+    let mut bench = Bench::rtd8();
+    bench.turn(Knob::Resistance(1, 100.0));
+    for (lead, index, number, back) in
+        [(2.0, 0x6110, 10_002.0, 10_001.0), (3.0, 0x6110, 10_000.0, 10_001.0), (4.0, 0x6112, 0.0, 1.0)]
+    {
+        bench.write(index, 1, number);
+        bench.run_ms(2_000);
+        bench.turn(Knob::LeadResistance(1, lead));
+        bench.write(index, 1, back);
+        bench.run_ms(2_000);
+        bench.assert_celsius(1, 0.0, 0.1);
+    }
+}
+
 // B-41, B-42, B-43, B-52, B-61
 #[test]
 fn open_and_short_circuits_of_an_rtd_are_seen_in_the_sweep_that_finds_them() {
@@ -509,6 +553,29 @@ fn a_frozen_converter_is_flagged_on_every_channel_that_is_on() {
     assert_eq!(bench.errors(), [0x0202_F001], "what was there before is seen again");
 }
 
+#[test]
+fn a_converter_that_wakes_up_in_the_middle_of_its_first_sweep_reads_no_nonsense() {
+    let product = Product::named("AXRTD8CO").expect("built in");
+    for thaw_ms in (5_050..7_000).step_by(100) {
+        let mut objects = Objects::factory(product, 127);
+        let measurement = Measurement::start(Instant::ZERO, product, &mut objects);
+        let sensors = Sensors::new(product, 1);
+        let mut bench = Bench { now: Instant::ZERO, sensors, objects, active: ActiveErrors::default(), measurement };
+        bench.turn(Knob::Freeze(true));
+        bench.run_ms(thaw_ms);
+        assert_eq!([1, 8].map(|channel| bench.status(channel)), [0x81, 0x81]);
+        bench.turn(Knob::Freeze(false));
+        for _ in 0..50 {
+            bench.run_ms(100);
+            for channel in 1..=8 {
+                let status = bench.status(channel);
+                assert!(matches!(status, 0x00 | 0x81), "{status:02X}h of channel {channel}, thawed at {thaw_ms} ms");
+            }
+        }
+        assert_eq!((bench.status(1), bench.status(8), bench.errors()), (0, 0, vec![]));
+    }
+}
+
 // B-45
 #[test]
 fn constants_without_a_solution_are_a_math_error() {
@@ -534,6 +601,14 @@ fn a_row_says_why_a_value_is_missing() {
     let field_values = row(&bench.objects, Source::FieldValue);
     assert_eq!(field_values.readings[..3], [Field::Disabled, Field::Open, Field::Short]);
     assert!(matches!(field_values.readings[3], Field::Value(celsius) if (celsius - 20.0).abs() < 0.1));
+    bench.write(0x6112, 1, 1.0);
+    for _ in 0..12 {
+        let reading = row(&bench.objects, Source::FieldValue).readings[0];
+        let is_read = matches!(reading, Field::Value(celsius) if (celsius - 20.0).abs() < 0.1);
+        assert!(is_read || reading == Field::Disabled, "{reading:?} of a channel that has just been switched on");
+        bench.run_ms(100);
+    }
+    assert!(matches!(row(&bench.objects, Source::ProcessValue).readings[0], Field::Value(4_688.0)));
     let bench = Bench::tc4();
     let process_values = row(&bench.objects, Source::ProcessValue);
     assert_eq!(process_values.readings.len(), 5);

@@ -3,7 +3,7 @@
 use super::super::its90::Thermocouple;
 use super::super::objects::Objects;
 use super::super::sensors::Sensors;
-use super::{Reading, scaled};
+use super::{Reading, Updated, scaled};
 use crate::canopen::Value;
 use crate::time::{Duration, Instant};
 
@@ -40,18 +40,18 @@ impl Thermocouples {
         self.scan_at = now + SCAN_TIME;
     }
 
-    /// Reads all channels; `None` says that all may have changed.
+    /// Reads all channels.
     pub(super) fn step(
         &mut self,
         sensors: &Sensors,
         objects: &mut Objects,
         read: &mut impl FnMut(u8, Reading),
-    ) -> Option<u8> {
+    ) -> Updated {
         let now = self.scan_at;
         self.scan_at += SCAN_TIME;
         // A converter that delivers nothing new leaves the old values: this unit has no status for it.
         if sensors.is_frozen() {
-            return None;
+            return Updated::All;
         }
         let cold_junction = to_milli(sensors.cold_junction(now));
         objects.set(0x3100, 0, Value::Real32(cold_junction as f32));
@@ -86,7 +86,7 @@ impl Thermocouples {
             }
             read(number, *last);
         }
-        None
+        Updated::All
     }
 }
 

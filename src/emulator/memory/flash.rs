@@ -114,7 +114,14 @@ impl Flash {
 
     /// Spoils a word. An address behind the last word is nowhere, and so is the defect.
     pub fn spoil(&mut self, word: u32, defect: Defect) {
-        self.defects.push((word, defect));
+        if !self.defects.contains(&(word, defect)) {
+            self.defects.push((word, defect));
+        }
+    }
+
+    /// Number of things that are wrong with words.
+    pub fn defects(&self) -> usize {
+        self.defects.len()
     }
 
     /// Makes all words good again.

@@ -23,11 +23,11 @@
 
 use std::collections::VecDeque;
 
-use super::super::objects::{Objects, Saved};
+use super::super::objects::{Objects, Saved, is_parameter};
 use super::super::{Area, Store};
 use crate::canopen::ObjectAddress;
-use crate::device::Product;
 use crate::device::dictionary::Group;
+use crate::device::{BIT_RATES_KBPS, Product};
 use crate::wire::stream::Source;
 
 /// Bytes of the whole image: two slots.
@@ -162,6 +162,10 @@ impl Parameters {
         if !(1..=127).contains(&values[4]) {
             return Err(ParametersError::Value("node-ID"));
         }
+        let kbps = u16_at(values, 6);
+        if !BIT_RATES_KBPS.contains(&kbps) {
+            return Err(ParametersError::Value("bit rate"));
+        }
         let start_delay = match values[8] {
             0 => StartDelay::AtOnce,
             0xFF => StartDelay::WaitsForEver,
@@ -170,7 +174,7 @@ impl Parameters {
         Ok(Parameters {
             stream: StreamSetting { on: flag(values[0], "stream switch")?, source, period_ms },
             node_id: values[4],
-            kbps: u16_at(values, 6),
+            kbps,
             start_delay,
             first_start: flag(values[9], "first-start flag")?,
             saved: read_saved(product, kept).ok_or(ParametersError::Value("list of saved parameters"))?,
@@ -212,16 +216,22 @@ impl Parameters {
     }
 }
 
-/// Reads the list of saved parameters. Entries the product does not have are left out: the list may be from another
-/// version of its dictionary.
+/// Reads the list of saved parameters, which is in order and names each once: so what is saved next has room, whatever
+/// was there. Entries that are no parameters of the product are left out: the list may be from another version of its
+/// dictionary.
 fn read_saved(product: &Product, bytes: &[u8]) -> Option<Saved> {
     let (count, mut rest) = bytes.split_first_chunk::<2>()?;
     let mut saved = Saved::new();
+    let mut last = None;
     for _ in 0..u16::from_le_bytes(*count) {
         let (head, behind) = rest.split_first_chunk::<4>()?;
         let (value, behind) = behind.split_at_checked(usize::from(head[3]))?;
         let at = ObjectAddress::new(u16::from_le_bytes([head[0], head[1]]), head[2]);
-        let known = product.dictionary.entry(at).and_then(|entry| entry.data_type.decode(value));
+        if last.replace(at).is_some_and(|last| last >= at) {
+            return None;
+        }
+        let parameter = product.dictionary.entry(at).filter(|entry| is_parameter(at, entry));
+        let known = parameter.and_then(|entry| entry.data_type.decode(value));
         saved.extend(known.map(|value| (at, value)));
         rest = behind;
     }
@@ -435,6 +445,24 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_list_that_is_not_in_order_is_refused_and_what_is_no_parameter_is_left_out() {
+        let at = |index, sub| ObjectAddress::new(index, sub);
+        let read = |saved: Saved| {
+            let mut image = Parameters { saved, ..Parameters::factory(product()) }.to_slot(product(), 1);
+            image.resize(IMAGE_BYTES, BLANK);
+            Parameters::read(product(), &image).map(|values| values.saved)
+        };
+        let factor = |sub| (at(0x6126, sub), Value::Real32(18.0));
+        assert_eq!(read(vec![factor(1), factor(2)]), Ok(vec![factor(1), factor(2)]));
+        let refused = Err(ParametersError::Value("list of saved parameters"));
+        assert_eq!(read(vec![factor(2), factor(1)]), refused);
+        // Nothing of another group takes their place: a save of the others would have no room.
+        assert_eq!(read(vec![factor(1); 200]), refused);
+        let others = [(at(0x1000, 0), Value::Unsigned32(1)), (at(0x1003, 0), Value::Unsigned8(200))];
+        assert_eq!(read(others.into_iter().chain([factor(1)]).collect()), Ok(vec![factor(1)]));
+    }
+
     // B-155, B-116, B-151
     #[test]
     fn a_group_is_saved_and_restored_without_the_others() {
@@ -510,6 +538,7 @@ mod tests {
             slot
         };
         let wrong_value = image(Parameters { node_id: 128, ..factory.clone() }.to_slot(product(), 1));
+        let wrong_rate = image(Parameters { kbps: 100, ..factory.clone() }.to_slot(product(), 1));
         let mut newer_format = factory.to_slot(product(), 1);
         newer_format[4] = 9;
         let crc_at = newer_format.len() - CRC_BYTES;
@@ -519,6 +548,7 @@ mod tests {
             (vec![0; 7], ParametersError::Length(7)),
             (vec![0; IMAGE_BYTES], ParametersError::Corrupt),
             (wrong_value, ParametersError::Value("node-ID")),
+            (wrong_rate, ParametersError::Value("bit rate")),
             (image(newer_format), ParametersError::Format(9)),
         ];
         for (image, error) in cases {

@@ -1,24 +1,21 @@
 //! Scenarios: what happens to a unit, and when, as a file says it.
 //!
 //! A file is TOML with deeds at moments and ramps between moments; `docs/emulator.md` describes it. A [`Scenario`] is
-//! what was read, the [`Stage`] is a unit with its scenario playing and its faults happening: an endpoint like the unit
-//! alone.
+//! what was read; the [`Stage`] plays it.
 
+mod stage;
 mod verb;
 
 pub use super::words::WordError;
+pub use stage::Stage;
 pub use verb::{HELP, Verb};
-
-use std::collections::VecDeque;
 
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::fault::{Arrival, Deed, Fault, Middleman, Way};
-use super::{NetworkState, Running, Store, Unit};
+use super::sensors::Sensors;
 use crate::device::{Complaint, Complaints, Product};
-use crate::endpoint::{Endpoint, Transmit};
-use crate::time::{Duration, Instant};
+use crate::time::Duration;
 
 /// What happens to a unit.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -92,11 +89,13 @@ impl Scenario {
                 Some(_) => {}
             }
         }
+        // A file for units of several products may turn what some of them have not.
+        let mut terminals = raw.product.as_ref().map(|_| Sensors::new(product, 0));
         let mut deeds = Vec::new();
         for moment in &raw.at {
-            let at = seconds(&moment.seconds, "at.seconds", &mut complaints);
+            let at = seconds(&moment.seconds, "at.seconds", &mut complaints).unwrap_or_default();
             for deed in &moment.deeds {
-                match act(deed.get_ref(), product) {
+                match act(deed.get_ref(), product, terminals.as_mut()) {
                     Ok(verb) => deeds.push((at, verb)),
                     Err(error) => complaints.add(place_of(text, deed, error.column), "at.do", error.message),
                 }
@@ -105,6 +104,7 @@ impl Scenario {
         for ramp in &raw.ramp {
             let from = seconds(&ramp.from, "ramp.from", &mut complaints);
             let to = seconds(&ramp.to, "ramp.to", &mut complaints);
+            let (Some(from), Some(to)) = (from, to) else { continue };
             if to <= from {
                 complaints.add(ramp.to.span().start, "ramp.to", "a ramp ends later than it begins");
                 continue;
@@ -113,7 +113,7 @@ impl Scenario {
             for step in 0..=steps {
                 let part = f64::from(step) / f64::from(steps);
                 let value = ramp.start + (ramp.end - ramp.start) * part;
-                match act(&format!("set {} {value}", ramp.what.get_ref()), product) {
+                match act(&format!("set {} {value}", ramp.what.get_ref()), product, terminals.as_mut()) {
                     Ok(verb) => deeds.push((from + (to - from).mul_f64(part), verb)),
                     Err(error) => {
                         complaints.add(ramp.what.span().start, "ramp.what", error.message);
@@ -128,8 +128,8 @@ impl Scenario {
         }
         deeds.sort_by_key(|(at, _)| *at);
         let last = deeds.last().map_or(Duration::ZERO, |(at, _)| *at);
-        let repeat = raw.repeat.as_ref().map(|repeat| {
-            let after = seconds(repeat, "repeat", &mut complaints);
+        let repeat = raw.repeat.as_ref().and_then(|repeat| {
+            let after = seconds(repeat, "repeat", &mut complaints)?;
             if after < last {
                 let message = format!("{} s is before the last deed, at {} s", repeat.get_ref(), last.as_secs_f64());
                 complaints.add(repeat.span().start, "repeat", message);
@@ -137,7 +137,7 @@ impl Scenario {
                 let message = format!("{} s is less than {} s", repeat.get_ref(), SHORTEST_ROUND.as_secs_f64());
                 complaints.add(repeat.span().start, "repeat", message);
             }
-            after
+            Some(after)
         });
         complaints.or(Some(Scenario { deeds, repeat }))
     }
@@ -158,371 +158,36 @@ fn ramp_steps(length: Duration) -> u32 {
     (length.as_nanos() / RAMP_STEP.as_nanos()).clamp(1, u128::from(u32::MAX)) as u32
 }
 
-fn seconds(raw: &Spanned<f64>, key: &str, complaints: &mut Complaints<'_>) -> Duration {
+fn seconds(raw: &Spanned<f64>, key: &str, complaints: &mut Complaints<'_>) -> Option<Duration> {
     let value = *raw.get_ref();
     if !(0.0..=LONGEST_S).contains(&value) {
         complaints.add(raw.span().start, key, format!("{value} is not 0 to {LONGEST_S} seconds"));
-        return Duration::ZERO;
+        return None;
     }
-    Duration::from_secs_f64(value)
+    Some(Duration::from_secs_f64(value))
 }
 
-/// A verb that does something; a file has nobody to answer.
-fn act(line: &str, product: &Product) -> Result<Verb, WordError> {
+/// A verb that does something, as a file has nobody to answer; at the terminals, where they are given, something that
+/// can be done there.
+fn act(line: &str, product: &Product, terminals: Option<&mut Sensors>) -> Result<Verb, WordError> {
     match Verb::read(line, product)? {
         Verb::Read(_) | Verb::Status => {
             Err(WordError { column: 1, message: "a scenario does things; nobody would hear the answer".into() })
         }
+        Verb::Turn(knob) => {
+            let turned = terminals.map_or(Ok(()), |terminals| terminals.turn(knob));
+            turned.map(|()| Verb::Turn(knob)).map_err(|error| WordError { column: 1, message: error.to_string() })
+        }
         verb => Ok(verb),
-    }
-}
-
-/// A unit with its scenario playing, on a cable with faults.
-#[derive(Debug)]
-pub struct Stage {
-    unit: Unit,
-    scenario: Scenario,
-    /// When the present round began.
-    began: Instant,
-    /// The next deed.
-    next: usize,
-    /// When the supply comes back.
-    power_at: Option<Instant>,
-    middleman: Middleman,
-    /// What the client gets.
-    outgoing: VecDeque<Transmit>,
-}
-
-impl Stage {
-    /// A unit to which only happens what is done by hand.
-    pub fn bare(unit: Unit) -> Self {
-        Stage::new(unit, Scenario::default())
-    }
-
-    /// A unit whose scenario begins at time zero.
-    pub fn new(unit: Unit, scenario: Scenario) -> Self {
-        Stage {
-            unit,
-            scenario,
-            began: Instant::ZERO,
-            next: 0,
-            power_at: None,
-            middleman: Middleman::new(0),
-            outgoing: VecDeque::new(),
-        }
-    }
-
-    /// The same with these faults from the beginning on; `seed` decides what chance decides about them, and about those
-    /// ordered later.
-    pub fn with_faults(mut self, seed: u64, faults: &[Fault]) -> Self {
-        self.middleman = Middleman::new(seed);
-        for &fault in faults {
-            self.suffer(fault);
-        }
-        self
-    }
-
-    /// The unit.
-    pub fn unit(&self) -> &Unit {
-        &self.unit
-    }
-
-    /// The unit, to do something to it that no verb does.
-    pub fn unit_mut(&mut self) -> &mut Unit {
-        &mut self.unit
-    }
-
-    /// Whether the client has heard XOFF and not yet XON. A unit that starts anew holds nobody.
-    pub fn holds_client(&self) -> bool {
-        self.middleman.client_is_held() && self.unit.running() == Running::Loader
-    }
-
-    /// Another client has come: it knows nothing of an XOFF.
-    pub fn forget_hold(&mut self) {
-        self.middleman.forget_hold();
-    }
-
-    /// Whether the cable is in.
-    pub fn is_plugged(&self) -> bool {
-        self.middleman.is_plugged()
-    }
-
-    /// Bytes that the adapter takes ahead of the line.
-    pub fn queue(&self) -> usize {
-        self.middleman.queue()
-    }
-
-    /// Supply voltage comes.
-    pub fn power_on(&mut self, now: Instant) {
-        self.power_at = None;
-        self.unit.power_on(now);
-        self.collect(now);
-    }
-
-    /// Supply voltage goes.
-    pub fn power_off(&mut self, now: Instant) {
-        self.power_at = None;
-        self.unit.power_off(now);
-        self.collect(now);
-    }
-
-    /// The next write to memory that outlives the power.
-    pub fn poll_store(&mut self) -> Option<Store> {
-        self.unit.poll_store()
-    }
-
-    /// Does something to the unit; gives what there is to say about it.
-    ///
-    /// # Errors
-    /// If the unit refuses, with its reason.
-    pub fn perform(&mut self, now: Instant, verb: &Verb) -> Result<Option<String>, String> {
-        self.handle_timeout(now);
-        let answer = self.act(now, verb);
-        self.collect(now);
-        answer
-    }
-
-    fn suffer(&mut self, fault: Fault) {
-        if let Fault::Flash { word, defect } = fault {
-            self.unit.spoil_word(word, defect);
-        }
-        self.middleman.order(fault);
-    }
-
-    /// What the unit has sent goes on the cable, and what has arrived to the client.
-    fn collect(&mut self, now: Instant) {
-        while let Some(transmit) = self.unit.poll_transmit() {
-            if self.middleman.is_idle() {
-                self.middleman.note_client_heard(&transmit.bytes);
-                self.outgoing.push_back(transmit);
-            } else {
-                transmit.bytes.iter().for_each(|&byte| self.middleman.carry(now, Way::FromUnit, byte));
-            }
-        }
-        let arrived: Vec<u8> = std::iter::from_fn(|| self.middleman.next_to_client(now)).collect();
-        if !arrived.is_empty() {
-            self.middleman.note_client_heard(&arrived);
-            self.outgoing.push_back(Transmit::open(arrived));
-        }
-        if matches!(self.unit.running(), Running::Off | Running::Starting) {
-            self.middleman.forget_hold();
-        }
-    }
-
-    /// Something arrives at the unit.
-    fn deliver(&mut self, now: Instant, arrival: Arrival) {
-        let loads = self.unit.running() == Running::Loader;
-        match arrival {
-            Arrival::Byte(byte) => self.unit.handle_bytes(now, &[byte]),
-            Arrival::Unreadable => self.unit.handle_framing_error(now),
-        }
-        self.collect(now);
-        if !loads {
-            self.middleman.note_no_loader();
-            return;
-        }
-        for deed in self.middleman.note_loader_got(arrival) {
-            self.power_off(now);
-            match deed {
-                Deed::Reset => self.power_on(now),
-                Deed::PowerCut(off) => self.power_at = off.map(|off| now + off),
-            }
-        }
-    }
-
-    /// Does what is due at this moment.
-    fn step(&mut self, now: Instant) {
-        self.unit.handle_timeout(now);
-        self.collect(now);
-        if self.power_at.is_some_and(|at| at <= now) {
-            self.power_on(now);
-        }
-        if self.due().is_some_and(|at| at <= now) {
-            self.play(now);
-            self.collect(now);
-        }
-        self.middleman.handle_timeout(now);
-        while let Some(arrival) = self.middleman.next_to_unit(now) {
-            self.deliver(now, arrival);
-        }
-    }
-
-    fn act(&mut self, now: Instant, verb: &Verb) -> Result<Option<String>, String> {
-        match verb {
-            Verb::Turn(knob) => self.unit.turn(now, *knob).map_err(|error| error.to_string())?,
-            Verb::Power(true) => self.power_on(now),
-            Verb::Power(false) => self.power_off(now),
-            Verb::PowerCycle(off) => {
-                self.unit.power_off(now);
-                self.power_at = Some(now + *off);
-            }
-            Verb::Nmt(order) => self.unit.nmt(now, *order),
-            Verb::Write(at, value) => {
-                let refused = |refusal| format!("{at} <- {value}: {refusal}");
-                self.unit.write_object(now, *at, &value.encode()).map_err(refused)?;
-            }
-            Verb::Read(at) => {
-                let value = self.unit.read_object(*at).map_err(|refusal| format!("{at}: {refusal}"))?;
-                let entry = self.unit.product().dictionary.entry(*at);
-                let meaning = entry.and_then(|entry| entry.meaning(value)).map(|text| format!(" ({text})"));
-                let unit = entry.and_then(|entry| entry.unit.as_deref()).map(|unit| format!(" {unit}"));
-                return Ok(Some(format!("{at} = {value}{}{}", unit.unwrap_or_default(), meaning.unwrap_or_default())));
-            }
-            Verb::Fault(fault) => self.suffer(*fault),
-            Verb::Heal => {
-                self.middleman.heal();
-                self.unit.repair_flash();
-            }
-            Verb::Plug(plugged) => self.middleman.plug(*plugged),
-            Verb::Status => return Ok(Some(self.status())),
-        }
-        Ok(None)
-    }
-
-    fn status(&self) -> String {
-        let product = &self.unit.product().name;
-        let state = match self.unit.running() {
-            Running::Off => "has no power",
-            Running::Starting => "starts",
-            Running::Loader => "waits in its loader",
-            Running::Application => match self.unit.network_state() {
-                Some(NetworkState::Operational) => "runs, operational",
-                Some(NetworkState::Stopped) => "runs, stopped",
-                Some(NetworkState::PreOperational) | None => "runs, pre-operational",
-            },
-        };
-        let cable = if self.middleman.is_plugged() { "" } else { ", its cable is out" };
-        format!("{product} {state}{cable}")
-    }
-
-    /// When the scenario has something to do.
-    fn due(&self) -> Option<Instant> {
-        let deed = self.scenario.deeds.get(self.next).map(|(at, _)| *at);
-        deed.or(self.scenario.repeat).map(|at| self.began + at)
-    }
-
-    /// Does what the scenario says for this moment.
-    fn play(&mut self, now: Instant) {
-        while self.due().is_some_and(|due| due <= now) {
-            let Some((_, verb)) = self.scenario.deeds.get(self.next) else {
-                self.began += self.scenario.repeat.unwrap_or_default();
-                self.next = 0;
-                continue;
-            };
-            let verb = verb.clone();
-            self.next += 1;
-            // A unit that refuses (no such input, an entry that is read-only) is what a scenario may want to see.
-            let _ = self.act(now, &verb);
-        }
-    }
-
-    /// The next moment of the stage's own.
-    fn own_deadline(&self) -> Option<Instant> {
-        [self.due(), self.power_at, self.middleman.deadline()].into_iter().flatten().min()
-    }
-}
-
-impl Endpoint for Stage {
-    fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
-        self.handle_timeout(now);
-        if self.middleman.is_idle() {
-            self.unit.handle_bytes(now, bytes);
-            self.collect(now);
-            return;
-        }
-        bytes.iter().for_each(|&byte| self.middleman.carry(now, Way::ToUnit, byte));
-        self.step(now);
-    }
-
-    fn handle_timeout(&mut self, now: Instant) {
-        loop {
-            let mut due = self.own_deadline();
-            if !self.middleman.is_idle() {
-                // What the unit says has to go on the cable at its own moment.
-                due = [due, self.unit.poll_timeout()].into_iter().flatten().min();
-            }
-            match due.filter(|&due| due <= now) {
-                Some(due) => self.step(due),
-                None => break,
-            }
-        }
-        self.step(now);
-    }
-
-    fn poll_transmit(&mut self) -> Option<Transmit> {
-        self.outgoing.pop_front()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        [self.own_deadline(), self.unit.poll_timeout()].into_iter().flatten().min()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::canopen::ObjectAddress;
-    use crate::image::make;
-    use crate::version::Version;
 
     fn product() -> &'static Product {
         Product::named("AXTC4CO").expect("built in")
-    }
-
-    fn stage(text: &str) -> Stage {
-        let scenario = Scenario::read("test.toml", text, product()).expect("a scenario").expect("for this product");
-        let mut flash = vec![0xFF; product().flash.program_words as usize * 2];
-        let recipe =
-            make::Recipe { target: &product().target(), version: Version::new(1, 1, 0), words: 1024, flaw: None };
-        let program = make::program(&recipe);
-        flash[..program.len()].copy_from_slice(&program);
-        let setup = crate::emulator::Setup {
-            product: product(),
-            loader: product().loader.kind,
-            seed: 1,
-            dialect: 0,
-            flash,
-            parameters: Vec::new(),
-        };
-        let mut stage = Stage::new(Unit::new(setup), scenario);
-        stage.power_on(Instant::ZERO);
-        stage
-    }
-
-    fn celsius(stage: &Stage, channel: u8) -> f64 {
-        stage.unit.read_object(ObjectAddress::new(0x6100, channel)).expect("it runs").as_f64()
-    }
-
-    fn at(millis: u64) -> Instant {
-        Instant::from_millis(millis)
-    }
-
-    #[test]
-    fn deeds_happen_at_their_moments_and_ramps_in_between() {
-        let mut stage = stage(
-            r#"
-            product = "axtc4co"
-            [[at]]
-            seconds = 10
-            do = ["set 1 temperature 250.0", "open 3"]
-            [[ramp]]
-            from = 20.0
-            to = 80.0
-            what = "2 temperature"
-            start = 25.0
-            end = 145.0
-            "#,
-        );
-        stage.handle_timeout(at(9_900));
-        assert!(celsius(&stage, 1) < 120.0 && celsius(&stage, 3) > 70.0);
-        stage.handle_timeout(at(12_500));
-        assert!((celsius(&stage, 1) - 250.0).abs() < 0.01);
-        assert!(celsius(&stage, 3).is_nan());
-        for (seconds, expected) in [(20u64, 25.0), (50, 85.0), (80, 145.0), (90, 145.0)] {
-            stage.handle_timeout(at(seconds * 1_000 + 300));
-            let found = celsius(&stage, 2);
-            assert!((found - expected).abs() < 1.0, "at {seconds} s: {found}");
-        }
     }
 
     #[test]
@@ -534,42 +199,6 @@ mod tests {
         for verb in HELP.lines().map(|line| line.split_whitespace().next().unwrap_or_default().trim_end_matches(',')) {
             assert!(text.contains(&format!("`{verb}")), "{verb} is not in the documentation");
         }
-    }
-
-    #[test]
-    fn a_scenario_begins_anew_and_asking_often_changes_nothing() {
-        let text = "repeat = 20\n[[at]]\nseconds = 5\ndo = ['set 1 temperature 50']\n[[at]]\nseconds = 15\n\
-                    do = ['set 1 temperature 90', 'power cycle 0.5']\n";
-        let (mut once, mut often) = (stage(text), stage(text));
-        for second in 1..=70u64 {
-            for step in 0..10 {
-                often.handle_timeout(at(second * 1_000 + step * 100));
-            }
-            once.handle_timeout(at(second * 1_000 + 900));
-            assert_eq!(once.unit.running(), often.unit.running(), "{second} s");
-        }
-        assert!((celsius(&once, 1) - 50.0).abs() < 0.1, "in the fourth round, 5 s after its begin");
-        assert_eq!(celsius(&once, 1), celsius(&often, 1));
-    }
-
-    #[test]
-    fn a_power_cycle_loses_what_was_not_saved() {
-        let mut stage = stage("");
-        stage.handle_timeout(at(1_000));
-        let verb = |line: &str| Verb::read(line, product()).expect(line);
-        assert_eq!(stage.perform(at(1_000), &verb("write 6126:1 18")), Ok(None));
-        assert_eq!(stage.perform(at(1_000), &verb("read 6110:1")), Ok(Some("6110:01 = 1 (type J)".into())));
-        assert_eq!(stage.perform(at(1_000), &verb("read 6127:1")), Ok(Some("6127:01 = 4368.0".into())));
-        let refused = stage.perform(at(1_000), &verb("write 4020:1 100")).expect_err("too low");
-        assert_eq!(refused, "4020:01 <- 100: the value is below the low limit (abort 06090032h)");
-        assert_eq!(stage.perform(at(1_000), &verb("status")), Ok(Some("AXTC4CO runs, pre-operational".into())));
-        assert_eq!(stage.perform(at(2_000), &verb("power cycle 0.5")), Ok(None));
-        assert_eq!(stage.perform(at(2_100), &verb("status")), Ok(Some("AXTC4CO has no power".into())));
-        assert_eq!(stage.perform(at(2_200), &verb("read 6126:1")), Err("6126:01: the unit does not answer".into()));
-        stage.handle_timeout(at(3_000));
-        assert_eq!(stage.perform(at(3_000), &verb("read 6126:1")), Ok(Some("6126:01 = 16.0".into())));
-        let refused = stage.perform(at(3_000), &verb("set 9 temperature 20")).expect_err("no such input");
-        assert_eq!(refused, "there is no input 9: this unit has inputs 1 to 4");
     }
 
     #[test]
@@ -593,6 +222,18 @@ mod tests {
                 "repeat = 1\n[[at]]\nseconds = 2\ndo = []\n[[at]]\nseconds = 3\ndo = ['freeze']",
                 "test.toml:1:10: repeat: 1 s is",
             ),
+            (
+                "product = 'axtc4co'\n[[at]]\nseconds = 1\ndo = ['open 5']",
+                "test.toml:4:8: at.do: there is no input 5: this unit has inputs 1 to 4",
+            ),
+            (
+                "product = 'axtc4co'\n[[at]]\nseconds = 1\ndo = ['set 1 temperature 9999']",
+                "test.toml:4:8: at.do: a temperature cannot be 9999: it is from -273.15 to 3000",
+            ),
+            (
+                "product = 'axtc4co'\n[[ramp]]\nfrom = 1\nto = 2\nwhat = '1 resistance'\nstart = 1\nend = 2",
+                "test.toml:5:8: ramp.what: a unit with thermocouples has no resistance",
+            ),
             ("repeat = 0.000000001", "test.toml:1:10: repeat: 0.000000001 s is less than 0.1 s"),
             // Blanks of two bytes; one written as an escape; a deed on a line of its own.
             ("[[at]]\nseconds = 1\ndo = ['open\u{a0}\u{a0}3\u{a0}X']", "test.toml:3:16: at.do: 'X' is not known"),
@@ -607,6 +248,19 @@ mod tests {
         }
         let two = Scenario::read("test.toml", "[[at]]\nseconds = -1\ndo = ['x', 'y']", product()).expect_err("three");
         assert_eq!(two.len(), 3, "none hides another");
+        for text in [
+            "repeat = 1e9\n[[at]]\nseconds = 2\ndo = ['freeze']",
+            "[[ramp]]\nfrom = 5\nto = 1e9\nwhat = 'supply'\nstart = 1\nend = 2",
+        ] {
+            let complaints = Scenario::read("test.toml", text, product()).expect_err(text);
+            assert_eq!(complaints.len(), 1, "and none has a second that says something else: {complaints:?}");
+        }
+        let many = format!("[[at]]\nseconds = 1\ndo = [{}]", "\n'x',".repeat(100_000));
+        let complaints = Scenario::read("test.toml", &many, product()).expect_err("no verbs");
+        assert_eq!(complaints.len(), 101);
+        assert_eq!(complaints[100].to_string(), "test.toml:104:2: and more is wrong");
+        let for_all = "[[at]]\nseconds = 1\ndo = ['set 8 temperature 20']";
+        assert!(Scenario::read("test.toml", for_all, product()).is_ok(), "another product has that input");
         assert_eq!(Scenario::read("test.toml", "product = 'axrtd8co'", product()), Ok(None), "for another product");
     }
 }

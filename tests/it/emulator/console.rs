@@ -213,6 +213,19 @@ fn a_line_that_is_too_slow_loses_whole_rows() {
     assert!(menu.contains("V - View Object Dictionary\r\n  D - Default"), "the menu comes whole: {menu}");
 }
 
+// B-197
+#[test]
+fn a_stream_that_fills_the_line_leaves_room_for_the_diagnostics() {
+    let mut bench = Bench::at_menu();
+    bench.keys(b"tf1\rs");
+    bench.run_ms(4_000);
+    bench.take();
+    bench.run_ms(5_000);
+    let text = bench.take();
+    assert_eq!(text.matches("Supply Voltage").count(), 5, "a page a second");
+    assert!(rows(&text).len() > 1_100, "and rows in between: {}", rows(&text).len());
+}
+
 // B-191, B-197, B-157
 #[test]
 fn the_stream_comes_back_after_a_power_cycle_and_diagnostics_do_not() {
@@ -466,6 +479,33 @@ fn keys_pressed_while_the_output_is_stopped_are_not_forgotten_and_not_without_li
     let stuck_after = 2_048usize.div_ceil(menu.len());
     assert_eq!(menus, stuck_after + 64, "what fills the output, and what the receiver keeps");
     assert_eq!(bench.keys(b"m"), menu, "and all is well again");
+}
+
+#[test]
+fn a_reset_by_the_network_does_not_wait_for_the_terminal() {
+    for held in [false, true] {
+        let mut bench = Bench::at_menu();
+        bench.send(b"m");
+        bench.run_ms(10);
+        if held {
+            bench.send(&[XOFF]);
+            bench.run_ms(1_000);
+        }
+        bench.nmt(NmtCommand::ResetNode);
+        assert_eq!(bench.unit().running(), Running::Starting);
+        bench.run_ms(500);
+        let text = bench.take();
+        let menus = (text.matches("Main Menu").count(), text.matches("L - Load").count());
+        assert_eq!(menus, (2, 1), "half a menu, and a new start: {text}");
+        assert!(text.ends_with("State Pre-Operational\r\n") && text.contains("V1.2.3, built"), "{text}");
+    }
+}
+
+#[test]
+fn a_unit_that_waits_for_a_file_asks_for_nothing() {
+    let mut bench = Bench::at_menu();
+    bench.keys(b"lAXIO-2010\r");
+    assert_eq!((bench.unit().running(), bench.unit().poll_timeout()), (Running::Loader, None));
 }
 
 #[test]

@@ -132,6 +132,23 @@ fn changes_act_at_once_and_stay_only_if_they_are_saved() {
     assert_eq!((rtd8.read("3000:2"), rtd8.read("3030:2")), (Ok(0.0), Ok(-4.0)), "the user's own constants");
 }
 
+// Errata E-93, E-G4.
+#[test]
+fn a_reset_of_communication_brings_back_what_is_kept_of_it_and_nothing_else() {
+    for name in PRODUCTS {
+        let mut bench = measuring(name);
+        assert_eq!((bench.write("1017", 500.0), bench.write("100C", 70.0)), (Ok(()), Ok(())));
+        bench.save();
+        for (entry, number) in [("1017", 900.0), ("1801:5", 250.0), ("6126:1", 18.0), ("4030:1", 0.0)] {
+            assert_eq!(bench.write(entry, number), Ok(()), "{entry}");
+        }
+        let period = if name == "AXTC4CO" { 0.0 } else { 1_000.0 };
+        bench.nmt(NmtCommand::ResetCommunication);
+        let found = ["1017", "100C", "1801:5", "1010:1", "6126:1", "4030:1"].map(|entry| bench.read(entry));
+        assert_eq!(found, [500.0, 70.0, period, 1.0, 18.0, 0.0].map(Ok), "{name}");
+    }
+}
+
 // B-028, B-027, B-109, B-108, B-026
 #[test]
 fn the_node_starts_by_itself_if_it_was_told_to() {
@@ -147,6 +164,26 @@ fn the_node_starts_by_itself_if_it_was_told_to() {
         assert_eq!(bench.unit().network_state(), Some(NetworkState::PreOperational), "{name}: not before 5 s");
         bench.run_ms(100);
         assert_eq!(bench.unit().network_state(), Some(NetworkState::Operational), "{name}");
+    }
+}
+
+// Errata E-110: behind the view the node is pre-operational.
+#[test]
+fn a_start_that_is_due_while_the_view_is_open_comes_later() {
+    for name in PRODUCTS {
+        let mut bench = measuring(name);
+        assert_eq!(bench.write("5555", 1.0), Ok(()));
+        bench.save();
+        bench.power_off();
+        bench.power_on();
+        bench.run_ms(3_000);
+        bench.keys(b"v");
+        bench.run_ms(20_000);
+        bench.keys(b"x");
+        bench.run_ms(1_500);
+        assert_eq!(bench.unit().network_state(), Some(NetworkState::PreOperational), "{name}");
+        bench.run_ms(500);
+        assert_eq!(bench.unit().network_state(), Some(NetworkState::Operational), "{name}: 5 s without the view");
     }
 }
 

@@ -8,17 +8,7 @@ use std::collections::VecDeque;
 use super::objects::Objects;
 use crate::canopen::Value;
 use crate::device::SensorKind;
-
-/// An error, as an entry of 1003h names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Fault {
-    /// EMCY code, bits 15-0.
-    pub code: u16,
-    /// Channel, bits 23-16; for a lost heartbeat the node-ID.
-    pub channel: u8,
-    /// Error description, bits 31-24.
-    pub description: u8,
-}
+use crate::device::emergency::Emergency;
 
 /// Classes of errors that object 1029h tells apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,13 +25,13 @@ pub enum Class {
 
 /// An error has come or gone: what an EMCY message tells the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FaultEvent {
+pub enum ErrorEvent {
     /// It has become active.
-    Raised(Fault),
+    Raised(Emergency),
     /// It has cleared; whether it was the last one.
     Cleared {
         /// Which.
-        fault: Fault,
+        error: Emergency,
         /// No error is active any more: EMCY code 0000h (section 3.2.4).
         last: bool,
     },
@@ -49,12 +39,12 @@ pub enum FaultEvent {
 
 /// The active errors of a unit.
 #[derive(Clone, Debug, Default)]
-pub struct Faults {
+pub struct ActiveErrors {
     /// Oldest first.
-    active: Vec<Fault>,
+    active: Vec<Emergency>,
     /// What 1003h shows, newest first.
-    listed: VecDeque<Fault>,
-    events: VecDeque<FaultEvent>,
+    listed: VecDeque<Emergency>,
+    events: VecDeque<ErrorEvent>,
 }
 
 /// Open or short circuit (section 3.2.4, table of EMCY codes).
@@ -67,24 +57,17 @@ pub const DEVICE_SPECIFIC: u16 = 0xFF00;
 /// Events that nobody has fetched at most; the oldest are lost.
 const MOST_EVENTS: usize = 64;
 
-impl Fault {
-    /// The entry of 1003h.
-    pub fn entry(self) -> u32 {
-        u32::from(self.description) << 24 | u32::from(self.channel) << 16 | u32::from(self.code)
-    }
-
-    /// Which reaction of 1029h it brings about.
-    pub fn class(self, sensors: SensorKind) -> Class {
-        match (self.code, sensors) {
+impl Class {
+    /// The class of an error of a unit with these sensors.
+    pub fn of(error: Emergency, sensors: SensorKind) -> Class {
+        match (error.code, sensors) {
             (INPUT_OVERLOAD, _) | (LIMIT_EXCEEDED, SensorKind::Thermocouple) => Class::Sensor,
             (LIMIT_EXCEEDED, SensorKind::Rtd) => Class::System,
             (DEVICE_SPECIFIC, _) => Class::Scanner,
             (_, _) => Class::Communication,
         }
     }
-}
 
-impl Class {
     /// Its sub-index in 1029h.
     pub fn sub_index(self) -> u8 {
         match self {
@@ -96,25 +79,26 @@ impl Class {
     }
 }
 
-impl Faults {
-    /// An error becomes active; nothing happens if it is.
-    pub fn raise(&mut self, fault: Fault, objects: &mut Objects) {
-        if self.active.contains(&fault) {
+impl ActiveErrors {
+    /// Errors become active, and others clear, at one and the same moment: the list never holds both, and the unit is
+    /// never without an error in between. What is active already, or is not, is passed over.
+    pub fn change(&mut self, raised: &[Emergency], cleared: &[Emergency], objects: &mut Objects) {
+        let raised: Vec<Emergency> = raised.iter().copied().filter(|error| !self.active.contains(error)).collect();
+        let cleared: Vec<Emergency> = cleared.iter().copied().filter(|error| self.active.contains(error)).collect();
+        if raised.is_empty() && cleared.is_empty() {
             return;
         }
-        self.active.push(fault);
-        self.listed.push_front(fault);
+        self.active.retain(|active| !cleared.contains(active));
+        self.listed.retain(|listed| !cleared.contains(listed));
+        for &error in &raised {
+            self.active.push(error);
+            self.listed.push_front(error);
+            self.note(ErrorEvent::Raised(error));
+        }
         self.publish(objects);
-        self.note(FaultEvent::Raised(fault));
-    }
-
-    /// An error clears; nothing happens if it is not active.
-    pub fn clear(&mut self, fault: Fault, objects: &mut Objects) {
-        let Some(place) = self.active.iter().position(|active| *active == fault) else { return };
-        self.active.remove(place);
-        self.listed.retain(|listed| *listed != fault);
-        self.publish(objects);
-        self.note(FaultEvent::Cleared { fault, last: self.active.is_empty() });
+        for (left, &error) in (0..cleared.len()).rev().zip(&cleared) {
+            self.note(ErrorEvent::Cleared { error, last: left == 0 && self.active.is_empty() });
+        }
     }
 
     /// Empties the list, not the errors.
@@ -129,11 +113,11 @@ impl Faults {
     }
 
     /// The next event.
-    pub fn poll_event(&mut self) -> Option<FaultEvent> {
+    pub fn poll_event(&mut self) -> Option<ErrorEvent> {
         self.events.pop_front()
     }
 
-    fn note(&mut self, event: FaultEvent) {
+    fn note(&mut self, event: ErrorEvent) {
         if self.events.len() == MOST_EVENTS {
             self.events.pop_front();
         }
@@ -147,7 +131,7 @@ impl Faults {
         objects.set(0x1001, 0, Value::Unsigned8(u8::from(!self.active.is_empty())));
         objects.set(0x1003, 0, Value::Unsigned8(self.listed.len() as u8));
         for (sub, place) in (1u8..).zip(0..room) {
-            let entry = self.listed.get(place).map_or(0, |fault| fault.entry());
+            let entry = self.listed.get(place).map_or(0, |&error| error.into());
             objects.set(0x1003, sub, Value::Unsigned32(entry));
         }
     }
@@ -166,31 +150,58 @@ mod tests {
         (1..=objects.integer(0x1003, 0) as u8).map(|sub| objects.integer(0x1003, sub) as u32).collect()
     }
 
-    fn threshold(channel: u8, description: u8) -> Fault {
-        Fault { code: LIMIT_EXCEEDED, channel, description }
+    fn threshold(channel: u8, description: u8) -> Emergency {
+        Emergency { code: LIMIT_EXCEEDED, channel, description }
     }
 
     // B-110, B-111, B-114, B-70, B-71, B-72
     #[test]
     fn the_list_holds_what_is_active_newest_first() {
-        let (mut objects, mut faults) = (objects("AXTC4CO"), Faults::default());
+        let (mut objects, mut errors) = (objects("AXTC4CO"), ActiveErrors::default());
         let (low, high) = (threshold(1, 0x10), threshold(3, 0x20));
-        faults.raise(low, &mut objects);
-        faults.raise(high, &mut objects);
-        faults.raise(high, &mut objects);
+        errors.change(&[low], &[], &mut objects);
+        errors.change(&[high], &[], &mut objects);
+        errors.change(&[high], &[], &mut objects);
         assert_eq!(list(&objects), [0x2003_F011, 0x1001_F011]);
         assert_eq!(objects.get(0x1001, 0), Value::Unsigned8(1));
         assert_eq!(objects.get(0x1003, 3), Value::Unsigned32(0), "beyond the count");
-        faults.clear(low, &mut objects);
+        errors.change(&[], &[low], &mut objects);
         assert_eq!(list(&objects), [0x2003_F011]);
-        faults.clear(high, &mut objects);
+        errors.change(&[], &[high], &mut objects);
         assert_eq!((list(&objects), objects.get(0x1001, 0)), (vec![], Value::Unsigned8(0)));
-        let events: Vec<FaultEvent> = std::iter::from_fn(|| faults.poll_event()).collect();
+        let events: Vec<ErrorEvent> = std::iter::from_fn(|| errors.poll_event()).collect();
         let expected = [
-            FaultEvent::Raised(low),
-            FaultEvent::Raised(high),
-            FaultEvent::Cleared { fault: low, last: false },
-            FaultEvent::Cleared { fault: high, last: true },
+            ErrorEvent::Raised(low),
+            ErrorEvent::Raised(high),
+            ErrorEvent::Cleared { error: low, last: false },
+            ErrorEvent::Cleared { error: high, last: true },
+        ];
+        assert_eq!(events, expected);
+    }
+
+    #[test]
+    fn an_error_takes_the_place_of_others_without_a_moment_of_none_or_of_both() {
+        let (mut objects, mut errors) = (objects("AXTC4CO"), ActiveErrors::default());
+        let open = Emergency { code: INPUT_OVERLOAD, channel: 4, description: 0x02 };
+        for channel in 1..=4 {
+            errors.change(&[threshold(channel, 0x20), threshold(channel, 0x40)], &[], &mut objects);
+        }
+        errors.change(&[Emergency { code: 0x8130, channel: 5, description: 0x80 }], &[], &mut objects);
+        errors.change(&[open], &[threshold(4, 0x20), threshold(4, 0x40)], &mut objects);
+        assert_eq!((list(&objects).len(), list(&objects)[7]), (8, 0x2001_F011), "the full list has lost nothing");
+        let all = errors.active.clone();
+        errors.change(&[], &all[1..], &mut objects);
+        errors.change(&[open], &all, &mut objects);
+        errors.events.clear();
+        errors.change(&[threshold(1, 0x20), threshold(1, 0x40)], &[open], &mut objects);
+        errors.change(&[], &[open, threshold(1, 0x20), threshold(1, 0x40)], &mut objects);
+        let events: Vec<ErrorEvent> = std::iter::from_fn(|| errors.poll_event()).collect();
+        let expected = [
+            ErrorEvent::Raised(threshold(1, 0x20)),
+            ErrorEvent::Raised(threshold(1, 0x40)),
+            ErrorEvent::Cleared { error: open, last: false },
+            ErrorEvent::Cleared { error: threshold(1, 0x20), last: false },
+            ErrorEvent::Cleared { error: threshold(1, 0x40), last: true },
         ];
         assert_eq!(events, expected);
     }
@@ -198,14 +209,14 @@ mod tests {
     // B-113, B-73
     #[test]
     fn a_list_emptied_by_hand_stays_so_until_an_error_comes_again() {
-        let (mut objects, mut faults) = (objects("AXRTD8CO"), Faults::default());
-        faults.raise(threshold(2, 0x20), &mut objects);
-        faults.clear_list(&mut objects);
+        let (mut objects, mut errors) = (objects("AXRTD8CO"), ActiveErrors::default());
+        errors.change(&[threshold(2, 0x20)], &[], &mut objects);
+        errors.clear_list(&mut objects);
         assert_eq!((list(&objects), objects.get(0x1001, 0)), (vec![], Value::Unsigned8(1)));
-        faults.raise(threshold(2, 0x20), &mut objects);
+        errors.change(&[threshold(2, 0x20)], &[], &mut objects);
         assert!(list(&objects).is_empty(), "it has never gone");
-        faults.clear(threshold(2, 0x20), &mut objects);
-        faults.raise(threshold(2, 0x20), &mut objects);
+        errors.change(&[], &[threshold(2, 0x20)], &mut objects);
+        errors.change(&[threshold(2, 0x20)], &[], &mut objects);
         assert_eq!(list(&objects), [0x2002_F011]);
     }
 
@@ -213,13 +224,13 @@ mod tests {
     #[test]
     fn a_full_list_loses_its_oldest() {
         for (name, channels, room) in [("AXTC4CO", 4, 9), ("AXRTD8CO", 8, 17)] {
-            let (mut objects, mut faults) = (objects(name), Faults::default());
+            let (mut objects, mut errors) = (objects(name), ActiveErrors::default());
             for channel in 1..=channels {
-                faults.raise(threshold(channel, 0x20), &mut objects);
-                faults.raise(threshold(channel, 0x40), &mut objects);
+                errors.change(&[threshold(channel, 0x20)], &[], &mut objects);
+                errors.change(&[threshold(channel, 0x40)], &[], &mut objects);
             }
             for node in [5, 6] {
-                faults.raise(Fault { code: 0x8130, channel: node, description: 0x80 }, &mut objects);
+                errors.change(&[Emergency { code: 0x8130, channel: node, description: 0x80 }], &[], &mut objects);
             }
             let list = list(&objects);
             assert_eq!(list.len(), room, "{name}");
@@ -231,9 +242,10 @@ mod tests {
     // B-125, B-81
     #[test]
     fn classes_are_those_of_the_products_manual() {
-        let fault = |code| Fault { code, channel: 1, description: 0 };
+        let error = |code| Emergency { code, channel: 1, description: 0 };
         let classes = |sensors| {
-            [0x8130, 0x8110, INPUT_OVERLOAD, LIMIT_EXCEEDED, DEVICE_SPECIFIC].map(|code| fault(code).class(sensors))
+            [0x8130, 0x8110, INPUT_OVERLOAD, LIMIT_EXCEEDED, DEVICE_SPECIFIC]
+                .map(|code| Class::of(error(code), sensors))
         };
         use Class::{Communication, Scanner, Sensor, System};
         assert_eq!(classes(SensorKind::Thermocouple), [Communication, Communication, Sensor, Sensor, Scanner]);
