@@ -431,16 +431,21 @@ mod hosting {
         Ok(listening)
     }
 
+    /// Bytes of a line of verbs that are looked at together; no verb is nearly as long.
+    const LONGEST_LINE: u64 = 1 << 16;
+
     fn listen_for_lines(news: SyncSender<News>) -> Result<(), CliError> {
         if !crate::host::terminal::may_read_standard_input() {
             return Ok(());
         }
         let lines = move || {
-            // What is no UTF-8 is a verb that nobody knows, and answered so.
-            for line in std::io::stdin().lock().split(b'\n') {
-                let Ok(line) = line else { return };
-                let line = String::from_utf8_lossy(&line).trim_end_matches('\r').to_owned();
-                if news.send(News::Line(line)).is_err() {
+            let mut input = std::io::stdin().lock();
+            let mut line = Vec::new();
+            // What is no UTF-8, or goes on for ever, is a verb that nobody knows, and answered so.
+            while matches!(input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line), Ok(1..)) {
+                let text = String::from_utf8_lossy(&line).trim_end_matches(['\r', '\n']).to_owned();
+                line.clear();
+                if news.send(News::Line(text)).is_err() {
                     return;
                 }
             }

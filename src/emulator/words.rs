@@ -21,6 +21,8 @@ impl fmt::Display for WordError {
 
 impl std::error::Error for WordError {}
 
+/// Characters of a word that an error quotes at most.
+const LONGEST_QUOTE: usize = 60;
 /// Longest time for which a supply is off, or a cable out, before it comes back by itself: a day.
 pub const LONGEST_OFF_S: f64 = 86_400.0;
 
@@ -142,7 +144,9 @@ pub fn unknown(column: usize, word: &str, allowed: &str) -> WordError {
     WordError { column, message: format!("'{}' is not known; there is: {allowed}", shown(word)) }
 }
 
-/// A word of the user's as an error quotes it.
+/// A word of the user's as an error quotes it: an endless one its beginning.
 pub fn shown(word: &str) -> String {
-    crate::wire::visible::line(word.as_bytes())
+    let begin: String = word.chars().take(LONGEST_QUOTE).collect();
+    let rest = if begin.len() < word.len() { " ..." } else { "" };
+    crate::wire::visible::line(begin.as_bytes()) + rest
 }

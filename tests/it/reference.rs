@@ -138,7 +138,7 @@ fn the_everyday_commands_of_the_readme_work_as_printed() {
         if !args.starts_with(&["dictionary", "diff"]) {
             args.extend(["--port", "u0", "--baud", "3000000"]);
         }
-        let ran = world.run(&args, b"");
+        let ran = world.start(&args).wait_within(EXAMPLE);
         assert_eq!(ran.code, Some(0), "{command}\n{}\n{}", ran.out, ran.err);
     }
     assert!(world.path("values.csv").exists());

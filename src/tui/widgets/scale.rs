@@ -69,7 +69,7 @@ impl Scale {
             step = round_step((high - low) / 5.0);
             ticks = multiples(step, low, high);
         }
-        let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+        let decimals = (-(step.log10() + HAIR).floor()).clamp(0.0, 9.0) as usize;
         Scale { low, high, ticks, decimals }
     }
 
@@ -86,18 +86,22 @@ impl Scale {
     }
 }
 
+/// By how little numbers may miss each other that are the same to people: systems round powers and logarithms
+/// differently, and none of them knows 0.1.
+const HAIR: f64 = 1e-9;
+
 /// The step of 1, 2 or 5 times a power of ten that is no less than `least`.
 fn round_step(least: f64) -> f64 {
-    let power = 10f64.powf(least.log10().floor());
+    let power = 10f64.powi((least.log10() + HAIR).floor() as i32);
     let steps = [1.0, 2.0, 5.0].map(|digit| digit * power);
     steps.into_iter().find(|step| *step >= least).unwrap_or(10.0 * power)
 }
 
 fn multiples(step: f64, low: f64, high: f64) -> Vec<f64> {
-    let first = (low / step).ceil();
+    let first = (low / step - HAIR).ceil();
     // A screen has no room for more; without a limit a value of hundreds of digits would count for ever.
     let all = (0..100).map(|number| (first + f64::from(number)) * step);
-    all.take_while(|value| *value <= high).collect()
+    all.take_while(|value| *value <= high + step * HAIR).collect()
 }
 
 /// The round times of day from `from` to `to` that have room for a label in `columns` columns, each with its label;

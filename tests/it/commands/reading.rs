@@ -284,12 +284,14 @@ fn a_command_line_that_makes_no_sense_is_told_as_json_where_that_was_asked_for()
 #[test]
 fn what_is_no_text_on_standard_input_ends_no_emulator() {
     let world = World::new();
-    let ran = world.run(&["emulate", "axtc4co", "--json"], b"status\n\xff\xfe\nfoo\nstatus\nquit\n");
+    let endless = vec![b'x'; 100_000];
+    let input = [&b"status\n\xff\xfe\nfoo\n"[..], &endless, b"\nstatus\nquit\n"].concat();
+    let ran = world.run(&["emulate", "axtc4co", "--json"], &input);
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     let answers: Vec<Value> =
         objects(&ran.out).into_iter().filter(|object| object["schema"] == "axcon.emulate-answer/1").collect();
     let refused = answers.iter().filter(|answer| answer["ok"] == false && answer["unit"].is_null()).count();
-    assert_eq!(refused, 2, "{}", ran.out);
+    assert_eq!(refused, 2 + 2, "an endless line is looked at in pieces: {}", ran.out);
 }
 
 #[test]
