@@ -392,7 +392,11 @@ fn the_units_list_of_errors_is_told_in_words() {
     desk.keys("/1003:01").press(KeyCode::Enter);
     assert!(desk.picture().contains("0x0202F001: TC2: open circuit"), "{}", desk.picture());
     desk.keys("2");
-    assert!(desk.picture().contains("TC2: open circuit  in the unit's list of errors (1003h)"), "{}", desk.picture());
+    assert!(
+        desk.picture().contains("TC2     open circuit   in the unit's list of errors (1003h)"),
+        "{}",
+        desk.picture()
+    );
 }
 
 #[test]
