@@ -181,7 +181,7 @@ fn activity(view: &View) -> &'static str {
 }
 
 /// The lost link, or whose unit is not known yet, for the top of every screen.
-pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
+pub fn lost(view: &View, front: ScreenId, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     if view.returning.is_some() && view.can_send() {
         let text = match view.job {
             Some(Job::Identify) => " The link is back. The unit is being asked who it is.",
@@ -196,7 +196,10 @@ pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let LinkState::Lost(failure) = &view.link.state else { return Vec::new() };
     let text = format!("Link lost: {}", visible::text(&failure.text));
     let mut rows = vec![Line::styled(format::left(&format!(" {text}"), columns), theme.alarm())];
-    let then = " Below is history. Plug the cable in again; C connects, 1 chooses another link.";
+    let then = match front {
+        ScreenId::Terminal => " Below is history. Plug it in again; Ctrl-] C connects, Ctrl-] 1 lists links.",
+        _ => " Below is history. Plug the cable in again; C connects, 1 chooses another link.",
+    };
     rows.push(Line::styled(format::left(then, columns), theme.warning()));
     rows
 }

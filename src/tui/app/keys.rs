@@ -108,7 +108,8 @@ impl App {
             return None;
         }
         let body = frame::body(Rect::new(0, 0, columns, rows), &self.view);
-        let (_, area) = lines::split(body, frame::lost(&self.view, self.theme, usize::from(columns)).len() as u16);
+        let (_, area) =
+            lines::split(body, frame::lost(&self.view, self.front, self.theme, usize::from(columns)).len() as u16);
         self.dirty = true;
         let again = match self.front {
             ScreenId::Connect => {
@@ -275,18 +276,25 @@ impl App {
         }
     }
 
+    /// Where the screen itself is drawn, below what is said of a lost link.
+    pub(super) fn screen_area(&self) -> Rect {
+        let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1), &self.view);
+        let lost = frame::lost(&self.view, self.front, self.theme, usize::from(self.size.0)).len() as u16;
+        lines::split(area, lost).1
+    }
+
     pub(super) fn screen(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
         let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1), &self.view);
         let page = usize::from(area.height);
+        let below_lost = self.screen_area();
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         let action = match self.front {
             ScreenId::Connect => self.connect.on(cmd, &self.view),
             ScreenId::Overview => {
-                let lost = frame::lost(&self.view, self.theme, usize::from(self.size.0)).len() as u16;
-                let faults = self.overview.faults_at(self.scene(), lines::split(area, lost).1);
+                let faults = self.overview.faults_at(self.scene(), below_lost);
                 self.overview.on(cmd, self.view.monitor.stream.channels.len(), faults)
             }
-            ScreenId::Terminal => self.terminal.on(cmd, &self.scrollback, record, page),
+            ScreenId::Terminal => self.terminal.on(cmd, &self.view, &self.scrollback, record, below_lost),
             ScreenId::Load => self.load.on(cmd, &self.view, area),
             ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
             ScreenId::Stream => self.stream.on(cmd, &self.view),

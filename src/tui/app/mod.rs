@@ -266,7 +266,7 @@ impl App {
         let theme = self.theme;
         lines::draw(frame, row(0), [frame::header(&self.view, theme, columns)]);
         lines::draw(frame, row(1), [frame::tabs(&self.view, front, theme, columns)]);
-        let lost = frame::lost(&self.view, theme, columns);
+        let lost = frame::lost(&self.view, self.front, theme, columns);
         let (banner, body) = lines::split(frame::body(area, &self.view), lost.len() as u16);
         lines::draw(frame, banner, lost);
         self.draw_screen(body, frame);
@@ -416,7 +416,10 @@ impl App {
             Action::RestartExtremes => self.view.restart_extremes(),
             Action::Mark => self.mark(effects),
             Action::Find(words) => match self.front {
-                ScreenId::Terminal => self.terminal.find(words, &self.scrollback),
+                ScreenId::Terminal => {
+                    let area = self.screen_area();
+                    self.terminal.find(words, &self.view, &self.scrollback, area);
+                }
                 _ => self.dictionary.find(&words),
             },
             Action::ExportStream(path) => self.export_stream(self.expanded(path), effects),
