@@ -5,6 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::keymap::{Binding, Cmd, EVERYWHERE, MENU};
+use super::popup::in_the_middle;
 use super::screens::ScreenId;
 use super::screens::bench::emulated;
 use super::theme::Theme;
@@ -39,21 +40,29 @@ pub fn body(area: Rect, view: &View) -> Rect {
     Rect { y: area.y + ABOVE.min(area.height), height, ..area }
 }
 
-/// Says that the terminal is too small, if it is.
-pub fn too_small(frame: &mut Frame) -> bool {
+/// Whether a terminal has less than the pictures need.
+pub fn is_too_small((columns, rows): (u16, u16)) -> bool {
+    columns < LEAST.0 || rows < LEAST.1
+}
+
+/// Says that the terminal is too small, and what can be done all the same; `asks` whether to leave.
+pub fn too_small(view: &View, asks: bool, frame: &mut Frame) {
     let area = frame.area();
-    if area.width >= LEAST.0 && area.height >= LEAST.1 {
-        return false;
-    }
-    let text = format!(
-        "axcon needs {} x {} characters, this terminal has {} x {}. Make it larger: everything goes on meanwhile.",
-        LEAST.0, LEAST.1, area.width, area.height
-    );
+    let text = match asks {
+        true => {
+            let what = in_the_middle(view).map(|text| format!(" {text}")).concat();
+            format!("Leave axcon? Y leaves, N stays.{what}")
+        }
+        false => format!(
+            "axcon needs {} x {} characters, this terminal has {} x {}. Make it larger: everything goes on meanwhile. \
+             Until then only Q means something: it leaves.",
+            LEAST.0, LEAST.1, area.width, area.height
+        ),
+    };
     let rows = format::wrap(&text, usize::from(area.width));
     let top = area.height.saturating_sub(rows.len() as u16) / 2;
     let (_, below) = lines::split(area, top);
     lines::draw(frame, below, rows.into_iter().map(|row| Line::raw(row).centered()));
-    true
 }
 
 /// Product, version, node and link, in one line.

@@ -539,7 +539,9 @@ pictures! {
 
 #[test]
 fn a_small_terminal_gets_one_clear_message() {
-    assert_snapshot!(Stage::streaming((60, 10)).picture());
+    let mut stage = Stage::streaming(SMALL);
+    stage.resized((60, 10));
+    assert_snapshot!(stage.picture());
 }
 
 #[test]

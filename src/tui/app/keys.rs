@@ -41,6 +41,9 @@ impl App {
     }
 
     pub(super) fn mouse(&mut self, mouse: MouseEvent, effects: &mut Vec<Effect>) {
+        if self.is_too_small() {
+            return;
+        }
         let step = match mouse.kind {
             MouseEventKind::ScrollUp => Some(KeyCode::Up),
             MouseEventKind::ScrollDown => Some(KeyCode::Down),
@@ -137,6 +140,9 @@ impl App {
     }
 
     pub(super) fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+        if self.is_too_small() {
+            return self.key_unseen(key, effects);
+        }
         // No text and no answer: it means the same in front of everything but the bare terminal.
         if !self.passes_keys() && keymap::find(&[EVERYWHERE], key) == Some(Cmd::Suspend) {
             return self.on(Cmd::Suspend, effects);
@@ -198,7 +204,28 @@ impl App {
         }
     }
 
+    /// A key while nothing of the screen is seen: what it did would be seen by nobody. Only leaving is possible, and asked
+    /// about in the one message there is; and Ctrl-Z, which changes nothing.
+    fn key_unseen(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+        let cmd = keymap::find(&[EVERYWHERE], key);
+        match (&self.popup, cmd, key.code) {
+            (_, Some(Cmd::Suspend), _) if !self.passes_keys() => self.on(Cmd::Suspend, effects),
+            (Some(Popup::Asking(Question::Quit)), _, KeyCode::Char('y' | 'Y')) => {
+                self.popup = None;
+                self.perform(Action::Quit, effects);
+            }
+            (Some(Popup::Asking(Question::Quit)), _, KeyCode::Char('n' | 'N') | KeyCode::Esc) => self.popup = None,
+            // It is being left already, or a link is being opened: nobody has to wait for that.
+            (Some(Popup::Waiting { .. }), Some(Cmd::Quit), _) => effects.push(Effect::Quit),
+            (_, Some(Cmd::Quit), _) => self.on(Cmd::Quit, effects),
+            _ => {}
+        }
+    }
+
     pub(super) fn paste(&mut self, text: &str) {
+        if self.is_too_small() {
+            return;
+        }
         if let Some(popup) = &mut self.popup {
             return popup.paste(text);
         }

@@ -256,10 +256,11 @@ impl App {
 
     /// Draws the picture.
     pub fn draw(&self, frame: &mut Frame) {
-        if frame::too_small(frame) {
-            return;
-        }
         let area = frame.area();
+        if frame::is_too_small((area.width, area.height)) {
+            let asks = matches!(self.popup, Some(Popup::Asking(Question::Quit)));
+            return frame::too_small(&self.view, asks, frame);
+        }
         let columns = usize::from(area.width);
         let row = |y: u16| Rect { y, height: 1, ..area };
         let front = self.help.is_none().then_some(self.front);
@@ -320,6 +321,11 @@ impl App {
             now: self.now,
             start_of_day: self.start_of_day,
         }
+    }
+
+    /// Whether nothing is drawn but that the terminal is too small.
+    fn is_too_small(&self) -> bool {
+        frame::is_too_small(self.size)
     }
 
     /// Whether clicks and the wheel mean something here. On the terminal screen they are the terminal program's own, to

@@ -212,6 +212,12 @@ impl Stage {
         self.input(Input::Terminal(TerminalEvent::Mouse(mouse)))
     }
 
+    /// The terminal has another size now.
+    pub(super) fn resized(&mut self, size: (u16, u16)) -> &mut Self {
+        self.size = size;
+        self.input(Input::Terminal(TerminalEvent::Resize(size.0, size.1)))
+    }
+
     /// What a terminal sends for Ctrl-].
     pub(super) fn prefix(&mut self) -> &mut Self {
         self.key(KeyCode::Char('5'), KeyModifiers::CONTROL)

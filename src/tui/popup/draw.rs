@@ -442,7 +442,7 @@ fn too_fast(view: &View, source: Source, millis: &str) -> Option<String> {
 }
 
 /// What is in the middle, and what becomes of it when the link is closed.
-fn in_the_middle(view: &View) -> [&'static str; 2] {
+pub fn in_the_middle(view: &View) -> [&'static str; 2] {
     match view.job {
         Some(Job::Load) => {
             ["New software is being loaded.", consequence(view.load.progress.map(|progress| progress.phase))]

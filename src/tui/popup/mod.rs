@@ -21,7 +21,7 @@ use crate::session::{Command, Phase, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
 
-pub use draw::{Target, draw, target_at};
+pub use draw::{Target, draw, in_the_middle, target_at};
 
 /// What stands in front of the screen.
 #[derive(Debug)]
