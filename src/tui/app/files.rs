@@ -8,7 +8,8 @@ use crate::session::{Command, Job};
 use crate::time::Instant;
 use crate::tui::input::{Effect, FIRST_BYTES, FileEntry};
 use crate::tui::picker::{begins_like_an_image, is_image_name};
-use crate::tui::popup::{Popup, Question};
+use crate::tui::popup::{Popup, Purpose, Question};
+use crate::tui::screens::dictionary::other_product;
 use crate::tui::view::{Export, MARK, Sending, Tone, doing};
 use crate::tui::visible;
 use crate::tui::widgets::format;
@@ -190,9 +191,20 @@ impl App {
             }
             Ok(dump) => {
                 let short = path.file_name().map_or(name.clone(), |name| name.to_string_lossy().into_owned());
+                let other = other_product(&dump, &self.view);
                 self.dictionary.compare(short, dump);
-                self.view
-                    .tell(Tone::Quiet, format!("Compared with {name}: ≠ marks what differs, O chooses what is shown."));
+                match other {
+                    Some((theirs, ours)) => self.view.tell(
+                        Tone::Bad,
+                        format!(
+                            "{name} is of another product, an {theirs}; this unit is an {ours}. Compared all the same."
+                        ),
+                    ),
+                    None => {
+                        let text = format!("Compared with {name}: ≠ marks what differs, O chooses what is shown.");
+                        self.view.tell(Tone::Quiet, text);
+                    }
+                }
             }
         }
     }

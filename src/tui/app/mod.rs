@@ -383,6 +383,7 @@ impl App {
                     self.perform(action, effects);
                 }
             }
+            Action::Tell(why) => self.view.tell(Tone::Quiet, why),
             Action::Ask(question) => self.ask(question),
             Action::Command(command) => {
                 let reads = matches!(command, Command::ReadDictionary);
