@@ -176,10 +176,8 @@ impl App {
             Input::RecordingOver(failure) => self.recording_over(now, failure),
             Input::FilesListed { directory, entries } => self.files_listed(directory, entries),
             Input::BytesRead { path, bytes } => self.bytes_read(&path, bytes),
-            Input::ImageChecked(facts) => {
-                self.load.checked(facts);
-                self.dirty = true;
-            }
+            Input::ImageChecked(facts) => self.image_checked(facts),
+            Input::ImageUnreadable { path, why } => self.image_unreadable(&path, &why),
             Input::FileWritten { path, result } => self.file_written(&path, result),
             Input::FileRead { path, text } => self.file_read(&path, text),
             Input::RecordingsListed(found) => {

@@ -118,8 +118,12 @@ pub struct Load {
 #[derive(Debug)]
 enum Stage {
     Picking,
+    /// A file is being read and checked.
     Checking(PathBuf),
-    Report { facts: Box<ImageFacts>, scrolled: usize },
+    Report {
+        facts: Box<ImageFacts>,
+        scrolled: usize,
+    },
 }
 
 impl Load {
@@ -141,7 +145,7 @@ impl Load {
 
     /// A folder has been read. One that was typed as if it were a file is opened.
     pub fn listed(&mut self, directory: PathBuf, entries: Result<Vec<FileEntry>, String>) {
-        if matches!(&self.stage, Stage::Checking(path) if *path == directory) {
+        if self.is_checking(&directory) {
             self.stage = Stage::Picking;
         }
         self.picker.listed(directory, entries);
@@ -177,9 +181,23 @@ impl Load {
 
     /// A file has been checked. An answer to an older question is not wanted any more.
     pub fn checked(&mut self, facts: Box<ImageFacts>) {
-        if matches!(&self.stage, Stage::Checking(path) if *path == facts.path) {
+        if self.is_checking(&facts.path) {
             self.stage = Stage::Report { facts, scrolled: 0 };
         }
+    }
+
+    /// Whether this file is being read.
+    pub fn is_checking(&self, path: &Path) -> bool {
+        matches!(&self.stage, Stage::Checking(of) if of == path)
+    }
+
+    /// There is nothing to check: another file has to be chosen. Says whether anybody has waited for it.
+    pub fn unreadable(&mut self, path: &Path) -> bool {
+        let is_awaited = self.is_checking(path);
+        if is_awaited {
+            self.stage = Stage::Picking;
+        }
+        is_awaited
     }
 
     /// The image the report is about.
@@ -229,9 +247,7 @@ impl Load {
 
     /// Checks a file. What was allowed in another one is not allowed in it.
     pub fn check(&mut self, path: PathBuf) -> Action {
-        if self.image().is_none_or(|facts| facts.path != path)
-            && !matches!(&self.stage, Stage::Checking(of) if *of == path)
-        {
+        if self.image().is_none_or(|facts| facts.path != path) && !self.is_checking(&path) {
             self.allow.clear();
         }
         self.stage = Stage::Checking(path.clone());
