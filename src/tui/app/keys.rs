@@ -13,6 +13,7 @@ use crate::tui::input::Effect;
 use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd, Press};
 use crate::tui::popup::{self, Answer, Popup, Question, Target};
 use crate::tui::screens::ScreenId;
+use crate::tui::screens::diagnostics::Diagnostics;
 use crate::tui::screens::help::Help;
 use crate::tui::screens::terminal::Meaning;
 use crate::tui::theme::Theme;
@@ -326,8 +327,8 @@ impl App {
             ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
             ScreenId::Stream => self.stream.on(cmd, &self.view),
             ScreenId::Diagnostics => {
-                let found = &self.view.monitor.diagnostics;
-                self.diagnostics.on(cmd, found.lines.len().max(found.found.len()), page)
+                let last = Diagnostics::last(self.scene(), below_lost);
+                self.diagnostics.on(cmd, last, page)
             }
             ScreenId::Recordings => self.recordings.on(cmd, &self.view),
             ScreenId::Bench => self.bench.on(cmd, &self.view),
