@@ -268,8 +268,22 @@ pub fn keys(theme: Theme, bindings: &[Binding]) -> Line<'static> {
     line
 }
 
-/// The keys of the terminal screen: those behind the prefix.
-pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'static> {
+/// The keys of the terminal screen: those behind the prefix, as many as have room.
+pub fn terminal_keys(theme: Theme, screen: ScreenId, after_prefix: bool, columns: usize) -> Line<'static> {
+    let behind_prefix = |binding: &&Binding| is_letter(binding) && !binding.short.is_empty();
+    let mut bindings: Vec<Binding> = screen.bindings().iter().filter(behind_prefix).copied().collect();
+    let mut dispensable = screen.dispensable().iter();
+    loop {
+        let line = prefix_keys(theme, &bindings, after_prefix);
+        match dispensable.next() {
+            // Behind the last one no blank is needed.
+            Some(cmd) if line.width() > columns + 2 => bindings.retain(|binding| binding.cmd != *cmd),
+            _ => return line,
+        }
+    }
+}
+
+fn prefix_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'static> {
     let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
     if after_prefix {
         line.push_span(Span::styled("next key is for axcon: ", theme.warning()));
@@ -278,7 +292,7 @@ pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> 
         line.push_span(Span::styled("Ctrl-]", theme.key()));
         line.push_span(Span::raw(" then "));
     }
-    for binding in bindings.iter().filter(|binding| is_letter(binding) && !binding.short.is_empty()) {
+    for binding in bindings {
         line.spans.extend(hint(theme, binding));
     }
     line.push_span(Span::styled("1-9", theme.key()));
@@ -297,6 +311,19 @@ pub fn help_keys(theme: Theme) -> Line<'static> {
     line
 }
 
+/// As many of these keys as have room beside those that work everywhere; the dispensable ones go first, in their order.
+pub fn fitting(theme: Theme, mut bindings: Vec<Binding>, dispensable: &[Cmd], columns: usize) -> Vec<Binding> {
+    // Behind the last one no blank is needed.
+    let is_too_wide = |bindings: &[Binding]| keys(theme, bindings).width() > columns + 2;
+    for cmd in dispensable {
+        if !is_too_wide(&bindings) {
+            break;
+        }
+        bindings.retain(|binding| binding.cmd != *cmd);
+    }
+    bindings
+}
+
 fn is_letter(binding: &Binding) -> bool {
     binding.keys.first().is_some_and(|press| press.name().chars().count() == 1 && !"↑↓".contains(&press.name()))
 }
@@ -312,8 +339,9 @@ fn hints(theme: Theme, tables: &[&[Binding]]) -> Vec<Span<'static>> {
 
 fn hint(theme: Theme, binding: &Binding) -> [Span<'static>; 2] {
     let key = match binding.keys.first().map(|press| press.name()) {
-        // Up and down belong together; the footer names them once.
+        // Two arrows belong together; the footer names them once.
         Some(name) if name == "↓" => "↑↓".to_owned(),
+        Some(name) if name == "→" => "←→".to_owned(),
         Some(name) => name,
         None => String::new(),
     };

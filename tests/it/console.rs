@@ -327,7 +327,7 @@ fn the_dictionary_is_read_searched_compared_and_written_down() {
     assert!(choice.contains("› before.json") && choice.contains("/images"), "the dump is found: {choice}");
     desk.press(KeyCode::Enter);
     let picture = desk.picture();
-    assert!(picture.contains("in before.json") && picture.contains("≠ 6112:02"), "{picture}");
+    assert!(picture.contains("before.json has") && picture.contains("≠ 6112:02"), "{picture}");
     desk.press(KeyCode::Esc).keys("/operating mode");
     assert!(desk.picture().contains("with 'operating mode'"), "{}", desk.picture());
     desk.press(KeyCode::Esc).keys("ex.pdf").press(KeyCode::Enter);

@@ -82,7 +82,7 @@ impl App {
                 self.help = None;
                 None
             }
-            row if row + 1 == rows => frame::key_at(self.theme, self.footer(), column),
+            row if row + 1 == rows => frame::key_at(self.theme, &self.footer(usize::from(columns)), column),
             row => self.choose_at(columns, rows, row),
         };
         if let Some(cmd) = cmd {

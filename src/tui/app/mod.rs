@@ -17,7 +17,7 @@ use link::Next;
 use super::action::Action;
 use super::frame;
 use super::input::{Effect, Input, Noted};
-use super::keymap::Binding;
+use super::keymap::{Binding, Cmd};
 use super::picker::expanded;
 use super::popup::{self, Popup, Question, Wanted};
 use super::screens::bench::{self, Bench};
@@ -275,8 +275,8 @@ impl App {
         lines::draw(frame, row(area.height - 2), [frame::menu(theme)]);
         let keys = match self.front {
             _ if self.help.is_some() => frame::help_keys(theme),
-            ScreenId::Terminal => frame::terminal_keys(theme, self.front.bindings(), self.terminal.is_after_prefix()),
-            _ => frame::keys(theme, self.footer()),
+            ScreenId::Terminal => frame::terminal_keys(theme, self.front, self.terminal.is_after_prefix(), columns),
+            _ => frame::keys(theme, &self.footer(columns)),
         };
         lines::draw(frame, row(area.height - 1), [keys]);
         if let Some(popup) = &self.popup {
@@ -284,11 +284,36 @@ impl App {
         }
     }
 
-    /// The bindings of the screen in front that mean something now.
-    fn footer(&self) -> &'static [Binding] {
-        match self.front {
+    /// The bindings of the screen in front that mean something now, as many as have room.
+    fn footer(&self, columns: usize) -> Vec<Binding> {
+        let bindings = match self.front {
             ScreenId::Load => self.load.footer(&self.view),
-            screen => screen.bindings(),
+            screen => screen.bindings().to_vec(),
+        };
+        let meant = bindings.into_iter().filter(|binding| self.means_something(binding.cmd)).collect();
+        frame::fitting(self.theme, meant, self.front.dispensable(), columns)
+    }
+
+    /// Whether a key of the screen in front does something now. One that does not is left out of the footer.
+    fn means_something(&self, cmd: Cmd) -> bool {
+        let view = &self.view;
+        let has_rows = !view.monitor.stream.channels.is_empty();
+        match (self.front, cmd) {
+            (ScreenId::Connect, Cmd::Disconnect) => {
+                matches!(view.link.state, LinkState::Open { .. } | LinkState::Lost(_))
+            }
+            (ScreenId::Overview, Cmd::PageDown) => !view.monitor.faults.is_empty(),
+            (ScreenId::Stream, Cmd::Mark) => view.link.name.is_some(),
+            (ScreenId::Stream, Cmd::Export) => has_rows || view.export.is_some(),
+            (ScreenId::Overview | ScreenId::Stream, _) => has_rows,
+            (ScreenId::Dictionary, Cmd::Export | Cmd::Compare | Cmd::Only) => view.dictionary.is_some(),
+            (ScreenId::Dictionary, Cmd::Back) => self.dictionary.is_narrowed(),
+            (ScreenId::Dictionary, _) => view.dictionary.is_some() || view.product().is_some(),
+            (ScreenId::Diagnostics, _) => view.monitor.diagnostics.at.is_some(),
+            (ScreenId::Recordings, Cmd::Down | Cmd::Accept) => !self.recordings.entries().is_empty(),
+            (ScreenId::Recordings, cmd) if cmd != Cmd::Refresh => view.playing.is_some(),
+            (ScreenId::Bench, _) => bench::emulated(view).is_some(),
+            (ScreenId::Connect | ScreenId::Terminal | ScreenId::Load | ScreenId::Recordings, _) => true,
         }
     }
 

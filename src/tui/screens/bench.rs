@@ -30,7 +30,7 @@ pub const BINDINGS: &[Binding] = &[
     Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "input above" },
     Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "input", long: "input below" },
     Binding { keys: &[Press::Plain(KeyCode::Left)], cmd: Cmd::Left, short: "", long: "10 °C colder" },
-    Binding { keys: &[Press::Plain(KeyCode::Right)], cmd: Cmd::Right, short: "", long: "10 °C warmer" },
+    Binding { keys: &[Press::Plain(KeyCode::Right)], cmd: Cmd::Right, short: "10 °C", long: "10 °C warmer" },
     Binding {
         keys: &[Press::Plain(KeyCode::Enter)],
         cmd: Cmd::Accept,

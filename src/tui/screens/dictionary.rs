@@ -56,7 +56,7 @@ pub const BINDINGS: &[Binding] = &[
         short: "export",
         long: "write what was read to a file: .json, .csv, .dcf or .txt",
     },
-    Binding { keys: &[Press::Plain(KeyCode::Esc)], cmd: Cmd::Back, short: "", long: "show everything again" },
+    Binding { keys: &[Press::Plain(KeyCode::Esc)], cmd: Cmd::Back, short: "everything", long: "show everything again" },
 ];
 
 /// Rows of the pane that explains the chosen entry, its heading included.
