@@ -76,11 +76,9 @@ fn failure(error: &CliError) -> Failure {
     Failure { text: error.to_string(), hints: error.hints.clone() }
 }
 
-fn check(path: PathBuf, loader: Option<LoaderKind>, allow: &[DefectId]) -> ImageFacts {
-    match image_cli::read_for(&path, &image_cli::targets_with(loader), None, allow) {
-        Ok(report) => ImageFacts::of_report(path, &report, allow),
-        Err(error) => ImageFacts::unreadable(path, error.to_string()),
-    }
+fn check(path: PathBuf, loader: Option<LoaderKind>, allow: &[DefectId]) -> Result<ImageFacts, String> {
+    let report = image_cli::read_for(&path, &image_cli::targets_with(loader), None, allow);
+    report.map(|report| ImageFacts::of_report(path, &report, allow)).map_err(|error| error.to_string())
 }
 
 /// The console says what it notes; that a note could not be written costs a question later, no more.

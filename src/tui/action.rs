@@ -31,6 +31,8 @@ pub enum Action {
     CheckImage(PathBuf),
     /// Check the image once more, and allow this error.
     Allow(DefectId),
+    /// Say why a key does nothing now.
+    Tell(String),
     /// Put a question.
     Ask(Question),
     /// Ask the session.

@@ -5,6 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::keymap::{Binding, Cmd, EVERYWHERE, MENU};
+use super::popup::in_the_middle;
 use super::screens::ScreenId;
 use super::screens::bench::emulated;
 use super::theme::Theme;
@@ -39,21 +40,29 @@ pub fn body(area: Rect, view: &View) -> Rect {
     Rect { y: area.y + ABOVE.min(area.height), height, ..area }
 }
 
-/// Says that the terminal is too small, if it is.
-pub fn too_small(frame: &mut Frame) -> bool {
+/// Whether a terminal has less than the pictures need.
+pub fn is_too_small((columns, rows): (u16, u16)) -> bool {
+    columns < LEAST.0 || rows < LEAST.1
+}
+
+/// Says that the terminal is too small, and what can be done all the same; `asks` whether to leave.
+pub fn too_small(view: &View, asks: bool, frame: &mut Frame) {
     let area = frame.area();
-    if area.width >= LEAST.0 && area.height >= LEAST.1 {
-        return false;
-    }
-    let text = format!(
-        "axcon needs {} x {} characters, this terminal has {} x {}. Make it larger: everything goes on meanwhile.",
-        LEAST.0, LEAST.1, area.width, area.height
-    );
+    let text = match asks {
+        true => {
+            let what = in_the_middle(view).map(|text| format!(" {text}")).concat();
+            format!("Leave axcon? Y leaves, N stays.{what}")
+        }
+        false => format!(
+            "axcon needs {} x {} characters, this terminal has {} x {}. Make it larger: everything goes on meanwhile. \
+             Until then only Q means something: it leaves.",
+            LEAST.0, LEAST.1, area.width, area.height
+        ),
+    };
     let rows = format::wrap(&text, usize::from(area.width));
     let top = area.height.saturating_sub(rows.len() as u16) / 2;
     let (_, below) = lines::split(area, top);
     lines::draw(frame, below, rows.into_iter().map(|row| Line::raw(row).centered()));
-    true
 }
 
 /// Product, version, node and link, in one line.
@@ -182,7 +191,7 @@ fn activity(view: &View) -> &'static str {
 }
 
 /// The lost link, or whose unit is not known yet, for the top of every screen.
-pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
+pub fn lost(view: &View, front: ScreenId, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     if view.returning.is_some() && view.can_send() {
         let text = match view.job {
             Some(Job::Identify) => " The link is back. The unit is being asked who it is.",
@@ -197,7 +206,10 @@ pub fn lost(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let LinkState::Lost(failure) = &view.link.state else { return Vec::new() };
     let text = format!("Link lost: {}", visible::text(&failure.text));
     let mut rows = vec![Line::styled(format::left(&format!(" {text}"), columns), theme.alarm())];
-    let then = " Below is history. Plug the cable in again; C connects, 1 chooses another link.";
+    let then = match front {
+        ScreenId::Terminal => " Below is history. Plug it in again; Ctrl-] C connects, Ctrl-] 1 lists links.",
+        _ => " Below is history. Plug the cable in again; C connects, 1 chooses another link.",
+    };
     rows.push(Line::styled(format::left(then, columns), theme.warning()));
     rows
 }
@@ -257,8 +269,22 @@ pub fn keys(theme: Theme, bindings: &[Binding]) -> Line<'static> {
     line
 }
 
-/// The keys of the terminal screen: those behind the prefix.
-pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'static> {
+/// The keys of the terminal screen: those behind the prefix, as many as have room.
+pub fn terminal_keys(theme: Theme, screen: ScreenId, after_prefix: bool, columns: usize) -> Line<'static> {
+    let behind_prefix = |binding: &&Binding| is_letter(binding) && !binding.short.is_empty();
+    let mut bindings: Vec<Binding> = screen.bindings().iter().filter(behind_prefix).copied().collect();
+    let mut dispensable = screen.dispensable().iter();
+    loop {
+        let line = prefix_keys(theme, &bindings, after_prefix);
+        match dispensable.next() {
+            // Behind the last one no blank is needed.
+            Some(cmd) if line.width() > columns + 2 => bindings.retain(|binding| binding.cmd != *cmd),
+            _ => return line,
+        }
+    }
+}
+
+fn prefix_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'static> {
     let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
     if after_prefix {
         line.push_span(Span::styled("next key is for axcon: ", theme.warning()));
@@ -267,7 +293,7 @@ pub fn terminal_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> 
         line.push_span(Span::styled("Ctrl-]", theme.key()));
         line.push_span(Span::raw(" then "));
     }
-    for binding in bindings.iter().filter(|binding| is_letter(binding) && !binding.short.is_empty()) {
+    for binding in bindings {
         line.spans.extend(hint(theme, binding));
     }
     line.push_span(Span::styled("1-9", theme.key()));
@@ -286,6 +312,19 @@ pub fn help_keys(theme: Theme) -> Line<'static> {
     line
 }
 
+/// As many of these keys as have room beside those that work everywhere; the dispensable ones go first, in their order.
+pub fn fitting(theme: Theme, mut bindings: Vec<Binding>, dispensable: &[Cmd], columns: usize) -> Vec<Binding> {
+    // Behind the last one no blank is needed.
+    let is_too_wide = |bindings: &[Binding]| keys(theme, bindings).width() > columns + 2;
+    for cmd in dispensable {
+        if !is_too_wide(&bindings) {
+            break;
+        }
+        bindings.retain(|binding| binding.cmd != *cmd);
+    }
+    bindings
+}
+
 fn is_letter(binding: &Binding) -> bool {
     binding.keys.first().is_some_and(|press| press.name().chars().count() == 1 && !"↑↓".contains(&press.name()))
 }
@@ -301,8 +340,9 @@ fn hints(theme: Theme, tables: &[&[Binding]]) -> Vec<Span<'static>> {
 
 fn hint(theme: Theme, binding: &Binding) -> [Span<'static>; 2] {
     let key = match binding.keys.first().map(|press| press.name()) {
-        // Up and down belong together; the footer names them once.
+        // Two arrows belong together; the footer names them once.
         Some(name) if name == "↓" => "↑↓".to_owned(),
+        Some(name) if name == "→" => "←→".to_owned(),
         Some(name) => name,
         None => String::new(),
     };

@@ -9,6 +9,7 @@ use ratatui::crossterm::event::Event as TerminalEvent;
 use crate::device::{self, LoaderKind};
 use crate::endpoint::{Arrived, Transmit};
 use crate::image::{CheckedImage, DefectId, Report, Severity};
+use crate::session::LoadOrder;
 use crate::time::Duration;
 use crate::version::Version;
 
@@ -59,6 +60,13 @@ pub enum Input {
     },
     /// Answer to [`Effect::CheckImage`].
     ImageChecked(Box<ImageFacts>),
+    /// Answer to [`Effect::CheckImage`]: there is nothing to check.
+    ImageUnreadable {
+        /// Which file.
+        path: PathBuf,
+        /// Why it cannot be read.
+        why: String,
+    },
     /// Answer to [`Effect::CreateFile`] and, where it fails, to [`Effect::AppendFile`].
     FileWritten {
         /// Which file.
@@ -117,7 +125,7 @@ pub enum Effect {
     ListPorts,
     /// List a folder. Answered by [`Input::FilesListed`].
     ListFiles(PathBuf),
-    /// Read and check an image file. Answered by [`Input::ImageChecked`], also when the file cannot be read, or by
+    /// Read and check an image file. Answered by [`Input::ImageChecked`], by [`Input::ImageUnreadable`], or by
     /// [`Input::FilesListed`] when it is a folder.
     CheckImage {
         /// Which.
@@ -322,6 +330,8 @@ pub struct ImageFacts {
     pub errors: Vec<DefectId>,
     /// Errors in spite of which it may be sent, because the user says so.
     pub allowed: Vec<DefectId>,
+    /// Records and characters that will be sent if they are packed, as long as the loader keeps up with them.
+    pub packed: (usize, usize),
     /// The image itself, if it may be sent.
     pub checked: Option<CheckedImage>,
 }
@@ -336,25 +346,35 @@ impl ImageFacts {
                 errors.push(defect.id);
             }
         }
+        // What does not say what it is cannot be compared with the unit, nor with its banner: as 'axcon load' has it, it
+        // goes only if the user answers for it. As a file it is sound, and what the check calls it stands once.
+        let ok = report.is_ok() && (identity.is_some() || allow.contains(&DefectId::NoIdentity));
+        let is_nameless = report.is_ok() && !ok;
+        errors.extend(is_nameless.then_some(DefectId::NoIdentity));
         let mut defects: Vec<_> = report.defects.iter().collect();
-        defects.sort_by_key(|defect| defect.severity != Severity::Error);
+        let stands = |id, severity| severity == Severity::Error || is_nameless && id == DefectId::NoIdentity;
+        defects.sort_by_key(|defect| !stands(defect.id, defect.severity));
         let mut defects: Vec<String> = defects
             .into_iter()
             .map(|defect| {
                 let (severity, id) = (defect.severity.name(), defect.id);
-                format!("{severity} {id}: line {}, column {}: {}", defect.line, defect.column, defect.message)
+                let text =
+                    format!("{severity} {id}: line {}, column {}: {}", defect.line, defect.column, defect.message);
+                match is_nameless && id == DefectId::NoIdentity {
+                    true => format!("{text}, so nobody could tell afterwards what the unit runs"),
+                    false => text,
+                }
             })
             .collect();
         if report.unlisted() > 0 {
             defects.push(format!("{} more defects are not listed", report.unlisted()));
         }
-        // What does not say what it is cannot be compared with the unit, nor with its banner.
-        let ok = report.is_ok() && (identity.is_some() || allow.contains(&DefectId::NoIdentity));
-        if report.is_ok() && !ok {
-            errors.push(DefectId::NoIdentity);
-            let id = DefectId::NoIdentity;
-            defects.insert(0, format!("error {id}: nobody could tell afterwards what the unit runs"));
-        }
+        let image = report.image().filter(|_| ok);
+        let packed = image.clone().map_or((0, 0), |image| {
+            let order = LoadOrder { packed: true, ..LoadOrder::new(image, None) };
+            let beginning = order.at_its_beginning();
+            (beginning.records_total, beginning.bytes_total)
+        });
         ImageFacts {
             path,
             ok,
@@ -366,24 +386,13 @@ impl ImageFacts {
             defects,
             errors,
             allowed: allow.to_vec(),
-            checked: report.image().filter(|_| ok),
+            packed,
+            checked: image,
         }
     }
 
-    /// A file that could not be read, and why.
-    pub fn unreadable(path: PathBuf, why: String) -> Self {
-        ImageFacts {
-            path,
-            ok: false,
-            product: None,
-            version: None,
-            records: 0,
-            characters: 0,
-            time: Duration::ZERO,
-            defects: vec![why],
-            errors: Vec::new(),
-            allowed: Vec::new(),
-            checked: None,
-        }
+    /// Whether nothing is wrong with the file but that it does not say what it is.
+    pub fn is_nameless(&self) -> bool {
+        !self.ok && self.errors == [DefectId::NoIdentity]
     }
 }

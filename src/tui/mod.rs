@@ -25,6 +25,7 @@ pub use input::{
     Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_SENT, LARGEST_TEXT, LinkInfo, Noted,
     Pace, Playback, Playing, PortEntry, RecordingEntry,
 };
+pub use popup::ORDERS;
 pub use theme::Palette;
 
 #[cfg(test)]

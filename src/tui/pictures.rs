@@ -7,7 +7,9 @@ mod choices;
 mod keys;
 mod links;
 mod loading;
+mod room;
 mod stage;
+mod told;
 mod typing;
 
 use insta::assert_snapshot;
@@ -17,6 +19,7 @@ use stage::*;
 
 use super::{Failure, ImageFacts, Input, LinkInfo, Pace, Playing};
 use crate::canopen::{ObjectAddress, Value};
+use crate::device::Product;
 use crate::dump::Dump;
 use crate::record::Span;
 use crate::session::{DictionaryReading, Event, Job, LoadReport, Outcome, Phase, ReadEntry, UnitNow, Verdict};
@@ -520,6 +523,38 @@ pictures! {
         }
         stage
     };
+    bench_of_old_values: |size| {
+        let mut stage = Stage::with_ports(size);
+        stage.press(KeyCode::Enter).opened("emu:axtc4co").bytes(BANNER).bytes(MENU).wait(3000);
+        stage = stage.with_rows();
+        stage.wait(10_000).keys("9");
+        stage
+    };
+    load_path_of_nothing: |size| {
+        let mut stage = Stage::connected(size).picking();
+        stage.keys("pnew.S").press(KeyCode::Enter);
+        let path = "/home/service/images/new.S".into();
+        stage.input(Input::ImageUnreadable { path, why: "there is no such file".into() });
+        stage
+    };
+    load_report_nameless: |size| Stage::connected(size).with_image(nameless_image(&[]));
+    load_report_packed: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.keys("k");
+        stage
+    };
+    dictionary_compared_with_another_product: |size| {
+        let mut stage = Stage::with_dictionary(size);
+        stage.keys("wyesterday.json").press(KeyCode::Enter);
+        let other = Product::named("AXRTD8CO").expect("built in");
+        stage.input(Input::FileRead { path: "yesterday.json".into(), text: Ok(Dump::factory(other).json()) });
+        stage
+    };
+    diagnostics_of_eight_channels: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("s").wait(2000).bytes(&page_of_eight()).wait(1500);
+        stage
+    };
     help_on_overview: |size| {
         let mut stage = Stage::connected(size);
         stage.press(KeyCode::F(1));
@@ -539,7 +574,9 @@ pictures! {
 
 #[test]
 fn a_small_terminal_gets_one_clear_message() {
-    assert_snapshot!(Stage::streaming((60, 10)).picture());
+    let mut stage = Stage::streaming(SMALL);
+    stage.resized((60, 10));
+    assert_snapshot!(stage.picture());
 }
 
 #[test]

@@ -186,6 +186,20 @@ fn a_sound_image_is_told_in_words_and_as_data() {
 }
 
 #[test]
+fn an_image_without_a_name_is_sound_and_sent_only_by_whoever_answers_for_it() {
+    let file = in_tree_text("firmware_images/odd/no-identity.elf.S");
+    let checked = axcon(&["image", "check", &file]);
+    let said = text(&checked.stdout);
+    assert_eq!(checked.status.code(), Some(0), "{said}");
+    assert!(said.ends_with(": may be sent with --allow no-identity, 1 warning\n"), "{said}");
+    let refused = axcon(&["load", "--dry-run", &file]);
+    assert_eq!(refused.status.code(), Some(5));
+    assert!(text(&refused.stderr).contains("--allow no-identity"), "{}", text(&refused.stderr));
+    let allowed = axcon(&["load", "--dry-run", "--allow", "no-identity", &file]);
+    assert_eq!(allowed.status.code(), Some(0), "{}", text(&allowed.stderr));
+}
+
+#[test]
 fn an_image_is_checked_against_the_flash_of_its_product() {
     let file = in_tree_text("firmware_images/AXRTD8CO_V2.2.0.elf.S");
     let report = json(&axcon(&["image", "check", "--json", "--product", "axrtd8co", &file]).stdout);

@@ -320,6 +320,29 @@ fn recordings_are_listed_and_played_from_any_place() {
 }
 
 #[test]
+fn arrows_that_are_pressed_quickly_move_a_recording_by_all_of_their_steps() {
+    let world = World::new();
+    let head = "{\"version\":2,\"timestamp\":1769860800,\"axcon\":{\"schema\":\"axcon.recording/1\",\"begun_ms\":1769860800123,\"encoding\":\"latin-1\"}}";
+    let row = "  23.500;  24.125;Disabled;OpenCct ; -12.750\\r\\n";
+    let rows: String = (0..=6000).map(|tenth| format!("[{}.{},\"o\",\"{row}\"]\n", tenth / 10, tenth % 10)).collect();
+    fs::write(world.path("it.cast"), format!("{head}\n{rows}")).expect("written");
+    let mut screen = Screen::start(world.command(&["--port", "replay:it.cast"]), 24, 80);
+    screen.wait("end of the recording");
+    screen.keys("8");
+    screen.wait("at its end");
+    // Each plays from the beginning, and none is there when the next one comes.
+    screen.keys("\x1b[D\x1b[D\x1b[D");
+    let there = screen.wait("9:30 of 10:00");
+    assert!(there.contains("paused"), "{there}");
+    screen.keys("2");
+    screen.wait("newest ");
+    screen.keys("8\x1b[C");
+    screen.wait("9:40 of 10:00");
+    screen.keys("q");
+    assert_eq!(screen.wait_end(), Some(0));
+}
+
+#[test]
 fn a_question_is_left_by_a_signal_and_by_ctrl_c_and_nothing_is_sent() {
     let world = World::new();
     let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "400", "--out", "new.S"];

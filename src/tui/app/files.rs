@@ -6,9 +6,10 @@ use super::App;
 use crate::dump::{self, Dump};
 use crate::session::{Command, Job};
 use crate::time::Instant;
-use crate::tui::input::{Effect, FIRST_BYTES, FileEntry};
+use crate::tui::input::{Effect, FIRST_BYTES, Failure, FileEntry, ImageFacts};
 use crate::tui::picker::{begins_like_an_image, is_image_name};
-use crate::tui::popup::{Popup, Question};
+use crate::tui::popup::{Popup, Purpose, Question};
+use crate::tui::screens::dictionary::other_product;
 use crate::tui::view::{Export, MARK, Sending, Tone, doing};
 use crate::tui::visible;
 use crate::tui::widgets::format;
@@ -23,7 +24,45 @@ impl App {
                 picker.listed(directory, entries);
                 self.folder = picker.directory().to_path_buf();
             }
-            _ => self.load.listed(directory, entries),
+            _ => {
+                if self.load.is_checking(&directory) {
+                    self.close_path_box();
+                }
+                self.load.listed(directory, entries);
+            }
+        }
+    }
+
+    /// A file has been checked: who has typed its path looks at the report now.
+    pub(super) fn image_checked(&mut self, facts: Box<ImageFacts>) {
+        self.dirty = true;
+        if self.load.is_checking(&facts.path) {
+            self.close_path_box();
+        }
+        self.load.checked(facts);
+    }
+
+    /// There is nothing to check. Who has typed the path finds it where it was typed.
+    pub(super) fn image_unreadable(&mut self, path: &Path, why: &str) {
+        self.dirty = true;
+        if !self.load.unreadable(path) {
+            return;
+        }
+        let text = format!("{}: {}", visible::sentence(why), visible::text(&path.to_string_lossy()));
+        match &mut self.popup {
+            Some(Popup::Asking(Question::File { purpose: Purpose::Image, complaint, .. })) => *complaint = Some(text),
+            Some(_) => self.view.tell(Tone::Bad, text),
+            None => {
+                let failure = Failure { text, hints: Vec::new() };
+                self.popup = Some(Popup::Failed { title: "Not read", failure });
+            }
+        }
+    }
+
+    /// The box in which an image's path was typed has done its work.
+    fn close_path_box(&mut self) {
+        if matches!(self.popup, Some(Popup::Asking(Question::File { purpose: Purpose::Image, .. }))) {
+            self.popup = None;
         }
     }
 
@@ -193,9 +232,20 @@ impl App {
             }
             Ok(dump) => {
                 let short = path.file_name().map_or(name.clone(), |name| name.to_string_lossy().into_owned());
+                let other = other_product(&dump, &self.view);
                 self.dictionary.compare(short, dump);
-                self.view
-                    .tell(Tone::Quiet, format!("Compared with {name}: ≠ marks what differs, O chooses what is shown."));
+                match other {
+                    Some((theirs, ours)) => self.view.tell(
+                        Tone::Bad,
+                        format!(
+                            "{name} is of another product, an {theirs}; this unit is an {ours}. Compared all the same."
+                        ),
+                    ),
+                    None => {
+                        let text = format!("Compared with {name}: ≠ marks what differs, O chooses what is shown.");
+                        self.view.tell(Tone::Quiet, text);
+                    }
+                }
             }
         }
     }

@@ -13,6 +13,7 @@ use crate::tui::input::Effect;
 use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd, Press};
 use crate::tui::popup::{self, Answer, Popup, Question, Target};
 use crate::tui::screens::ScreenId;
+use crate::tui::screens::diagnostics::Diagnostics;
 use crate::tui::screens::help::Help;
 use crate::tui::screens::terminal::Meaning;
 use crate::tui::theme::Theme;
@@ -41,6 +42,9 @@ impl App {
     }
 
     pub(super) fn mouse(&mut self, mouse: MouseEvent, effects: &mut Vec<Effect>) {
+        if self.is_too_small() {
+            return;
+        }
         let step = match mouse.kind {
             MouseEventKind::ScrollUp => Some(KeyCode::Up),
             MouseEventKind::ScrollDown => Some(KeyCode::Down),
@@ -78,7 +82,7 @@ impl App {
                 self.help = None;
                 None
             }
-            row if row + 1 == rows => frame::key_at(self.theme, self.footer(), column),
+            row if row + 1 == rows => frame::key_at(self.theme, &self.footer(usize::from(columns)), column),
             row => self.choose_at(columns, rows, row),
         };
         if let Some(cmd) = cmd {
@@ -108,7 +112,8 @@ impl App {
             return None;
         }
         let body = frame::body(Rect::new(0, 0, columns, rows), &self.view);
-        let (_, area) = lines::split(body, frame::lost(&self.view, self.theme, usize::from(columns)).len() as u16);
+        let (_, area) =
+            lines::split(body, frame::lost(&self.view, self.front, self.theme, usize::from(columns)).len() as u16);
         self.dirty = true;
         let again = match self.front {
             ScreenId::Connect => {
@@ -136,6 +141,9 @@ impl App {
     }
 
     pub(super) fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+        if self.is_too_small() {
+            return self.key_unseen(key, effects);
+        }
         // No text and no answer: it means the same in front of everything but the bare terminal.
         if !self.passes_keys() && keymap::find(&[EVERYWHERE], key) == Some(Cmd::Suspend) {
             return self.on(Cmd::Suspend, effects);
@@ -197,7 +205,28 @@ impl App {
         }
     }
 
+    /// A key while nothing of the screen is seen: what it did would be seen by nobody. Only leaving is possible, and asked
+    /// about in the one message there is; and Ctrl-Z, which changes nothing.
+    fn key_unseen(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+        let cmd = keymap::find(&[EVERYWHERE], key);
+        match (&self.popup, cmd, key.code) {
+            (_, Some(Cmd::Suspend), _) if !self.passes_keys() => self.on(Cmd::Suspend, effects),
+            (Some(Popup::Asking(Question::Quit)), _, KeyCode::Char('y' | 'Y')) => {
+                self.popup = None;
+                self.perform(Action::Quit, effects);
+            }
+            (Some(Popup::Asking(Question::Quit)), _, KeyCode::Char('n' | 'N') | KeyCode::Esc) => self.popup = None,
+            // It is being left already, or a link is being opened: nobody has to wait for that.
+            (Some(Popup::Waiting { .. }), Some(Cmd::Quit), _) => effects.push(Effect::Quit),
+            (_, Some(Cmd::Quit), _) => self.on(Cmd::Quit, effects),
+            _ => {}
+        }
+    }
+
     pub(super) fn paste(&mut self, text: &str) {
+        if self.is_too_small() {
+            return;
+        }
         if let Some(popup) = &mut self.popup {
             return popup.paste(text);
         }
@@ -275,24 +304,31 @@ impl App {
         }
     }
 
+    /// Where the screen itself is drawn, below what is said of a lost link.
+    pub(super) fn screen_area(&self) -> Rect {
+        let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1), &self.view);
+        let lost = frame::lost(&self.view, self.front, self.theme, usize::from(self.size.0)).len() as u16;
+        lines::split(area, lost).1
+    }
+
     pub(super) fn screen(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
         let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1), &self.view);
         let page = usize::from(area.height);
+        let below_lost = self.screen_area();
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         let action = match self.front {
             ScreenId::Connect => self.connect.on(cmd, &self.view),
             ScreenId::Overview => {
-                let lost = frame::lost(&self.view, self.theme, usize::from(self.size.0)).len() as u16;
-                let faults = self.overview.faults_at(self.scene(), lines::split(area, lost).1);
+                let faults = self.overview.faults_at(self.scene(), below_lost);
                 self.overview.on(cmd, self.view.monitor.stream.channels.len(), faults)
             }
-            ScreenId::Terminal => self.terminal.on(cmd, &self.scrollback, record, page),
+            ScreenId::Terminal => self.terminal.on(cmd, &self.view, &self.scrollback, record, below_lost),
             ScreenId::Load => self.load.on(cmd, &self.view, area),
             ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
             ScreenId::Stream => self.stream.on(cmd, &self.view),
             ScreenId::Diagnostics => {
-                let found = &self.view.monitor.diagnostics;
-                self.diagnostics.on(cmd, found.lines.len().max(found.found.len()), page)
+                let last = Diagnostics::last(self.scene(), below_lost);
+                self.diagnostics.on(cmd, last, page)
             }
             ScreenId::Recordings => self.recordings.on(cmd, &self.view),
             ScreenId::Bench => self.bench.on(cmd, &self.view),

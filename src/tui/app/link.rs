@@ -31,12 +31,15 @@ pub(super) enum Next {
 impl App {
     /// Whether something can be sent; if not, the user is told why.
     pub(super) fn can_send(&mut self) -> bool {
-        let why = match &self.view.link.state {
+        let (what, key, to) = match &self.view.link.state {
             LinkState::Open { read_only: false } => return true,
-            LinkState::Open { read_only: true } => "Not sent: this is a recording. Press 1 to choose a link.",
-            LinkState::Opening | LinkState::Closed => "Not sent: no unit is connected. Press 1 to choose a link.",
-            LinkState::Lost(_) => "Not sent: the link is lost. Press C to connect again.",
+            LinkState::Open { read_only: true } => ("this is a recording", "1", "choose a link"),
+            LinkState::Opening | LinkState::Closed => ("no unit is connected", "1", "choose a link"),
+            LinkState::Lost(_) => ("the link is lost", "C", "connect again"),
         };
+        // There every other key is the unit's.
+        let prefix = if self.passes_keys() { "Ctrl-] " } else { "" };
+        let why = format!("Not sent: {what}. Press {prefix}{key} to {to}.");
         self.view.tell(Tone::Bad, why);
         false
     }

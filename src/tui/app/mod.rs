@@ -17,7 +17,7 @@ use link::Next;
 use super::action::Action;
 use super::frame;
 use super::input::{Effect, Input, Noted};
-use super::keymap::Binding;
+use super::keymap::{Binding, Cmd};
 use super::picker::expanded;
 use super::popup::{self, Popup, Question, Wanted};
 use super::screens::bench::{self, Bench};
@@ -176,10 +176,8 @@ impl App {
             Input::RecordingOver(failure) => self.recording_over(now, failure),
             Input::FilesListed { directory, entries } => self.files_listed(directory, entries),
             Input::BytesRead { path, bytes } => self.bytes_read(&path, bytes),
-            Input::ImageChecked(facts) => {
-                self.load.checked(facts);
-                self.dirty = true;
-            }
+            Input::ImageChecked(facts) => self.image_checked(facts),
+            Input::ImageUnreadable { path, why } => self.image_unreadable(&path, &why),
             Input::FileWritten { path, result } => self.file_written(&path, result),
             Input::FileRead { path, text } => self.file_read(&path, text),
             Input::RecordingsListed(found) => {
@@ -256,17 +254,18 @@ impl App {
 
     /// Draws the picture.
     pub fn draw(&self, frame: &mut Frame) {
-        if frame::too_small(frame) {
-            return;
-        }
         let area = frame.area();
+        if frame::is_too_small((area.width, area.height)) {
+            let asks = matches!(self.popup, Some(Popup::Asking(Question::Quit)));
+            return frame::too_small(&self.view, asks, frame);
+        }
         let columns = usize::from(area.width);
         let row = |y: u16| Rect { y, height: 1, ..area };
         let front = self.help.is_none().then_some(self.front);
         let theme = self.theme;
         lines::draw(frame, row(0), [frame::header(&self.view, theme, columns)]);
         lines::draw(frame, row(1), [frame::tabs(&self.view, front, theme, columns)]);
-        let lost = frame::lost(&self.view, theme, columns);
+        let lost = frame::lost(&self.view, self.front, theme, columns);
         let (banner, body) = lines::split(frame::body(area, &self.view), lost.len() as u16);
         lines::draw(frame, banner, lost);
         self.draw_screen(body, frame);
@@ -276,8 +275,8 @@ impl App {
         lines::draw(frame, row(area.height - 2), [frame::menu(theme)]);
         let keys = match self.front {
             _ if self.help.is_some() => frame::help_keys(theme),
-            ScreenId::Terminal => frame::terminal_keys(theme, self.front.bindings(), self.terminal.is_after_prefix()),
-            _ => frame::keys(theme, self.footer()),
+            ScreenId::Terminal => frame::terminal_keys(theme, self.front, self.terminal.is_after_prefix(), columns),
+            _ => frame::keys(theme, &self.footer(columns)),
         };
         lines::draw(frame, row(area.height - 1), [keys]);
         if let Some(popup) = &self.popup {
@@ -285,11 +284,36 @@ impl App {
         }
     }
 
-    /// The bindings of the screen in front that mean something now.
-    fn footer(&self) -> &'static [Binding] {
-        match self.front {
+    /// The bindings of the screen in front that mean something now, as many as have room.
+    fn footer(&self, columns: usize) -> Vec<Binding> {
+        let bindings = match self.front {
             ScreenId::Load => self.load.footer(&self.view),
-            screen => screen.bindings(),
+            screen => screen.bindings().to_vec(),
+        };
+        let meant = bindings.into_iter().filter(|binding| self.means_something(binding.cmd)).collect();
+        frame::fitting(self.theme, meant, self.front.dispensable(), columns)
+    }
+
+    /// Whether a key of the screen in front does something now. One that does not is left out of the footer.
+    fn means_something(&self, cmd: Cmd) -> bool {
+        let view = &self.view;
+        let has_rows = !view.monitor.stream.channels.is_empty();
+        match (self.front, cmd) {
+            (ScreenId::Connect, Cmd::Disconnect) => {
+                matches!(view.link.state, LinkState::Open { .. } | LinkState::Lost(_))
+            }
+            (ScreenId::Overview, Cmd::PageDown) => !view.monitor.faults.is_empty(),
+            (ScreenId::Stream, Cmd::Mark) => view.link.name.is_some(),
+            (ScreenId::Stream, Cmd::Export) => has_rows || view.export.is_some(),
+            (ScreenId::Overview | ScreenId::Stream, _) => has_rows,
+            (ScreenId::Dictionary, Cmd::Export | Cmd::Compare | Cmd::Only) => view.dictionary.is_some(),
+            (ScreenId::Dictionary, Cmd::Back) => self.dictionary.is_narrowed(),
+            (ScreenId::Dictionary, _) => view.dictionary.is_some() || view.product().is_some(),
+            (ScreenId::Diagnostics, _) => view.monitor.diagnostics.at.is_some(),
+            (ScreenId::Recordings, Cmd::Down | Cmd::Accept) => !self.recordings.entries().is_empty(),
+            (ScreenId::Recordings, cmd) if cmd != Cmd::Refresh => view.playing.is_some(),
+            (ScreenId::Bench, _) => bench::emulated(view).is_some(),
+            (ScreenId::Connect | ScreenId::Terminal | ScreenId::Load | ScreenId::Recordings, _) => true,
         }
     }
 
@@ -320,6 +344,11 @@ impl App {
             now: self.now,
             start_of_day: self.start_of_day,
         }
+    }
+
+    /// Whether nothing is drawn but that the terminal is too small.
+    fn is_too_small(&self) -> bool {
+        frame::is_too_small(self.size)
     }
 
     /// Whether clicks and the wheel mean something here. On the terminal screen they are the terminal program's own, to
@@ -377,6 +406,7 @@ impl App {
                     self.perform(action, effects);
                 }
             }
+            Action::Tell(why) => self.view.tell(Tone::Quiet, why),
             Action::Ask(question) => self.ask(question),
             Action::Command(command) => {
                 let reads = matches!(command, Command::ReadDictionary);
@@ -416,7 +446,10 @@ impl App {
             Action::RestartExtremes => self.view.restart_extremes(),
             Action::Mark => self.mark(effects),
             Action::Find(words) => match self.front {
-                ScreenId::Terminal => self.terminal.find(words, &self.scrollback),
+                ScreenId::Terminal => {
+                    let area = self.screen_area();
+                    self.terminal.find(words, &self.view, &self.scrollback, area);
+                }
                 _ => self.dictionary.find(&words),
             },
             Action::ExportStream(path) => self.export_stream(self.expanded(path), effects),

@@ -84,7 +84,7 @@ fn the_keys_in_the_last_line_can_be_clicked_also_on_the_help_page() {
 #[test]
 fn the_kind_of_loader_is_chosen_on_the_load_screen_judged_and_ordered() {
     let mut stage = Stage::connected(SMALL).with_image(good_image());
-    assert!(stage.shows("g1, believed of every AXTC4CO; G says another"), "{}", stage.picture());
+    assert!(stage.shows("g1, believed of every AXTC4CO; G if the unit has another"), "{}", stage.picture());
     for kind in LoaderKind::ALL.map(Some).into_iter().chain([None, Some(LoaderKind::G1)]) {
         stage.asked();
         stage.keys("g");

@@ -12,7 +12,7 @@ use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::device::dictionary::{Entry, Object};
 use crate::endpoint::Transmit;
-use crate::image::make;
+use crate::image::{DefectId, make};
 use crate::record::Span;
 use crate::session::{
     DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, UnitState, Verdict,
@@ -212,6 +212,12 @@ impl Stage {
         self.input(Input::Terminal(TerminalEvent::Mouse(mouse)))
     }
 
+    /// The terminal has another size now.
+    pub(super) fn resized(&mut self, size: (u16, u16)) -> &mut Self {
+        self.size = size;
+        self.input(Input::Terminal(TerminalEvent::Resize(size.0, size.1)))
+    }
+
     /// What a terminal sends for Ctrl-].
     pub(super) fn prefix(&mut self) -> &mut Self {
         self.key(KeyCode::Char('5'), KeyModifiers::CONTROL)
@@ -339,6 +345,33 @@ pub(super) fn good_image() -> ImageFacts {
     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
     let report = crate::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
     ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report, &[])
+}
+
+/// What the checker says of a file that is sound but for not saying what it is; these errors are allowed.
+pub(super) fn nameless_image(allow: &[DefectId]) -> ImageFacts {
+    let (target, flaw) = (axtc4co().target(), Some(DefectId::NoIdentity));
+    let recipe = make::Recipe { target: &target, version: Version::new(1, 2, 0), words: 320, flaw };
+    let file = make::make(&recipe).expect("a small image");
+    let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
+    let report = crate::image::check(file.as_slice(), None, &targets, None, allow).expect("a slice");
+    ImageFacts::of_report("/home/service/images/no-identity.elf.S".into(), &report, allow)
+}
+
+/// A page of diagnostics of a unit with eight channels, the first of them shorted.
+pub(super) fn page_of_eight() -> Vec<u8> {
+    let mut page =
+        String::from("Diagnostics   up 0:00:12\r\nSupply Voltage     24.10 V\r\nSource Current      4.000 mA\r\n");
+    for channel in 1..=8 {
+        let value = if channel == 1 { "   Short".to_owned() } else { format!("{:8.1}", 100.0 + f64::from(channel)) };
+        page.push_str(&format!(
+            "RTD{channel} {value} C   raw {:7} uV   {:8.2} Ohm   PV {:6}   status 0x00\r\n",
+            4000 + channel,
+            138.5 + f64::from(channel),
+            1000 + channel
+        ));
+    }
+    page.push_str("Active Errors              1\r\n");
+    page.into_bytes()
 }
 
 /// What the checker says of a good file in which an editor has replaced digits and cut the end off.

@@ -6,7 +6,7 @@ use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Clear};
 
-use super::{Popup, Purpose, Question, Wanted, consequence};
+use super::{ORDERS, Popup, Purpose, Question, Wanted, consequence};
 use crate::session::Job;
 use crate::time::{BITS_PER_CHARACTER, Duration};
 use crate::tui::keymap::Press;
@@ -23,6 +23,8 @@ const COLUMNS: u16 = 66;
 
 /// Columns of a popup with a list of files.
 const LIST_COLUMNS: u16 = 78;
+/// Columns of the orders that are examples.
+const EXAMPLE_COLUMNS: usize = 33;
 /// Rows of a list of files at most.
 const MOST_LIST_ROWS: usize = 24;
 /// The row of its content in which the list begins.
@@ -183,7 +185,7 @@ fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, 
             },
             vec![(ENTER, "connect"), (ESC, "back")],
         ),
-        Question::File { purpose, typed: field, directory } => {
+        Question::File { purpose, typed: field, directory, complaint } => {
             let (title, text, key) = match purpose {
                 Purpose::Image => ("Image file", "A path, absolute or from this folder:", "check it"),
                 Purpose::ExportStream => (
@@ -204,6 +206,7 @@ fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, 
             }
             rows.push(Line::default());
             rows.push(typed(theme, "", field.text(), columns));
+            rows.extend(complain(theme, complaint.as_deref(), columns));
             (title, rows, vec![(ENTER, key), (CLEAR, "clear"), (ESC, "back")])
         }
         Question::Find(field) => {
@@ -221,14 +224,19 @@ fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, 
             },
             vec![(ENTER, "set"), (ESC, "back")],
         ),
-        Question::Order(field) => (
+        Question::Order { typed: field, complaint } => (
             "Order to the emulated unit",
             {
-                let text = "As on the input of 'axcon emulate': set 1 temperature 451, open 2, fault loss 0.01, heal, \
-                            nmt start, write 6112:1 0, power off, status ...";
-                let mut rows = paragraphs(&[text], columns);
+                let example = |(orders, does): &(&[&str], &str)| {
+                    Line::from(vec![
+                        Span::raw(format::left(&orders.join(", "), EXAMPLE_COLUMNS)),
+                        Span::styled(format::keep_start(does, columns.saturating_sub(EXAMPLE_COLUMNS)), theme.quiet()),
+                    ])
+                };
+                let mut rows: Vec<Line> = ORDERS.iter().map(example).collect();
                 rows.push(Line::default());
                 rows.push(typed(theme, "", field.text(), columns));
+                rows.extend(complain(theme, *complaint, columns));
                 rows
             },
             vec![(ENTER, "do it"), (ESC, "back")],
@@ -442,7 +450,7 @@ fn too_fast(view: &View, source: Source, millis: &str) -> Option<String> {
 }
 
 /// What is in the middle, and what becomes of it when the link is closed.
-fn in_the_middle(view: &View) -> [&'static str; 2] {
+pub fn in_the_middle(view: &View) -> [&'static str; 2] {
     match view.job {
         Some(Job::Load) => {
             ["New software is being loaded.", consequence(view.load.progress.map(|progress| progress.phase))]
@@ -489,7 +497,7 @@ fn typed(theme: Theme, label: &'static str, text: &str, columns: usize) -> Line<
     ])
 }
 
-fn complain(theme: Theme, complaint: Option<&'static str>, columns: usize) -> Vec<Line<'static>> {
+fn complain(theme: Theme, complaint: Option<&str>, columns: usize) -> Vec<Line<'static>> {
     let Some(text) = complaint else { return Vec::new() };
     let broken = format::wrap(text, columns).into_iter().map(|line| Line::styled(line, theme.bad()));
     std::iter::once(Line::default()).chain(broken).collect()

@@ -21,7 +21,7 @@ use crate::session::{Command, Phase, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
 
-pub use draw::{Target, draw, target_at};
+pub use draw::{Target, draw, in_the_middle, target_at};
 
 /// What stands in front of the screen.
 #[derive(Debug)]
@@ -57,6 +57,8 @@ pub enum Question {
         typed: TextField,
         /// The folder; empty for the one the program was started in.
         directory: PathBuf,
+        /// Why the file named cannot be read.
+        complaint: Option<String>,
     },
     /// A file that is there: chosen from its folder, or its path typed.
     Choose {
@@ -88,7 +90,12 @@ pub enum Question {
         complaint: Option<&'static str>,
     },
     /// An order to an emulated unit.
-    Order(TextField),
+    Order {
+        /// What has been typed.
+        typed: TextField,
+        /// What is wrong with it.
+        complaint: Option<&'static str>,
+    },
     /// What the stream shall send.
     Stream {
         /// Field or process value.
@@ -184,6 +191,20 @@ pub enum Answer {
     Meanwhile(Action),
 }
 
+/// Orders to an emulated unit as examples, and what they do; each is one that the emulator takes.
+pub const ORDERS: &[(&[&str], &str)] = &[
+    (&["set 1 temperature 45.5"], "its sensor has so many °C"),
+    (&["process 1"], "back to the default process"),
+    (&["open 2", "short 2", "repair 2"], "its wires"),
+    (&["fault lost from-unit one in 100"], "something goes wrong"),
+    (&["fault latency 16", "heal"], "also; all faults end"),
+    (&["nmt start", "nmt stop"], "as the network's master"),
+    (&["write 6112:1 0", "read 6100:1"], "the object dictionary"),
+    (&["power off", "power cycle 2"], "the supply"),
+    (&["unplug", "plug"], "the cable"),
+    (&["freeze", "thaw", "status"], "the converter; how it stands"),
+];
+
 /// Rows that a page key moves in a list of files.
 const PAGE: usize = 8;
 /// Shortest repetition time of the stream (errata E-105).
@@ -235,7 +256,8 @@ impl Question {
 
     /// Asks for an image.
     pub fn image(directory: &Path) -> Question {
-        Question::File { purpose: Purpose::Image, typed: TextField::default(), directory: directory.to_path_buf() }
+        let directory = directory.to_path_buf();
+        Question::File { purpose: Purpose::Image, typed: TextField::default(), directory, complaint: None }
     }
 
     /// Asks for another file, and suggests a name for a new one.
@@ -248,7 +270,7 @@ impl Question {
                 TextField::new(suggested(view, "dictionary", at, "json"))
             }
         };
-        Question::File { purpose, typed, directory: PathBuf::new() }
+        Question::File { purpose, typed, directory: PathBuf::new(), complaint: None }
     }
 
     /// Asks for a file that is there, beginning in a folder that has to be read.
@@ -274,7 +296,7 @@ impl Question {
 
     /// Asks for an order to an emulated unit.
     pub fn order() -> Question {
-        Question::Order(TextField::default())
+        Question::Order { typed: TextField::default(), complaint: None }
     }
 
     /// Asks what the stream shall send.
@@ -382,13 +404,14 @@ impl Question {
             Question::Link(field) if field.text().trim().is_empty() => Answer::Stay,
             Question::Link(field) => Answer::Act(Action::Open(field.text().trim().to_owned())),
             Question::File { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
-            Question::File { purpose, typed, directory } => {
+            Question::File { purpose, typed, directory, .. } => {
                 let path = placed(directory, typed.text());
-                Answer::Act(match purpose {
-                    Purpose::Image => Action::CheckImage(path),
-                    Purpose::ExportStream => Action::ExportStream(path),
-                    Purpose::ExportDictionary => Action::ExportDictionary(path),
-                })
+                match purpose {
+                    // A name typed wrong is mended here: the box goes when the file has been read.
+                    Purpose::Image => Answer::Meanwhile(Action::CheckImage(path)),
+                    Purpose::ExportStream => Answer::Act(Action::ExportStream(path)),
+                    Purpose::ExportDictionary => Answer::Act(Action::ExportDictionary(path)),
+                }
             }
             Question::Choose { picker, typed, .. } if typed.text().trim().is_empty() => {
                 let picked = picker.on(Cmd::Accept, PAGE);
@@ -407,8 +430,15 @@ impl Question {
                     Answer::Stay
                 }
             },
-            Question::Order(field) if field.text().trim().is_empty() => Answer::Stay,
-            Question::Order(field) => Answer::Act(Action::Order(field.text().trim().to_owned())),
+            Question::Order { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
+            Question::Order { typed, complaint } => match typed.text().trim() {
+                // The emulator's own help is made for a page, not for a line of answers.
+                text if text.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("help")) => {
+                    *complaint = Some("They stand above; docs/emulator.md has all, with every fault.");
+                    Answer::Stay
+                }
+                text => Answer::Act(Action::Order(text.to_owned())),
+            },
             Question::Stream { source, millis, complaint, .. } => match millis.text().parse() {
                 Ok(number @ SHORTEST_PERIOD_MS..=LONGEST_PERIOD_MS) => {
                     let period = Duration::from_millis(number);
@@ -468,10 +498,9 @@ impl Question {
 
     fn typed(&mut self, character: char) -> Answer {
         match self {
-            Question::Link(field)
-            | Question::File { typed: field, .. }
-            | Question::Choose { typed: field, .. }
-            | Question::Order(field) => {
+            Question::Link(field) | Question::Choose { typed: field, .. } => field.push(character),
+            Question::File { typed: field, complaint, .. } => {
+                *complaint = None;
                 field.push(character);
             }
             Question::Find(field) => {
@@ -481,7 +510,8 @@ impl Question {
             Question::Defaults { typed: field, complaint }
             | Question::Label { typed: field, complaint, .. }
             | Question::Allow { typed: field, complaint, .. }
-            | Question::Temperature { typed: field, complaint, .. } => {
+            | Question::Temperature { typed: field, complaint, .. }
+            | Question::Order { typed: field, complaint } => {
                 *complaint = None;
                 field.push(character);
             }
@@ -550,7 +580,7 @@ impl Question {
             | Question::File { typed: field, .. }
             | Question::Choose { typed: field, .. }
             | Question::Find(field)
-            | Question::Order(field)
+            | Question::Order { typed: field, .. }
             | Question::Temperature { typed: field, .. }
             | Question::Defaults { typed: field, .. }
             | Question::Allow { typed: field, .. }

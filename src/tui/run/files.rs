@@ -128,6 +128,11 @@ pub(super) fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
+/// Whether there is something of this name to be read.
+pub(super) fn is_there(path: &Path) -> Result<(), String> {
+    fs::metadata(path).map(drop).map_err(|error| said(&error))
+}
+
 /// What the system says, without the number that it adds.
 fn said(error: &io::Error) -> String {
     match error.kind() {

@@ -63,13 +63,17 @@ pub struct World {
     pub explain: fn(LinkError) -> Failure,
     /// Says why a recording cannot be read.
     pub unreadable: fn(RecordingError) -> Failure,
-    /// Reads and checks an image file, for a loader if not each product's own, and allows these errors.
-    pub check: fn(PathBuf, Option<LoaderKind>, &[DefectId]) -> ImageFacts,
+    /// Reads and checks an image file.
+    pub check: Check,
     /// Notes that an upload of this product begins on this link, or (`None`) that the unit on it runs.
     pub note: fn(&str, Option<(&str, &str)>),
     /// What is noted of an upload on this link that has not ended well: the unit's product, and the image's file.
     pub noted: fn(&str) -> Option<(String, String)>,
 }
+
+/// Reads and checks an image file for a loader, if not each product's own, and allows these errors; or says why it cannot
+/// be read.
+pub type Check = fn(PathBuf, Option<LoaderKind>, &[DefectId]) -> Result<ImageFacts, String>;
 
 /// How the console ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -386,9 +390,14 @@ impl Console {
                 }
                 Effect::CheckImage { path, loader, allow } => {
                     let check = self.world.check;
-                    self.ask(move || match path.is_dir() {
-                        true => files::folder(&path),
-                        false => Input::ImageChecked(Box::new(check(path, loader, &allow))),
+                    self.ask(move || {
+                        if path.is_dir() {
+                            return files::folder(&path);
+                        }
+                        match files::is_there(&path).and_then(|()| check(path.clone(), loader, &allow)) {
+                            Ok(facts) => Input::ImageChecked(Box::new(facts)),
+                            Err(why) => Input::ImageUnreadable { path, why },
+                        }
                     });
                 }
                 Effect::UploadBegins { link, product, image } => (self.world.note)(&link, Some((&product, &image))),

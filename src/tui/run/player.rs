@@ -105,7 +105,17 @@ impl Player {
 
     /// How it is played.
     pub(super) fn playing(&self) -> Playing {
-        Playing { position: self.position(), length: self.length, pace: self.pace }
+        Playing { position: self.wanted().unwrap_or(self.position()), length: self.length, pace: self.pace }
+    }
+
+    /// The place it is on its way to: whoever steers from there counts from it, and not from where it happens to be.
+    fn wanted(&self) -> Option<Duration> {
+        let target = self.target?;
+        match self.length {
+            Some(length) => Some(target.min(length)),
+            // Its end, wherever that is.
+            None => Some(target).filter(|target| *target < Duration::MAX),
+        }
     }
 
     /// Whether it has to begin anew for that.
@@ -163,6 +173,7 @@ impl Player {
                 Ok(next) => Some(next),
                 Err(failure) => {
                     self.over = true;
+                    self.target = None;
                     self.length = Some(self.position());
                     return Step::Over(failure);
                 }
@@ -297,6 +308,30 @@ mod tests {
         assert_eq!(heard(&mut player, clock(99_000)), "hi");
         player.steer(clock(99_000), Playback::Pace(Pace::AtOnce));
         assert_eq!(heard(&mut player, clock(99_000)), "jk.");
+    }
+
+    #[test]
+    fn places_are_counted_from_the_one_that_is_wanted_however_far_the_player_is() {
+        let shelf = Shelf::new();
+        let mut player = shelf.player();
+        heard(&mut player, clock(0));
+        let seconds = Duration::from_secs;
+        // Three keys before anything has been played up to the first one's place.
+        for wanted in [8, 6, 4] {
+            let seek = Playback::Seek(player.playing().position.saturating_sub(seconds(2)));
+            if player.is_behind(seek) {
+                player.begin_again(shelf.recording());
+            }
+            player.steer(clock(0), seek);
+            assert_eq!(player.playing().position, seconds(wanted));
+            player.step(clock(0), unreadable);
+        }
+        assert_eq!(heard(&mut player, clock(0)), "de", "behind a, b and c, one for each key, and not further");
+        assert_eq!(player.playing().position, seconds(4));
+        player.steer(clock(0), Playback::Seek(seconds(99)));
+        assert_eq!(player.playing().position, seconds(10), "there is nothing behind the end");
+        assert_eq!(heard(&mut player, clock(0)), "fghijk.");
+        assert_eq!(player.playing().position, seconds(10));
     }
 
     #[test]

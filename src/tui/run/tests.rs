@@ -2,6 +2,8 @@
 
 use std::sync::mpsc::sync_channel;
 
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
 
 use super::*;
@@ -26,7 +28,7 @@ fn console() -> Console {
         },
         explain: |error| Failure { text: error.to_string(), hints: Vec::new() },
         unreadable: |error| Failure { text: error.to_string(), hints: Vec::new() },
-        check: |path, _, _| ImageFacts::unreadable(path, "nobody asks for it here".into()),
+        check: |_, _, _| Err("nobody asks for it here".into()),
         note: |_, _| {},
         noted: |_| None,
     };
@@ -90,4 +92,20 @@ fn what_the_reader_has_brought_counts_also_behind_the_loss_of_the_link() {
     console.lose_link(failure());
     let recorded = std::fs::read_to_string(folder.path().join("it.cast")).expect("a recording");
     assert!(recorded.contains("hello from") && recorded.contains("last words"), "{recorded}");
+}
+
+#[test]
+fn a_path_of_nothing_is_told_as_what_it_is() {
+    let mut console = console();
+    type_keys(&mut console, "lp/nowhere/x.S\r");
+    let words = "There is no such file: /nowhere/x.S";
+    for _ in 0..2 {
+        // The folder's list, and what came of the path.
+        let answer = console.answers.recv_timeout(Duration::from_secs(60)).expect("an answer");
+        console.handle(answer);
+    }
+    let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a test backend");
+    terminal.draw(|frame| console.app.draw(frame)).expect("drawing in memory");
+    let picture = terminal.backend().to_string();
+    assert!(picture.contains(words) && picture.contains("› /nowhere/x.S"), "{picture}");
 }

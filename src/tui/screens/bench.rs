@@ -12,6 +12,7 @@ use ratatui::text::{Line, Span};
 
 use super::Scene;
 use crate::device::Product;
+use crate::session::UnitState;
 use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
@@ -29,7 +30,7 @@ pub const BINDINGS: &[Binding] = &[
     Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "input above" },
     Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "input", long: "input below" },
     Binding { keys: &[Press::Plain(KeyCode::Left)], cmd: Cmd::Left, short: "", long: "10 °C colder" },
-    Binding { keys: &[Press::Plain(KeyCode::Right)], cmd: Cmd::Right, short: "", long: "10 °C warmer" },
+    Binding { keys: &[Press::Plain(KeyCode::Right)], cmd: Cmd::Right, short: "10 °C", long: "10 °C warmer" },
     Binding {
         keys: &[Press::Plain(KeyCode::Enter)],
         cmd: Cmd::Accept,
@@ -64,7 +65,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('/'))],
         cmd: Cmd::Type,
         short: "order",
-        long: "type any order of axcon emulate: fault, nmt, write, heal ...",
+        long: "type an order to the unit; the box says which there are",
     },
 ];
 
@@ -72,6 +73,10 @@ pub const BINDINGS: &[Binding] = &[
 const STEP: f64 = 10.0;
 /// Where a sensor begins whose temperature nobody knows.
 const ROOM_TEMPERATURE: f64 = 20.0;
+/// Columns of an order beside its answer.
+const ORDER_COLUMNS: usize = 28;
+/// What there is to do where nothing is emulated.
+pub const NO_UNIT: &str = "No emulated unit is connected: press 1 and choose one.";
 /// Orders that are remembered.
 const KEPT_ORDERS: usize = 100;
 /// Prefix of links to emulated units in this program.
@@ -143,7 +148,7 @@ impl Bench {
 
     /// What a command does here.
     pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
-        let product = emulated(view)?;
+        let Some(product) = emulated(view) else { return Some(Action::Tell(NO_UNIT.to_owned())) };
         let last = usize::from(product.measurement.channels).saturating_sub(1);
         let number = self.input + 1;
         let warmer = |by: f64| {
@@ -191,18 +196,20 @@ impl Bench {
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let theme = scene.theme;
         let Some(product) = emulated(scene.view) else {
-            let rows = [
-                lines::rule(theme, area.width, "Bench", ""),
-                Line::raw("  Here the sensors, the cable and the power of an emulated unit are in your hands."),
-                Line::raw("  No emulated unit is connected: press 1 and choose one."),
-            ];
-            return lines::draw(frame, area, rows);
+            let texts = ["Here the sensors, the cable and the power of an emulated unit are in your hands.", NO_UNIT];
+            let room = usize::from(area.width).saturating_sub(4);
+            let broken = texts.into_iter().flat_map(|text| format::wrap(text, room));
+            let rows = broken.map(|line| Line::raw(format!("  {line}")));
+            return lines::draw(frame, area, [lines::rule(theme, area.width, "Bench", "")].into_iter().chain(rows));
         };
-        let mut rows = vec![lines::rule(theme, area.width, "Sensors", &format!("of this emulated {}", product.name))];
+        let newest = scene.view.monitor.stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
+        let newest = newest.map(|time| format!(", newest row {time}")).unwrap_or_default();
+        let remark = format!("of this emulated {}{newest}", product.name);
+        let mut rows = vec![lines::rule(theme, area.width, "Sensors", &remark)];
         let heads = format!("    {:<8}{:<20}{:<10}{:>16}   {}", "Input", "Set to", "Wire", "The unit says", "State");
         rows.push(Line::styled(heads, theme.quiet()));
         rows.extend((0..usize::from(product.measurement.channels)).map(|place| self.row(scene, product, place)));
-        rows.push(Line::default());
+        rows.push(Line::styled(why_old(scene.view).map(|why| format!("  {why}")).unwrap_or_default(), theme.warning()));
         let (upper, rest) = lines::split(area, rows.len() as u16);
         lines::draw(frame, upper, rows);
         let (heading, log) = lines::split(rest, 1);
@@ -213,7 +220,9 @@ impl Bench {
         }
         let room = usize::from(log.height);
         let newest = self.orders.iter().skip(self.orders.len().saturating_sub(room));
-        lines::draw(frame, log, newest.map(|order| order_row(scene, order, area.width)));
+        let rows: Vec<Line> = newest.flat_map(|order| order_rows(scene, order, area.width)).collect();
+        let above = rows.len().saturating_sub(room);
+        lines::draw(frame, log, rows.into_iter().skip(above));
     }
 
     fn row(&self, scene: Scene, product: &Product, place: usize) -> Line<'static> {
@@ -237,14 +246,30 @@ impl Bench {
                 format!("{value:.*}", super::overview::decimals(scene.view, source))
             },
         );
-        let state = channel.map_or("", |channel| channel.reading.words());
+        let words = channel.map_or("", |channel| channel.reading.words());
+        let (state, says_style) = match why_old(scene.view) {
+            Some(_) if !words.is_empty() => (format!("old: {words}"), theme.quiet()),
+            _ => (words.to_owned(), Style::new()),
+        };
         let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, place + 1);
         Line::from(vec![
             Span::styled(name, if is_chosen { theme.strong() } else { Style::new() }),
             Span::raw(format!("{set:<20}")),
             Span::styled(format!("{wire:<10}"), style),
-            Span::raw(format!("{says:>16}   {state}")),
+            Span::styled(format!("{says:>16}   {state}"), says_style),
         ])
+    }
+}
+
+/// Why what the unit says here is not what it says now, where it has said something.
+fn why_old(view: &View) -> Option<&'static str> {
+    let stream = &view.monitor.stream;
+    stream.newest?;
+    match (view.facts.state, view.facts.stream) {
+        (UnitState::Loader, _) => Some("The unit waits in its loader: these are its last values."),
+        (_, None) => Some("The stream is off: these are its last values. T switches it on."),
+        _ if stream.late => Some("No new row: these values are old. M asks whether the unit still answers."),
+        _ => None,
     }
 }
 
@@ -260,7 +285,8 @@ fn streamed(view: &View, product: &Product, place: usize) -> Option<f64> {
     channel_of(view, product, place).filter(|_| is_temperature)?.reading.value()
 }
 
-fn order_row(scene: Scene, order: &Order, columns: u16) -> Line<'static> {
+/// An order and its answer side by side, each in as many lines as it needs: what is refused says why at its end.
+fn order_rows(scene: Scene, order: &Order, columns: u16) -> Vec<Line<'static>> {
     let theme = scene.theme;
     let time = format::time_of_day(scene.start_of_day, order.at);
     let (answer, style) = match &order.answer {
@@ -269,11 +295,17 @@ fn order_row(scene: Scene, order: &Order, columns: u16) -> Line<'static> {
         Some(Ok(Some(text))) => (visible::text(text), Style::new()),
         Some(Err(why)) => (format!("refused: {}", visible::text(why)), theme.bad()),
     };
-    let line = format::left(&visible::text(&order.line), 28);
-    let room = usize::from(columns).saturating_sub(42);
-    Line::from(vec![
-        Span::styled(format!("  {time}  "), theme.quiet()),
-        Span::raw(format!("{line}  ")),
-        Span::styled(format::keep_start(&answer, room), style),
-    ])
+    let asked = format::wrap(&visible::text(&order.line), ORDER_COLUMNS);
+    let room = usize::from(columns).saturating_sub(ORDER_COLUMNS + 14);
+    let answered = format::wrap(&answer, room);
+    let row = |number: usize| {
+        let text = |lines: &[String]| lines.get(number).cloned().unwrap_or_default();
+        let time = if number == 0 { time.as_str() } else { "" };
+        Line::from(vec![
+            Span::styled(format!("  {time:<8}  "), theme.quiet()),
+            Span::raw(format!("{}  ", format::left(&text(&asked), ORDER_COLUMNS))),
+            Span::styled(text(&answered), style),
+        ])
+    };
+    (0..asked.len().max(answered.len())).map(row).collect()
 }

@@ -151,7 +151,7 @@ impl Connect {
                         Some(Action::Ask(Question::Disconnect { then: None }))
                     }
                     LinkState::Open { .. } | LinkState::Lost(_) => Some(Action::Disconnect { then: None }),
-                    LinkState::Closed | LinkState::Opening => None,
+                    LinkState::Closed | LinkState::Opening => Some(Action::Tell("No link is open.".into())),
                 };
             }
             _ => {}

@@ -31,6 +31,8 @@ const FOUND_COLUMNS: usize = 33;
 const LONGEST_LABEL: usize = 36;
 /// From this width on the page and what was found on it stand side by side.
 const BESIDE: u16 = 120;
+/// Columns of the numbers at least where they stand beside the page, with their extremes.
+const LEAST_FOUND_COLUMNS: u16 = 60;
 /// Rows that the numbers get at least below a page.
 const LEAST_FOUND_ROWS: u16 = 7;
 
@@ -41,9 +43,8 @@ pub struct Diagnostics {
 }
 
 impl Diagnostics {
-    /// What a command does here; `lines` are those of the longer half, `page` is the height of the picture.
-    pub fn on(&mut self, cmd: Cmd, lines: usize, page: usize) -> Option<Action> {
-        let last = lines.saturating_sub(page.saturating_sub(2));
+    /// What a command does here; `last` is how far the longer half can be scrolled, `page` the height of the picture.
+    pub fn on(&mut self, cmd: Cmd, last: usize, page: usize) -> Option<Action> {
         let page = page.saturating_sub(3).max(1);
         self.scrolled = match cmd {
             Cmd::Up => self.scrolled.saturating_sub(1),
@@ -55,6 +56,13 @@ impl Diagnostics {
         }
         .min(last);
         None
+    }
+
+    /// How far the longer half can be scrolled.
+    pub fn last(scene: Scene, area: Rect) -> usize {
+        let parts = Parts::of(scene, area);
+        let hidden = parts.page.len().saturating_sub(parts.page_room());
+        hidden.max(parts.found_rows().saturating_sub(parts.found_room()))
     }
 
     /// The picture.
@@ -75,51 +83,176 @@ impl Diagnostics {
         };
         let time = format::time_of_day(scene.start_of_day, at);
         let state = if runs { "S stops" } else { "stopped" };
-        let remark = format!("page {}, {time}, {state}", format::grouped(diagnostics.pages));
+        let mut remark = format!("page {}, {time}, {state}", format::grouped(diagnostics.pages));
+        let parts = Parts::of(scene, area);
+        let (heading, body) = lines::split(parts.left, 1);
+        // The longer half sets how far it goes; the other one stops at its end.
+        let first = self.scrolled.min(parts.page.len().saturating_sub(parts.page_room()));
+        if let Some(more) = more(parts.page.len(), first, parts.page_room()) {
+            remark = format!("{more}, {remark}");
+        }
+        lines::draw(frame, heading, [lines::rule(theme, parts.left.width, "As the unit prints it", &remark)]);
+        lines::draw(frame, body, parts.page.iter().skip(first).map(|line| Line::raw(format!("  {line}"))));
+        self.draw_found(scene, &parts, frame);
+    }
+
+    /// The numbers on the page: with what they have been where there is room, else in two columns.
+    fn draw_found(&self, scene: Scene, parts: &Parts, frame: &mut Frame) {
+        let (theme, area, found) = (scene.theme, parts.right, &parts.found);
+        let (heading, body) = lines::split(area, 1);
+        let first = self.scrolled.min(parts.found_rows().saturating_sub(parts.found_room()));
+        let remark = more(parts.found_rows(), first, parts.found_room()).unwrap_or_default();
+        lines::draw(frame, heading, [lines::rule(theme, area.width, "Numbers on it", &remark)]);
+        if parts.is_wide() {
+            let label = usize::from(area.width).saturating_sub(FOUND_COLUMNS).min(LONGEST_LABEL);
+            let (head, body) = lines::split(body, 1);
+            let heads = format!("{}{:>12}{:>10}{:>10}", format::left(" ", label), "Now", "Min", "Max");
+            lines::draw(frame, head, [Line::styled(heads, theme.quiet())]);
+            return lines::draw(frame, body, found.iter().skip(first).map(|tracked| row(scene, tracked, label, true)));
+        }
+        let half = body.width / 2;
+        let label = usize::from(half).saturating_sub(14);
+        for (number, column) in found.chunks(parts.found_rows().max(1)).enumerate() {
+            let place = Rect { x: body.x + half * number as u16, width: half, ..body };
+            lines::draw(frame, place, column.iter().skip(first).map(|tracked| row(scene, tracked, label, false)));
+        }
+    }
+}
+
+/// The page and its numbers, and where they stand.
+struct Parts {
+    left: Rect,
+    right: Rect,
+    /// The page's lines, broken where they have to be.
+    page: Vec<String>,
+    found: Vec<Tracked>,
+}
+
+impl Parts {
+    fn of(scene: Scene, area: Rect) -> Self {
+        let diagnostics = &scene.view.monitor.diagnostics;
+        let printed: Vec<String> = diagnostics.lines.iter().map(|line| visible::text(line)).collect();
+        // Rows broken in the middle of a number are hard to read: the numbers have what the page leaves beside it, or
+        // stand below.
+        let longest = printed.iter().map(|line| format::width(line)).max().unwrap_or_default();
+        let needed = u16::try_from(longest + 4).unwrap_or(u16::MAX).max(area.width / 2);
+        let is_beside = area.width >= BESIDE && needed.saturating_add(LEAST_FOUND_COLUMNS) < area.width;
         // Cut lines would hide what the unit says.
-        let room = usize::from(if area.width >= BESIDE { area.width / 2 } else { area.width }).saturating_sub(2);
-        let broken = diagnostics.lines.iter().flat_map(|line| format::pieces(&visible::text(line), room));
-        let page: Vec<Line> = broken.map(|line| Line::raw(format!("  {line}"))).collect();
-        let (left, right) = match area.width >= BESIDE {
+        let room = usize::from(if is_beside { needed } else { area.width }).saturating_sub(2);
+        let page: Vec<String> = printed.iter().flat_map(|line| format::pieces(line, room)).collect();
+        let found = named(&diagnostics.found);
+        let (left, right) = match is_beside {
             true => {
-                let half = area.width / 2;
-                (Rect { width: half, ..area }, Rect { x: area.x + half + 1, width: area.width - half - 1, ..area })
+                let rest = Rect { x: area.x + needed + 1, width: area.width - needed - 1, ..area };
+                (Rect { width: needed, ..area }, rest)
             }
             false => {
                 let rows = (page.len() as u16 + 1).min(area.height.saturating_sub(LEAST_FOUND_ROWS));
                 lines::split(area, rows)
             }
         };
-        let (heading, body) = lines::split(left, 1);
-        lines::draw(frame, heading, [lines::rule(theme, left.width, "As the unit prints it", &remark)]);
-        // The longer half sets how far it goes; the other one stops at its end.
-        let first = self.scrolled.min(page.len().saturating_sub(usize::from(body.height)));
-        lines::draw(frame, body, page.into_iter().skip(first));
-        self.draw_found(scene, right, frame);
+        Parts { left, right, page, found }
     }
 
-    /// The numbers on the page: with what they have been where there is room, else in two columns.
-    fn draw_found(&self, scene: Scene, area: Rect, frame: &mut Frame) {
-        let (theme, found) = (scene.theme, &scene.view.monitor.diagnostics.found);
-        let (heading, body) = lines::split(area, 1);
-        let is_wide = area.width >= BESIDE / 2 && area.height > LEAST_FOUND_ROWS * 2;
-        lines::draw(frame, heading, [lines::rule(theme, area.width, "Numbers on it", "")]);
-        if is_wide {
-            let label = usize::from(area.width).saturating_sub(FOUND_COLUMNS).min(LONGEST_LABEL);
-            let (head, body) = lines::split(body, 1);
-            let heads = format!("{}{:>12}{:>10}{:>10}", format::left(" ", label), "Now", "Min", "Max");
-            lines::draw(frame, head, [Line::styled(heads, theme.quiet())]);
-            let first = self.scrolled.min(found.len().saturating_sub(usize::from(body.height)));
-            return lines::draw(frame, body, found.iter().skip(first).map(|tracked| row(scene, tracked, label, true)));
+    fn page_room(&self) -> usize {
+        usize::from(self.left.height.saturating_sub(1))
+    }
+
+    /// Whether the numbers have room for what they have been.
+    fn is_wide(&self) -> bool {
+        self.right.width >= LEAST_FOUND_COLUMNS && self.right.height > LEAST_FOUND_ROWS * 2
+    }
+
+    /// Rows that the numbers need, in two columns where they are not wide.
+    fn found_rows(&self) -> usize {
+        if self.is_wide() { self.found.len() } else { self.found.len().div_ceil(2) }
+    }
+
+    fn found_room(&self) -> usize {
+        usize::from(self.right.height.saturating_sub(if self.is_wide() { 2 } else { 1 }))
+    }
+}
+
+/// What of so many rows is not in sight.
+fn more(rows: usize, first: usize, room: usize) -> Option<String> {
+    match (first, rows.saturating_sub(first + room)) {
+        (0, 0) => None,
+        (0, below) => Some(format!("↓ {below} more")),
+        (above, 0) => Some(format!("↑ {above} more")),
+        (above, below) => Some(format!("↑ {above} and ↓ {below} more")),
+    }
+}
+
+/// Words that a page has in place of a channel's temperature (`wire::stream` knows those of the rows).
+const STATES: [&str; 8] = ["open", "short", "shorted", "opencct", "shortcct", "disabled", "off", "error"];
+
+/// The numbers under names of their own. Where a channel has no temperature its state stands before the number behind it,
+/// `RTD1 Short C raw 4001 uV`: that is the `RTD1 raw` of other pages. Two quantities of one name are told apart by what
+/// their units measure.
+fn named(found: &[Tracked]) -> Vec<Tracked> {
+    let mut named: Vec<Tracked> = Vec::new();
+    let mut stated: Vec<Stated> = Vec::new();
+    for tracked in found {
+        let label = without_state(&tracked.label, &mut stated);
+        let same = |known: &&mut Tracked| {
+            known.label == label && known.unit == tracked.unit && (known.value.is_none() || tracked.value.is_none())
+        };
+        match named.iter_mut().find(same) {
+            Some(known) => {
+                known.value = known.value.or(tracked.value);
+                known.decimals = known.decimals.max(tracked.decimals);
+                (known.min, known.max) = (known.min.min(tracked.min), known.max.max(tracked.max));
+            }
+            None => named.push(Tracked { label, ..tracked.clone() }),
         }
-        let half = body.width / 2;
-        let label = usize::from(half).saturating_sub(14);
-        let rows = found.len().div_ceil(2).max(1);
-        for (number, column) in found.chunks(rows).enumerate() {
-            let place = Rect { x: body.x + half * number as u16, width: half, ..body };
-            let shown = column.iter().skip(self.scrolled.min(column.len().saturating_sub(usize::from(body.height))));
-            lines::draw(frame, place, shown.map(|tracked| row(scene, tracked, label, false)));
+    }
+    let labels: Vec<(String, Option<String>)> =
+        named.iter().map(|tracked| (tracked.label.clone(), tracked.unit.clone())).collect();
+    for tracked in &mut named {
+        let is_shared = labels.iter().any(|(label, unit)| *label == tracked.label && *unit != tracked.unit);
+        let had_state = stated.iter().any(|known| known.about == tracked.label);
+        if let Some(quantity) = tracked.unit.as_deref().and_then(quantity).filter(|_| is_shared || had_state) {
+            tracked.label = format!("{} {quantity}", tracked.label);
         }
+    }
+    named
+}
+
+/// A label with a state in it, `RTD1 Short C raw`, and what the line is about.
+struct Stated {
+    label: String,
+    about: String,
+}
+
+/// A label without a state and the unit of the temperature that is not there. `stated` are those that had one so far: what
+/// follows in the line of one is called after all of it, and is about what the line is about.
+fn without_state(label: &str, stated: &mut Vec<Stated>) -> String {
+    let of_line = stated.iter().find_map(|known| {
+        let rest = label.strip_prefix(known.label.as_str())?;
+        (rest.is_empty() || rest.starts_with(' ')).then(|| format!("{}{rest}", known.about))
+    });
+    if let Some(label) = of_line {
+        return label;
+    }
+    let words: Vec<&str> = label.split(' ').collect();
+    let is_state = |word: &&str| STATES.contains(&word.to_lowercase().as_str());
+    let state = words
+        .iter()
+        .position(is_state)
+        .filter(|state| *state > 0 && words.get(state + 1).is_some_and(|word| matches!(*word, "C" | "°C" | "degC")));
+    let Some(state) = state else { return label.to_owned() };
+    stated.push(Stated { label: label.to_owned(), about: words[..state].join(" ") });
+    [&words[..state], &words[state + 2..]].concat().join(" ")
+}
+
+/// What a unit measures, in a word.
+fn quantity(unit: &str) -> Option<&'static str> {
+    match unit.to_lowercase().replace(['µ', 'μ'], "u").as_str() {
+        "c" | "°c" | "degc" | "f" | "°f" => Some("temperature"),
+        "ohm" | "ohms" | "ω" => Some("resistance"),
+        "v" | "mv" | "uv" => Some("voltage"),
+        "a" | "ma" => Some("current"),
+        _ => None,
     }
 }
 
@@ -136,4 +269,60 @@ fn row(scene: Scene, tracked: &Tracked, label: usize, with_extremes: bool) -> Li
         line.push_span(Span::raw(format!("{:>10}{:>10}", tracked.text(tracked.min), tracked.text(tracked.max))));
     }
     line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::diagnostics::quantities;
+
+    /// The names under which the numbers of these lines are shown, with the value they have now.
+    fn names(lines: &[&str]) -> Vec<String> {
+        let tracked = |line: &&str| quantities(line).into_iter();
+        let found: Vec<Tracked> = lines
+            .iter()
+            .flat_map(tracked)
+            .map(|quantity| Tracked {
+                label: quantity.label,
+                unit: quantity.unit,
+                decimals: quantity.decimals,
+                value: Some(quantity.value),
+                min: quantity.value,
+                max: quantity.value,
+            })
+            .collect();
+        named(&found).into_iter().map(|tracked| tracked.label).collect()
+    }
+
+    #[test]
+    fn two_quantities_of_a_channel_have_names_of_their_own() {
+        assert_eq!(
+            names(&["RTD5 125.8 C raw 7310 uV 148.25 Ohm PV 1258"]),
+            ["RTD5 temperature", "RTD5 raw", "RTD5 resistance", "RTD5 PV"]
+        );
+        assert_eq!(names(&["Supply 24.1 V", "TC1 100.1 C"]), ["Supply", "TC1"], "where nothing is mixed up");
+    }
+
+    #[test]
+    fn a_state_is_no_part_of_the_name_of_the_number_behind_it() {
+        let row = "RTD1  Short C   raw    4001 uV   0.00 Ohm   PV  0";
+        assert_eq!(names(&[row]), ["RTD1 raw", "RTD1 resistance", "RTD1 PV"]);
+        assert_eq!(names(&["Short Circuits 3", "Last Error Code 7"]), ["Short Circuits", "Last Error Code"]);
+        let mut found: Vec<Tracked> = Vec::new();
+        for (line, value) in [("RTD1 20.0 C raw 4000 uV", None), ("RTD1 Short C raw 4001 uV", Some(()))] {
+            found.extend(quantities(line).into_iter().map(|quantity| Tracked {
+                value: value.map(|()| quantity.value),
+                label: quantity.label,
+                unit: quantity.unit,
+                decimals: quantity.decimals,
+                min: quantity.value,
+                max: quantity.value,
+            }));
+        }
+        let shown: Vec<_> = named(&found).into_iter().map(|it| (it.label, it.value, it.min, it.max)).collect();
+        assert_eq!(
+            shown,
+            [("RTD1 temperature".into(), None, 20.0, 20.0), ("RTD1 raw".into(), Some(4001.0), 4000.0, 4001.0)]
+        );
+    }
 }

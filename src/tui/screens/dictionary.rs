@@ -17,7 +17,7 @@ use crate::session::Job;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::popup::{Purpose, Question, Wanted};
-use crate::tui::view::View;
+use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
@@ -56,15 +56,16 @@ pub const BINDINGS: &[Binding] = &[
         short: "export",
         long: "write what was read to a file: .json, .csv, .dcf or .txt",
     },
-    Binding { keys: &[Press::Plain(KeyCode::Esc)], cmd: Cmd::Back, short: "", long: "show everything again" },
+    Binding { keys: &[Press::Plain(KeyCode::Esc)], cmd: Cmd::Back, short: "everything", long: "show everything again" },
 ];
 
 /// Rows of the pane that explains the chosen entry, its heading included.
 const DETAIL_ROWS: u16 = 8;
 /// From this width on that pane stands beside the table ...
 const BESIDE_AT: u16 = 150;
-/// ... and takes so many columns.
+/// ... and takes so many columns at least; the table takes no more than these.
 const DETAIL_COLUMNS: u16 = 64;
+const TABLE_COLUMNS: u16 = 140;
 /// Columns of cursor, mark and address.
 const FIXED_COLUMNS: usize = 4 + 9;
 /// Columns at most of the value and of the factory's: on a narrow screen they leave room for the longest name.
@@ -110,6 +111,13 @@ struct Row<'a> {
     read: Option<&'a DumpEntry>,
     /// How the other dump differs.
     difference: Option<Difference>,
+}
+
+/// The products of a dump and of the unit, where they are not the same.
+pub fn other_product(dump: &Dump, view: &View) -> Option<(String, String)> {
+    let ours = view.dictionary.as_ref().and_then(|read| read.dump.product.as_deref());
+    let (theirs, ours) = dump.product.as_deref().zip(ours)?;
+    (!theirs.eq_ignore_ascii_case(ours)).then(|| (visible::text(theirs), visible::text(ours)))
 }
 
 impl Dictionary {
@@ -159,11 +167,23 @@ impl Dictionary {
                 (self.only, self.other, self.cursor) = (Only::Everything, None, 0);
                 self.words.clear();
             }
+            Cmd::Compare | Cmd::Export if view.dictionary.is_none() => {
+                let what = match view.can_send() {
+                    true => "Nothing has been read yet: V reads the object dictionary.".to_owned(),
+                    false => format!("Nothing has been read. {}", without_unit(view)),
+                };
+                return Some(Action::Tell(what));
+            }
             Cmd::Compare => return Some(Action::Choose(Wanted::Dump)),
             Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportDictionary, view))),
             _ => {}
         }
         None
+    }
+
+    /// Whether something is left out, or compared: Esc ends that.
+    pub fn is_narrowed(&self) -> bool {
+        self.only != Only::Everything || self.other.is_some() || !self.words.is_empty()
     }
 
     /// Everything there is to show: what was read, what the manual has besides, and what only the other dump has.
@@ -232,7 +252,8 @@ impl Dictionary {
         let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len(), total))];
         let columns = usize::from(upper.width);
         let factory = match &self.other {
-            Some(other) => format!("in {}", visible::text(&other.name)),
+            // Beside the heading of the values `in d1.json` would read as part of it.
+            Some(other) => format!("{} has", visible::text(&other.name)),
             None => "Factory".into(),
         };
         let widths = Widths::of(&rows, &factory, self.other.is_some(), columns);
@@ -259,9 +280,10 @@ impl Dictionary {
                 (_, Some(_)) if self.only == Only::Differences && self.words.is_empty() => {
                     "Nothing differs between the two. Esc shows everything again."
                 }
-                (None, None) => {
+                (None, None) if view.can_send() => {
                     "Nothing to show: the unit has not said what it is. V reads its dictionary all the same."
                 }
+                (None, None) => without_unit(view),
                 _ => "Nothing here matches. O chooses what is shown, / what it has to contain, Esc shows everything.",
             };
             let broken = format::wrap(text, columns.saturating_sub(4));
@@ -295,7 +317,9 @@ impl Dictionary {
             parts.push(format!("reading: {} so far", format::grouped(view.entries_read)));
         } else {
             match &view.dictionary {
-                None => parts.push("the manual's; V reads the unit's".to_owned()),
+                None if view.can_send() => parts.push("the manual's; V reads the unit's".to_owned()),
+                None if view.product().is_some() => parts.push("the manual's".to_owned()),
+                None => {}
                 Some(read) => {
                     let time = format::time_of_day(scene.start_of_day, read.at);
                     let compared = match view.product() {
@@ -313,6 +337,10 @@ impl Dictionary {
             Only::Deviations => parts.push("only those".into()),
             Only::Differences => parts.push("only differences".into()),
         }
+        if let Some((theirs, _)) = self.other.as_ref().and_then(|other| other_product(&other.dump, view)) {
+            // What is cut off for want of room must not be this.
+            parts.insert(0, format!("dump of an {theirs}"));
+        }
         if !self.words.is_empty() {
             parts.push(format!("with '{}'", visible::text(&self.words)));
         }
@@ -320,12 +348,22 @@ impl Dictionary {
     }
 }
 
+/// Why V cannot read a unit's dictionary.
+fn without_unit(view: &View) -> &'static str {
+    match &view.link.state {
+        LinkState::Closed | LinkState::Opening => "Not connected: press 1 to choose a port or an emulated unit.",
+        LinkState::Lost(_) => "The link is lost: C connects again.",
+        LinkState::Open { .. } => "Nobody has read it in this recording up to here.",
+    }
+}
+
 /// Where the table with its heading stands, and where the chosen entry is explained.
 fn parts(area: Rect) -> (Rect, Rect) {
     match area.width >= BESIDE_AT {
         true => {
-            let width = area.width - DETAIL_COLUMNS;
-            let beside = Rect { x: area.x + width + 2, width: DETAIL_COLUMNS - 2, ..area };
+            // Names are as long as they are: what is left beside them goes to what explains.
+            let width = (area.width - DETAIL_COLUMNS).min(TABLE_COLUMNS);
+            let beside = Rect { x: area.x + width + 2, width: area.width - width - 2, ..area };
             (Rect { width, ..area }, beside)
         }
         false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
@@ -359,7 +397,7 @@ impl Widths {
             cells.map(|cell| format::width(&cell)).max().unwrap_or_default().max(format::width(head))
         };
         let value = widest("Value", &mut rows.iter().map(|row| row.cell(most_value))).min(most_value);
-        let factory = widest(factory, &mut rows.iter().map(Row::other)).min(most_factory);
+        let factory = widest(factory, &mut rows.iter().map(|row| row.other_cell(most_factory))).min(most_factory);
         let meaning = columns >= MEANING_AT;
         let taken =
             FIXED_COLUMNS + value + factory + 2 + VALUES_APART.len() + if meaning { MEANING_COLUMNS } else { 0 };
@@ -433,6 +471,14 @@ impl Row<'_> {
         }
     }
 
+    /// The same in so many columns: with its unit where there is room for both.
+    fn other_cell(&self, columns: usize) -> String {
+        let bare = self.other();
+        let with_unit = self.measure().map(|measure| format!("{bare} {}", measure.unit));
+        let is_number = bare.trim_start_matches('-').starts_with(|first: char| first.is_ascii_digit());
+        with_unit.filter(|text| is_number && format::width(text) <= columns).unwrap_or(bare)
+    }
+
     fn meaning(&self) -> Option<&str> {
         self.read.and_then(|read| read.meaning.as_deref())
     }
@@ -467,7 +513,7 @@ impl Row<'_> {
             Span::raw(" "),
             Span::styled(format::left(&value, widths.value), value_style),
             Span::raw(VALUES_APART),
-            Span::styled(format::left(&self.other(), widths.factory), theme.quiet()),
+            Span::styled(format::left(&self.other_cell(widths.factory), widths.factory), theme.quiet()),
             Span::raw(" "),
         ]);
         if widths.meaning {
@@ -514,7 +560,8 @@ impl Row<'_> {
             Some(read) if read.deviates => value.push_str("; not as the factory made it"),
             Some(_) => {}
             None if scene.view.dictionary.is_some() => value = "not shown by the unit".into(),
-            None => value = "not read yet: V reads it".into(),
+            None if scene.view.can_send() => value = "not read yet: V reads it".into(),
+            None => value = format!("not read. {}", without_unit(scene.view)),
         }
         labelled("Value", value, 1);
         let Some((_, entry)) = self.known else {

@@ -10,7 +10,7 @@ use crate::tui::theme::Theme;
 use crate::tui::widgets::{format, lines};
 
 /// Columns of the keys.
-const KEY_COLUMNS: usize = 16;
+const KEY_COLUMNS: usize = 17;
 /// From this width on two columns of text stand side by side.
 const TWO_COLUMNS: u16 = 150;
 
@@ -37,8 +37,20 @@ impl Help {
             return lines::draw(frame, right, notes(theme, half));
         }
         let rows = page(theme, area.width, screen);
-        let first = self.scrolled.min(rows.len().saturating_sub(usize::from(area.height)));
-        lines::draw(frame, area, rows.into_iter().skip(first));
+        let room = usize::from(area.height);
+        if rows.len() <= room {
+            return lines::draw(frame, area, rows);
+        }
+        // One row says how much more there is.
+        let room = room.saturating_sub(1);
+        let first = self.scrolled.min(rows.len().saturating_sub(room));
+        let below = rows.len() - first - room.min(rows.len() - first);
+        let more = match (first, below) {
+            (_, 0) => format!("── ↑ {first} lines above "),
+            (_, below) => format!("── ↓ {below} more lines below "),
+        };
+        let shown = rows.into_iter().skip(first).take(room);
+        lines::draw(frame, area, shown.chain([Line::styled(more, theme.quiet())]));
     }
 }
 

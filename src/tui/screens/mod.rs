@@ -13,7 +13,7 @@ pub mod recordings;
 pub mod stream;
 pub mod terminal;
 
-use super::keymap::Binding;
+use super::keymap::{Binding, Cmd};
 use super::theme::Theme;
 use super::view::View;
 use crate::monitor::Scrollback;
@@ -116,6 +116,21 @@ impl ScreenId {
             ScreenId::Diagnostics => diagnostics::BINDINGS,
             ScreenId::Recordings => recordings::BINDINGS,
             ScreenId::Bench => bench::BINDINGS,
+        }
+    }
+
+    /// What the footer leaves out first where there is no room for all keys: F1 has them all.
+    pub const fn dispensable(self) -> &'static [Cmd] {
+        match self {
+            ScreenId::Connect => &[Cmd::Refresh, Cmd::Down],
+            ScreenId::Overview => &[Cmd::Down],
+            ScreenId::Load => &[Cmd::Last, Cmd::Refresh, Cmd::Loader, Cmd::Down],
+            ScreenId::Dictionary => &[Cmd::Back, Cmd::Down],
+            ScreenId::Stream => &[Cmd::Restart, Cmd::Accept, Cmd::Last, Cmd::Right, Cmd::Down],
+            ScreenId::Diagnostics => &[],
+            ScreenId::Recordings => &[Cmd::Refresh, Cmd::Last, Cmd::Slower, Cmd::Faster, Cmd::Down],
+            ScreenId::Bench => &[Cmd::Right, Cmd::Down],
+            ScreenId::Terminal => &[Cmd::Times, Cmd::SendFile, Cmd::Hex],
         }
     }
 

@@ -48,6 +48,9 @@ const TABLE_COLUMNS: usize = 64;
 const LEAST_TREND: usize = 12;
 /// Rows of the faults that the rest of the page leaves room for, with their heading, where there are any.
 const FAULT_ROWS: usize = 3;
+/// Columns of a fault's channel, and of what it is.
+const CHANNEL_COLUMNS: usize = 8;
+const KIND_COLUMNS: usize = 15;
 /// Columns of a channel and its value on a page of diagnostics, where the stream is off.
 const DIAGNOSED_COLUMNS: usize = 2 + 6 + 12;
 /// From this width on the limits have columns of their own ...
@@ -172,7 +175,7 @@ impl Overview {
             shown.push(value_row(scene, channel, number == self.cursor, source, decimals, room, has_columns));
         }
         if area.height >= CHART_ROWS {
-            shown.extend(averages(scene));
+            shown.extend(averages(scene, columns));
         }
         shown.push(match why_old(scene) {
             Some(why) => Line::styled(format!("  {why}"), theme.warning()),
@@ -240,13 +243,20 @@ fn limits_line(scene: Scene, source: Source, channel: &str, has_columns: bool) -
 }
 
 /// The unit's averages, as they were when its dictionary was read.
-fn averages(scene: Scene) -> Option<Line<'static>> {
+fn averages(scene: Scene, columns: u16) -> Option<Line<'static>> {
     let read = scene.view.current_dictionary()?;
     let averages = scene.view.averages();
-    let said: Vec<String> = averages.into_iter().map(|(name, value)| format!("{name} {value:.1}")).collect();
     let time = format::time_of_day(scene.start_of_day, read.at);
-    let text = format!("  Averages, read {time}: {} °C", said.join(", "));
-    (!said.is_empty()).then(|| Line::styled(text, scene.theme.quiet()))
+    let columns = usize::from(columns);
+    // Which channels a bank has is left out where there is no room for it; the numbers are not.
+    let short = |name: &str| name.split(" (").next().unwrap_or(name).to_owned();
+    let texts = [&(|name: &str| name.to_owned()) as &dyn Fn(&str) -> String, &short].map(|named| {
+        let said: Vec<String> = averages.iter().map(|(name, value)| format!("{} {value:.1}", named(name))).collect();
+        format!("  Averages in °C, read {time}: {}", said.join(", "))
+    });
+    let [long, short] = texts;
+    let text = if format::width(&long) <= columns { long } else { format::keep_start(&short, columns) };
+    (!averages.is_empty()).then(|| Line::styled(text, scene.theme.quiet()))
 }
 
 /// Digits behind the point, as the product prints them.
@@ -378,7 +388,15 @@ fn canopen_state(scene: Scene, room: usize) -> Span<'static> {
     let state = &scene.view.facts.nmt_state;
     let now = known(state, |state| visible::text(state));
     let age = scene.view.nmt_heard.and_then(|heard| format::ago(heard, scene.now));
-    let (Some(state), Some(age)) = (state, age) else { return now };
+    let Some(state) = state else { return now };
+    let Some(age) = age else {
+        // Where it comes from is said in full or not at all.
+        return if now.width() <= room {
+            now
+        } else {
+            Span::raw(format::keep_start(&visible::text(&state.value), room))
+        };
+    };
     let full = format!("{}, {age}", now.content);
     let text = if format::width(&full) <= room { full } else { format!("{}, {age}", visible::text(&state.value)) };
     Span::styled(text, scene.theme.quiet())
@@ -533,10 +551,18 @@ fn listed(scene: Scene) -> Vec<Line<'static>> {
     let Some(read) = scene.view.current_dictionary() else { return Vec::new() };
     let time = format::time_of_day(scene.start_of_day, read.at);
     let row = |words: &str| {
+        let words = visible::text(words);
+        // In the columns of the faults that were seen, where it is about a channel.
+        let (channel, words) = match words.split_once(": ") {
+            Some((channel, kind)) if format::width(channel) < CHANNEL_COLUMNS => {
+                (format::left(channel, CHANNEL_COLUMNS), format::left(kind, KIND_COLUMNS.max(format::width(kind) + 2)))
+            }
+            _ => (String::new(), format!("{words}  ")),
+        };
         Line::from(vec![
-            Span::raw("    "),
-            Span::styled(visible::text(words), theme.bad()),
-            Span::styled(format!("  in the unit's list of errors (1003h), read {time}"), theme.quiet()),
+            Span::raw(format!("    {channel}")),
+            Span::styled(words, theme.bad()),
+            Span::styled(format!("in the unit's list of errors (1003h), read {time}"), theme.quiet()),
         ])
     };
     read.dump.errors().map(row).collect()
@@ -546,16 +572,16 @@ fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
     let theme = scene.theme;
     let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
     let kind = fault.kind.words();
-    let name = Span::raw(format!("    {:<8}", fault.channel));
+    let name = Span::raw(format!("    {:<CHANNEL_COLUMNS$}", fault.channel));
     match fault.until {
         None => Line::from(vec![
             name,
-            Span::styled(format!("{kind:<15}"), theme.bad()),
+            Span::styled(format!("{kind:<KIND_COLUMNS$}"), theme.bad()),
             Span::raw(format!("since {}: check sensor, wire and connector", time(fault.since))),
         ]),
         Some(until) => {
             let lasted = format::period(until.since(fault.since));
-            let text = format!("{kind:<15}over, {} to {}, lasted {lasted}", time(fault.since), time(until));
+            let text = format!("{kind:<KIND_COLUMNS$}over, {} to {}, lasted {lasted}", time(fault.since), time(until));
             Line::from(vec![name, Span::styled(text, theme.quiet())])
         }
     }

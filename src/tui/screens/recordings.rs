@@ -39,21 +39,21 @@ pub const BINDINGS: &[Binding] = &[
     Binding {
         keys: &[Press::Plain(KeyCode::Left)],
         cmd: Cmd::Left,
-        short: "back",
+        short: "",
         long: "10 seconds back, or a hundredth of a long recording",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Right)],
         cmd: Cmd::Right,
-        short: "",
+        short: "move",
         long: "10 seconds on, or a hundredth of a long recording",
     },
     Binding { keys: &[Press::Plain(KeyCode::Home)], cmd: Cmd::First, short: "", long: "to its beginning" },
-    Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "", long: "to its end" },
+    Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "to its end", long: "to its end" },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
         cmd: Cmd::Refresh,
-        short: "",
+        short: "refresh",
         long: "look for recordings again",
     },
 ];
@@ -63,6 +63,8 @@ const PACES: [Pace; 6] =
     [Pace::Times(1), Pace::Times(2), Pace::Times(5), Pace::Times(10), Pace::Times(60), Pace::AtOnce];
 /// What an arrow moves by at least.
 const LEAST_STEP: Duration = Duration::from_secs(10);
+/// Ends the name of a recording.
+const ENDING: &str = ".cast";
 /// Rows of what is being played.
 const PLAYER_ROWS: u16 = 4;
 /// Rows below the list: where the chosen one lies, and how it is passed on.
@@ -110,7 +112,14 @@ impl Recordings {
             Cmd::Accept => return self.entries().get(self.cursor).map(|entry| Action::Open(entry.link.clone())),
             _ => {}
         }
-        let playing = view.playing?;
+        let Some(playing) = view.playing else {
+            let what = match (cmd, self.entries().is_empty()) {
+                (Cmd::Up | Cmd::Down, _) => return None,
+                (_, true) => "Nothing is being played.",
+                (_, false) => "Nothing is being played: Enter plays the chosen recording.",
+            };
+            return Some(Action::Tell(what.to_owned()));
+        };
         let step = playing.length.map_or(LEAST_STEP, |length| (length / 100).max(LEAST_STEP));
         let play = match cmd {
             Cmd::Pause if playing.pace != Pace::Paused => {
@@ -184,6 +193,17 @@ impl Recordings {
         std::mem::replace(&mut self.cursor, number) == number
     }
 
+    /// Whether this console writes it now: of a session in parts it is the newest.
+    fn is_being_written(&self, view: &View, number: usize) -> bool {
+        let Some(recording) = view.link.recording.as_deref().filter(|_| view.can_send()) else { return false };
+        let stem = recording.strip_suffix(ENDING).unwrap_or(recording);
+        let is_of_session = |entry: &RecordingEntry| {
+            let path = entry.link.strip_prefix("replay:").unwrap_or(&entry.link);
+            path == recording || path.strip_prefix(stem).is_some_and(|rest| rest.starts_with(".p"))
+        };
+        self.entries().iter().position(is_of_session) == Some(number)
+    }
+
     /// Where the chosen one lies, and what to do with it.
     fn detail(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
         let Some(entry) = self.entries().get(self.cursor) else { return Vec::new() };
@@ -191,9 +211,14 @@ impl Recordings {
         let path = visible::text(entry.link.strip_prefix("replay:").unwrap_or(&entry.link));
         let room = usize::from(columns).saturating_sub(4);
         let mut rows = vec![lines::rule(theme, columns, "To send it to somebody", "")];
-        // Two lines: whoever copies the path needs all of it.
+        // Whoever copies the path needs all of it, and the file's name in one piece.
+        let name = path.rfind('/').filter(|_| format::width(&path) > room).map_or(0, |slash| slash + 1);
+        let (folder, name) = path.split_at(name);
+        let parts = [folder, name].into_iter().filter(|part| !part.is_empty());
         rows.extend(
-            format::pieces(&path, room).into_iter().map(|piece| Line::styled(format!("  {piece}"), theme.strong())),
+            parts
+                .flat_map(|part| format::pieces(part, room))
+                .map(|piece| Line::styled(format!("  {piece}"), theme.strong())),
         );
         let text = "Attach this file: every byte, both directions, with times; of a password only its length. As one page \
                     to read: axcon report --port replay:FILE --out report.html";
@@ -215,6 +240,7 @@ impl Recordings {
             0 | 1 => visible::text(&entry.port),
             part => format!("{}, part {part}", visible::text(&entry.port)),
         };
+        let port = if self.is_being_written(scene.view, number) { format!("{port}, being written") } else { port };
         let room = usize::from(columns).saturating_sub(format::width(&fixed));
         let style = if is_chosen { scene.theme.bar() } else { Style::new() };
         Line::styled(format!("{fixed}{}", format::left(&format::keep_end(&port, room), room)), style)

@@ -30,7 +30,7 @@ pub const BINDINGS: &[Binding] = &[
     Binding {
         keys: &[Press::Plain(KeyCode::Enter)],
         cmd: Cmd::Accept,
-        short: "",
+        short: "alone",
         long: "the chosen channel's curve alone, or all that have room",
     },
     Binding {
@@ -51,8 +51,18 @@ pub const BINDINGS: &[Binding] = &[
         short: "",
         long: "hold the picture, cursor to an earlier moment",
     },
-    Binding { keys: &[Press::Plain(KeyCode::Right)], cmd: Cmd::Right, short: "", long: "cursor to a later moment" },
-    Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "", long: "follow the newest row again" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Right)],
+        cmd: Cmd::Right,
+        short: "cursor",
+        long: "cursor to a later moment",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::End)],
+        cmd: Cmd::Last,
+        short: "follow",
+        long: "follow the newest row again",
+    },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('k'))],
         cmd: Cmd::Mark,
@@ -62,7 +72,7 @@ pub const BINDINGS: &[Binding] = &[
     Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
         cmd: Cmd::Restart,
-        short: "",
+        short: "restart min/max",
         long: "start minimum, maximum and mean anew",
     },
     Binding {
@@ -132,6 +142,14 @@ impl Stream {
             Cmd::Last => self.held = None,
             Cmd::Accept => self.alone = !self.alone,
             Cmd::Restart => return Some(Action::RestartExtremes),
+            // Without rows a moment is marked in the recording all the same.
+            Cmd::Mark if view.link.name.is_none() => {
+                return Some(Action::Tell("Nothing to mark: no unit is connected.".to_owned()));
+            }
+            Cmd::Export if values.channels.is_empty() && view.export.is_none() => {
+                let how = if view.can_send() { " T switches the stream on." } else { "" };
+                return Some(Action::Tell(format!("There are no rows to write to a file yet.{how}")));
+            }
             Cmd::Mark => return Some(Action::Mark),
             Cmd::Export if view.export.is_some() => return Some(Action::EndExport),
             Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportStream, view))),

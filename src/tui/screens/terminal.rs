@@ -16,7 +16,7 @@ use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::popup::{Question, Wanted};
 use crate::tui::theme::Theme;
-use crate::tui::view::Sending;
+use crate::tui::view::{Sending, View};
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
@@ -77,6 +77,10 @@ pub const BINDINGS: &[Binding] = &[
 
 /// Rows that tell of a file being sent.
 const SENDING_ROWS: u16 = 3;
+/// Rows that are kept free below what was found: the question for words has seven.
+const ROWS_BELOW_FOUND: usize = 8;
+/// Columns of a time with its milliseconds, the blank behind it included.
+const TIME_COLUMNS: usize = 13;
 /// Bytes in a row of the hex view.
 const HEX_BYTES: u64 = 16;
 
@@ -167,13 +171,13 @@ impl Terminal {
     }
 
     /// Goes to the newest line that has these words; nothing is looked for without any.
-    pub fn find(&mut self, words: String, scrollback: &Scrollback) {
+    pub fn find(&mut self, words: String, view: &View, scrollback: &Scrollback, area: Rect) {
         self.words = words.to_lowercase();
         self.found = None;
         if self.words.is_empty() {
             return self.follow();
         }
-        self.go_to_match(scrollback.end(), scrollback);
+        self.go_to_match(scrollback.end(), scrollback, body(view, area).0);
     }
 
     /// Whether words are looked for and no line has them.
@@ -182,25 +186,42 @@ impl Terminal {
     }
 
     /// Goes to the newest line before line number `before` that has the words; if there is none, nothing moves.
-    fn go_to_match(&mut self, before: u64, scrollback: &Scrollback) {
+    fn go_to_match(&mut self, before: u64, scrollback: &Scrollback, body: Rect) {
         let older = usize::try_from(before.saturating_sub(scrollback.start())).unwrap_or(usize::MAX);
         let place = scrollback.lines().take(older).rposition(|line| line.text.to_lowercase().contains(&self.words));
         if let (Some(place), false) = (place, self.words.is_empty()) {
             let number = scrollback.start() + place as u64;
             self.found = Some(number);
-            self.mode = Mode::Text((number + 1 < scrollback.end()).then_some(number + 1));
+            // What follows is in sight as well, and the question in front of it hides none of what was found.
+            let mut room = ROWS_BELOW_FOUND.min(usize::from(body.height) / 2);
+            let follows = scrollback.lines().skip(place + 1).take_while(|line| {
+                let rows = rows_of(line, usize::from(body.width), self.with_times);
+                let fits = rows <= room;
+                room = room.saturating_sub(rows);
+                fits
+            });
+            let end = number + 1 + follows.count() as u64;
+            self.mode = Mode::Text((end < scrollback.end()).then_some(end));
         }
     }
 
-    /// What a command does here; `page` is the height of the picture.
-    pub fn on(&mut self, cmd: Cmd, scrollback: &Scrollback, record: &Record, page: usize) -> Option<Action> {
-        let page = page.saturating_sub(2).max(1);
+    /// What a command does here; `area` is that of the picture.
+    pub fn on(
+        &mut self,
+        cmd: Cmd,
+        view: &View,
+        scrollback: &Scrollback,
+        record: &Record,
+        area: Rect,
+    ) -> Option<Action> {
+        let body = body(view, area).0;
+        let page = usize::from(body.height).saturating_sub(1).max(1) as i64;
         match cmd {
-            Cmd::Up => self.scroll(1, scrollback, record),
-            Cmd::Down => self.scroll(-1, scrollback, record),
-            Cmd::PageUp => self.scroll(page as i64, scrollback, record),
-            Cmd::PageDown => self.scroll(-(page as i64), scrollback, record),
-            Cmd::First => self.scroll(i64::MAX, scrollback, record),
+            Cmd::Up => self.scroll(1, scrollback, record, body),
+            Cmd::Down => self.scroll(-1, scrollback, record, body),
+            Cmd::PageUp => self.scroll(page, scrollback, record, body),
+            Cmd::PageDown => self.scroll(-page, scrollback, record, body),
+            Cmd::First => self.scroll(i64::MAX, scrollback, record, body),
             Cmd::Last => self.follow(),
             Cmd::Hex => {
                 self.mode = match self.mode {
@@ -214,7 +235,7 @@ impl Terminal {
             Cmd::Find => return Some(Action::Ask(Question::find(&self.words))),
             Cmd::FindNext => {
                 let before = self.found.unwrap_or(scrollback.end());
-                self.go_to_match(before, scrollback);
+                self.go_to_match(before, scrollback, body);
             }
             _ => {}
         }
@@ -223,15 +244,9 @@ impl Terminal {
 
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
-        let (heading, body) = lines::split(area, 1);
-        let (body, sending) = match &scene.view.sending {
-            Some(sending) => {
-                let (body, below) = lines::split(body, body.height.saturating_sub(SENDING_ROWS));
-                (body, Some((sending, below)))
-            }
-            None => (body, None),
-        };
-        if let Some((sending, below)) = sending {
+        let (heading, _) = lines::split(area, 1);
+        let (body, below) = body(scene.view, area);
+        if let Some(sending) = &scene.view.sending {
             lines::draw(frame, below, sending_rows(scene, sending, below.width));
         }
         let (name, following) = match self.mode {
@@ -262,25 +277,35 @@ impl Terminal {
         lines::draw(frame, body, rows);
     }
 
-    /// Moves by lines or rows, positive to the older ones. At the newest one the view follows again.
-    fn scroll(&mut self, up: i64, scrollback: &Scrollback, record: &Record) {
+    /// Moves by lines or rows, positive to the older ones: until the oldest is in sight, and the picture full. At the newest
+    /// one the view follows again.
+    fn scroll(&mut self, up: i64, scrollback: &Scrollback, record: &Record, body: Rect) {
         let up = up.clamp(-(1 << 40), 1 << 40);
         self.mode = match self.mode {
             Mode::Text(place) => {
-                let end = place.unwrap_or(scrollback.end()) as i64;
-                let moved = (end - up).max(scrollback.start() as i64 + 1) as u64;
+                let lowest = end_of_first_page(scrollback, body, self.with_times) as i64;
+                let end = (place.unwrap_or(scrollback.end()) as i64).max(lowest);
+                let moved = (end - up).max(lowest) as u64;
                 Mode::Text((moved < scrollback.end()).then_some(moved))
             }
             Mode::Hex(place) => {
                 let place = place.unwrap_or(HexPlace { received: record.received(), sent: record.sent(), rows: 0 });
                 let wanted = usize::try_from((place.rows as i64 + up).max(0)).unwrap_or(0);
-                // Up to the row that is wanted, and no further: there may be half a million of them.
-                let there = if up > 0 { hex(record, &place, wanted, 1).1 } else { usize::MAX };
-                let rows = wanted.min(there.saturating_sub(1));
+                // Up to the page that is wanted, and no further: there may be half a million rows.
+                let page = usize::from(body.height).max(1);
+                let there = if up > 0 { hex(record, &place, wanted, page).1 } else { usize::MAX };
+                let rows = wanted.min(there.saturating_sub(page));
                 Mode::Hex((rows > 0).then_some(HexPlace { rows, ..place }))
             }
         };
     }
+}
+
+/// Where the lines or bytes stand, and below them what is being sent.
+fn body(view: &View, area: Rect) -> (Rect, Rect) {
+    let (_, body) = lines::split(area, 1);
+    let below = if view.sending.is_some() { SENDING_ROWS } else { 0 };
+    lines::split(body, body.height.saturating_sub(below))
 }
 
 /// How far a file has come that is sent as it is.
@@ -320,15 +345,21 @@ pub fn newest_lines(scene: Scene, area: Rect) -> Vec<Line<'static>> {
 fn text_rows(scene: Scene, area: Rect, place: Option<u64>, with_times: bool, words: &str) -> Vec<Line<'static>> {
     let scrollback = scene.scrollback;
     let room = usize::from(area.height);
-    let end = place.map_or(usize::MAX, |end| end.saturating_sub(scrollback.start()) as usize);
-    let shown = end.min(scrollback.lines().len()).max(1).min(scrollback.lines().len());
-    let mut rows: Vec<Line> = Vec::new();
-    for line in scrollback.lines().take(shown).rev() {
-        let mut broken = text_line(scene, line, usize::from(area.width), with_times);
-        if !words.is_empty() && line.text.to_lowercase().contains(words) {
-            broken = broken.into_iter().map(|row| row.patch_style(scene.theme.bar())).collect();
+    let drawn = |line: &TextLine| {
+        let broken = text_line(scene, line, usize::from(area.width), with_times);
+        match !words.is_empty() && line.text.to_lowercase().contains(words) {
+            true => broken.into_iter().map(|row| row.patch_style(scene.theme.bar())).collect(),
+            false => broken,
         }
-        rows.extend(broken.into_iter().rev());
+    };
+    if place.is_some_and(|end| end <= end_of_first_page(scrollback, area, with_times)) {
+        // Above it there is not enough: the picture begins with the oldest line, and is full all the same.
+        return scrollback.lines().take(room).flat_map(drawn).take(room).collect();
+    }
+    let end = place.map_or(usize::MAX, |end| end.saturating_sub(scrollback.start()) as usize);
+    let mut rows: Vec<Line> = Vec::new();
+    for line in scrollback.lines().take(end.min(scrollback.lines().len())).rev() {
+        rows.extend(drawn(line).into_iter().rev());
         if rows.len() >= room {
             break;
         }
@@ -336,6 +367,33 @@ fn text_rows(scene: Scene, area: Rect, place: Option<u64>, with_times: bool, wor
     rows.truncate(room);
     rows.reverse();
     rows
+}
+
+/// The number behind the last line of a picture that begins with the oldest one.
+fn end_of_first_page(scrollback: &Scrollback, area: Rect, with_times: bool) -> u64 {
+    let room = usize::from(area.height);
+    let mut rows = 0;
+    let is_in_sight = |line: &&TextLine| {
+        let fits = rows < room;
+        rows += rows_of(line, usize::from(area.width), with_times);
+        fits
+    };
+    scrollback.start() + scrollback.lines().take_while(is_in_sight).count().max(1) as u64
+}
+
+/// Rows that a line takes.
+fn rows_of(line: &TextLine, columns: usize, with_times: bool) -> usize {
+    format::pieces(&line.text, text_columns(line, columns, with_times)).len()
+}
+
+/// Columns that the text of a line has beside its time and its mark.
+fn text_columns(line: &TextLine, columns: usize, with_times: bool) -> usize {
+    let mark = match line.origin {
+        Origin::Unit | Origin::Us => 2,
+        Origin::Console => 3,
+    };
+    let time = if with_times { TIME_COLUMNS } else { 0 };
+    columns.saturating_sub(time + mark).max(1)
 }
 
 fn text_line(scene: Scene, line: &TextLine, columns: usize, with_times: bool) -> Vec<Line<'static>> {
@@ -350,8 +408,7 @@ fn text_line(scene: Scene, line: &TextLine, columns: usize, with_times: bool) ->
         false => String::new(),
     };
     let indent = format::width(&time) + format::width(mark);
-    let room = columns.saturating_sub(indent).max(1);
-    let pieces = format::pieces(&line.text, room);
+    let pieces = format::pieces(&line.text, text_columns(line, columns, with_times));
     let first = |piece: &String| {
         vec![
             Span::styled(time.clone(), theme.quiet()),

@@ -1,6 +1,8 @@
 //! What the console makes of values: in files, with their age, in physical units, and what it counts as text.
 
 use axcon::emulator::NmtCommand;
+use axcon::emulator::scenario::Verb;
+use axcon::tui::ORDERS;
 
 use super::*;
 
@@ -82,4 +84,36 @@ fn a_threshold_is_shown_in_degrees_and_found_by_either_number() {
     desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("a.csv").press(KeyCode::Enter);
     let text = String::from_utf8_lossy(&desk.files[Path::new("a.csv")]).into_owned();
     assert!(text.contains("-155,") && !text.contains("-15.5"), "{text}");
+}
+
+#[test]
+fn every_order_that_the_bench_shows_is_one_that_the_emulator_takes() {
+    for product in Product::all() {
+        for order in ORDERS.iter().flat_map(|(orders, _)| *orders) {
+            if let Err(error) = Verb::read(order, product) {
+                panic!("{}: {order}: {error}", product.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_bench_of_a_unit_without_power_or_in_its_loader_shows_no_old_value_as_live() {
+    let mut desk = Desk::new();
+    desk.keys("t500").press(KeyCode::Enter);
+    desk.wait_for("every 500 ms");
+    desk.run(Duration::from_secs(3)).keys("9");
+    let live = desk.picture();
+    assert!(live.contains("newest row") && !live.contains("old"), "{live}");
+    let now = desk.now;
+    desk.unit.unit_mut().power_off(now);
+    let old = desk.wait_for("these values are old");
+    assert!(old.contains("old: ok"), "{old}");
+    let now = desk.now;
+    desk.unit.unit_mut().power_on(now);
+    desk.run(Duration::from_secs(5));
+    assert!(!desk.picture().contains("old"), "{}", desk.picture());
+    desk.keys("3lAXIO-2010").press(KeyCode::Enter).run(Duration::from_secs(10));
+    desk.key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("9");
+    assert!(desk.picture().contains("old: ok"), "{}", desk.picture());
 }

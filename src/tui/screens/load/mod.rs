@@ -85,15 +85,15 @@ const ESC: &[Press] = &[Press::Plain(KeyCode::Esc)];
 const FINDINGS: Binding = footer(&[Press::Plain(KeyCode::Down)], Cmd::Down, "findings");
 const AGAIN: Binding = footer(&[Press::Plain(KeyCode::Char('r'))], Cmd::Refresh, "read again");
 const PACK: Binding = footer(&[Press::Plain(KeyCode::Char('k'))], Cmd::Pack, "pack");
+const UNPACK: Binding = footer(&[Press::Plain(KeyCode::Char('k'))], Cmd::Pack, "packed: on");
+const LOADER: Binding = footer(&[Press::Plain(KeyCode::Char('g'))], Cmd::Loader, "loader");
+const START: Binding = footer(ENTER, Cmd::Accept, "start");
+const OVERRIDE: Binding = footer(&[Press::Plain(KeyCode::Char('o'))], Cmd::Allow, "override");
 const OTHER: Binding = footer(ESC, Cmd::Back, "other file");
 
 /// What the footer shows at each stage; the keys themselves are those of [`BINDINGS`].
 const CHECKING_KEYS: &[Binding] = &[OTHER];
-const REPORT_KEYS: &[Binding] = &[FINDINGS, OTHER, AGAIN];
-const REFUSED_KEYS: &[Binding] =
-    &[FINDINGS, OTHER, AGAIN, footer(&[Press::Plain(KeyCode::Char('o'))], Cmd::Allow, "override")];
-const READY_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), PACK, OTHER, AGAIN];
-const READY_KEYS_WITH_FINDINGS: &[Binding] = &[footer(ENTER, Cmd::Accept, "start"), PACK, FINDINGS, OTHER];
+const REPORT_KEYS: &[Binding] = &[OVERRIDE, START, PACK, LOADER, FINDINGS, OTHER, AGAIN];
 const RUNNING_KEYS: &[Binding] = &[footer(ESC, Cmd::Back, "cancel")];
 const VERDICT_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "close the report")];
 
@@ -118,8 +118,12 @@ pub struct Load {
 #[derive(Debug)]
 enum Stage {
     Picking,
+    /// A file is being read and checked.
     Checking(PathBuf),
-    Report { facts: Box<ImageFacts>, scrolled: usize },
+    Report {
+        facts: Box<ImageFacts>,
+        scrolled: usize,
+    },
 }
 
 impl Load {
@@ -141,7 +145,7 @@ impl Load {
 
     /// A folder has been read. One that was typed as if it were a file is opened.
     pub fn listed(&mut self, directory: PathBuf, entries: Result<Vec<FileEntry>, String>) {
-        if matches!(&self.stage, Stage::Checking(path) if *path == directory) {
+        if self.is_checking(&directory) {
             self.stage = Stage::Picking;
         }
         self.picker.listed(directory, entries);
@@ -177,9 +181,23 @@ impl Load {
 
     /// A file has been checked. An answer to an older question is not wanted any more.
     pub fn checked(&mut self, facts: Box<ImageFacts>) {
-        if matches!(&self.stage, Stage::Checking(path) if *path == facts.path) {
+        if self.is_checking(&facts.path) {
             self.stage = Stage::Report { facts, scrolled: 0 };
         }
+    }
+
+    /// Whether this file is being read.
+    pub fn is_checking(&self, path: &Path) -> bool {
+        matches!(&self.stage, Stage::Checking(of) if of == path)
+    }
+
+    /// There is nothing to check: another file has to be chosen. Says whether anybody has waited for it.
+    pub fn unreadable(&mut self, path: &Path) -> bool {
+        let is_awaited = self.is_checking(path);
+        if is_awaited {
+            self.stage = Stage::Picking;
+        }
+        is_awaited
     }
 
     /// The image the report is about.
@@ -229,9 +247,7 @@ impl Load {
 
     /// Checks a file. What was allowed in another one is not allowed in it.
     pub fn check(&mut self, path: PathBuf) -> Action {
-        if self.image().is_none_or(|facts| facts.path != path)
-            && !matches!(&self.stage, Stage::Checking(of) if *of == path)
-        {
+        if self.image().is_none_or(|facts| facts.path != path) && !self.is_checking(&path) {
             self.allow.clear();
         }
         self.stage = Stage::Checking(path.clone());
@@ -295,23 +311,28 @@ impl Load {
     }
 
     /// The keys that mean something now, for the footer.
-    pub fn footer(&self, view: &View) -> &'static [Binding] {
+    pub fn footer(&self, view: &View) -> Vec<Binding> {
         if view.job == Some(Job::Load) {
-            return RUNNING_KEYS;
+            return RUNNING_KEYS.to_vec();
         }
         if view.load.report.is_some() {
-            return VERDICT_KEYS;
+            return VERDICT_KEYS.to_vec();
         }
-        match &self.stage {
-            Stage::Picking => BINDINGS,
-            Stage::Checking(_) => CHECKING_KEYS,
-            Stage::Report { facts, .. } if objections(facts, view).is_empty() => match facts.defects.is_empty() {
-                true => READY_KEYS,
-                false => READY_KEYS_WITH_FINDINGS,
-            },
-            Stage::Report { facts, .. } if !facts.errors.is_empty() => REFUSED_KEYS,
-            Stage::Report { .. } => REPORT_KEYS,
-        }
+        let facts = match &self.stage {
+            Stage::Picking => return BINDINGS.to_vec(),
+            Stage::Checking(_) => return CHECKING_KEYS.to_vec(),
+            Stage::Report { facts, .. } => facts,
+        };
+        let can_start = objections(facts, view).is_empty();
+        let has_place = |binding: &Binding| match binding.cmd {
+            Cmd::Accept => can_start,
+            Cmd::Pack => facts.ok,
+            Cmd::Allow => !facts.errors.is_empty(),
+            Cmd::Down => !facts.defects.is_empty(),
+            _ => true,
+        };
+        let shown = |binding: Binding| if binding.cmd == Cmd::Pack && self.packed { UNPACK } else { binding };
+        REPORT_KEYS.iter().copied().filter(has_place).map(shown).collect()
     }
 
     /// The picture.

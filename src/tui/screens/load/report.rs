@@ -26,7 +26,9 @@ const PLAN_STEPS: usize = 4;
 /// What stands against sending this image now, one sentence each.
 pub(super) fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
     let mut against = Vec::new();
-    if !facts.ok || facts.checked.is_none() {
+    if facts.is_nameless() {
+        against.push("the file does not say what it is. O sends it all the same.".to_owned());
+    } else if !facts.ok || facts.checked.is_none() {
         against.push("the file has errors and must not be sent.".to_owned());
     }
     if !view.can_send() {
@@ -64,11 +66,7 @@ pub(super) fn report(
     let mut rows = vec![
         lines::rule(theme, area.width, "Image", &file_name(&facts.path)),
         lines::labelled(theme, "Software", format!("{product}{version}")),
-        lines::labelled(
-            theme,
-            "To send",
-            format!("{} records, {} characters", format::grouped(facts.records), format::grouped(facts.characters)),
-        ),
+        lines::labelled(theme, "To send", to_send(facts, packed)),
         lines::labelled(theme, "Check", check_word(theme, facts)),
         loader_line(theme, facts, loader),
     ];
@@ -86,6 +84,16 @@ pub(super) fn report(
     rows
 }
 
+/// What will be sent: the file's own records, or the same words in long ones.
+fn to_send(facts: &ImageFacts, packed: bool) -> String {
+    let (records, characters) = if packed && facts.ok { facts.packed } else { (facts.records, facts.characters) };
+    let told = format!("{} records, {} characters", format::grouped(records), format::grouped(characters));
+    match packed {
+        true if facts.ok => format!("{told}, packed from {}", format::grouped(facts.characters)),
+        _ => told,
+    }
+}
+
 /// Which loader the unit has, and who says so.
 fn loader_line(theme: Theme, facts: &ImageFacts, chosen: Option<LoaderKind>) -> Line<'static> {
     let believed = facts.product.as_deref().and_then(Product::named);
@@ -96,7 +104,7 @@ fn loader_line(theme: Theme, facts: &ImageFacts, chosen: Option<LoaderKind>) -> 
     };
     let mut line = lines::labelled(theme, "Loader", text);
     line.push_span(Span::styled("G", theme.key()));
-    line.push_span(Span::raw(" says another"));
+    line.push_span(Span::raw(" if the unit has another"));
     line
 }
 
@@ -138,6 +146,9 @@ fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
             Span::styled(format!("passed in spite of {}{findings}", names.join(", ")), theme.warning())
         }
         true => Span::styled(format!("passed{findings}"), theme.good()),
+        false if facts.is_nameless() => {
+            Span::styled(format!("passed as a file, but it has no name{findings}"), theme.warning())
+        }
         false => Span::styled(format!("failed{findings}"), theme.bad()),
     }
 }
@@ -162,7 +173,9 @@ fn plan(scene: Scene, facts: &ImageFacts, packed: bool, columns: u16) -> Vec<Lin
             },
             match packed {
                 false => format!("Send {sent} characters: some {time} with what the loader needs."),
-                true => format!("Send fewer than {sent} characters, in long records: less than {time}."),
+                true => {
+                    format!("Send {} characters, in long records: less than {time}.", format::grouped(facts.packed.1))
+                }
             },
             format!("Wait for the banner of the new software: it must {expected}."),
         ];

@@ -1,0 +1,225 @@
+//! What is shown where there is much room, little, or too little.
+
+use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
+
+use super::stage::*;
+use crate::time::Duration;
+use crate::tui::{Effect, Input, RecordingEntry};
+
+/// The terminal with a hundred lines, each with its number.
+fn hundred_lines() -> Stage {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0");
+    for number in 0..100 {
+        stage.bytes(format!("line {number:02} of them\r\n").as_bytes());
+    }
+    stage.keys("3");
+    stage
+}
+
+/// Rows of the screen with a line of the unit in them.
+fn lines_in(stage: &Stage) -> Vec<String> {
+    let picture = stage.picture();
+    let words = |line: &str| line.contains(" of them").then(|| line.trim().to_owned());
+    picture.lines().filter_map(words).collect()
+}
+
+#[test]
+fn the_oldest_lines_fill_the_terminal_and_so_do_those_around_what_is_found() {
+    let mut stage = hundred_lines();
+    let all = lines_in(&stage).len();
+    stage.press(KeyCode::Home);
+    let oldest = lines_in(&stage);
+    assert!(oldest.len() + 2 >= all && oldest[0] == "line 00 of them", "{}", stage.picture());
+    assert!(stage.shows("stopped"), "{}", stage.picture());
+    stage.press(KeyCode::Up);
+    assert_eq!(lines_in(&stage), oldest, "there is nothing above");
+    stage.press(KeyCode::Down);
+    assert_ne!(lines_in(&stage).last(), oldest.last(), "every key moves the picture");
+    stage.prefix().keys("/line 03").press(KeyCode::Enter);
+    assert_eq!(lines_in(&stage), oldest, "what follows is in sight: {}", stage.picture());
+    stage.prefix().keys("/").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("line 50");
+    let picture = stage.picture();
+    assert!(
+        picture.contains("line 50 of them") && picture.contains("line 51 of them"),
+        "above the question: {picture}"
+    );
+    stage.press(KeyCode::Enter).prefix().keys("h").press(KeyCode::Home);
+    let rows = stage.picture().lines().filter(|line| line.starts_with("  000000")).count();
+    assert!(rows > 15 && stage.shows("00000000  6"), "bytes fill it as well: {}", stage.picture());
+    // What fits as a whole is followed.
+    let mut stage = Stage::connected(LARGE);
+    stage.keys("3").press(KeyCode::Home);
+    assert!(stage.shows("follows"), "{}", stage.picture());
+}
+
+#[test]
+fn lines_that_are_broken_fill_the_terminal_from_the_first_piece_on() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0").bytes(b"first\r\n");
+    for number in 0..30 {
+        stage.bytes(format!("{number:02}{}\r\n", "x".repeat(200)).as_bytes());
+    }
+    stage.keys("3").press(KeyCode::Home);
+    assert!(stage.shows("connected to /dev/ttyUSB0") && stage.shows("first"), "{}", stage.picture());
+    let rows = stage.picture().lines().filter(|line| line.contains("xxx")).count();
+    assert!(rows > 14 && stage.shows("04xx") && !stage.shows("06xx"), "{}", stage.picture());
+}
+
+#[test]
+fn no_key_does_anything_unseen_but_q_and_that_is_asked_about_in_sight() {
+    let mut stage = Stage::connected(SMALL);
+    stage.resized((60, 10)).asked();
+    stage.keys("tvsdl").press(KeyCode::Enter).press(KeyCode::F(1)).keys("3x");
+    stage.input(Input::Terminal(TerminalEvent::Paste("Yes".into())));
+    assert_eq!(stage.asked(), []);
+    stage.resized(SMALL);
+    assert!(stage.shows("── Unit") && !stage.shows("╭"), "nothing has happened: {}", stage.picture());
+    // What stood there stays, and no letter gets into it.
+    stage.keys("d").resized((60, 10)).keys("Yes").press(KeyCode::Enter).press(KeyCode::Esc);
+    stage.resized(SMALL);
+    assert!(stage.shows("Type Yes") && !stage.shows("› Yes") && stage.sent().is_empty(), "{}", stage.picture());
+    stage.resized((60, 10)).keys("q");
+    assert_eq!(stage.asked(), [Effect::Quit]);
+    // In the middle of an upload it is asked, whatever the size.
+    let mut stage = Stage::loading(SMALL);
+    stage.resized((40, 8)).asked();
+    stage.keys("q");
+    assert!(stage.shows("Leave axcon? Y leaves, N stays."), "{}", stage.picture());
+    stage.press(KeyCode::Enter).keys("x");
+    assert!(stage.asked().is_empty() && stage.shows("Leave axcon?"), "{}", stage.picture());
+    stage.keys("n");
+    assert!(!stage.shows("Leave axcon?"), "{}", stage.picture());
+    stage.keys("qy").wait(2000);
+    assert!(stage.effects.contains(&Effect::Quit));
+    // On the terminal as well: no letter goes to the unit unseen.
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").resized((60, 10)).asked();
+    stage.keys("dl");
+    assert_eq!(stage.asked(), []);
+    stage.keys("q");
+    assert_eq!(stage.asked(), [Effect::Quit]);
+}
+
+#[test]
+fn a_page_of_diagnostics_keeps_its_rows_whole_and_says_how_many_numbers_stand_below() {
+    for size in [SMALL, (140, 40), LARGE] {
+        let mut stage = Stage::connected(size);
+        stage.keys("s").wait(2000).bytes(&page_of_eight()).wait(1500);
+        let whole = |line: &str| line.contains("RTD2 ") && line.contains("status 0x00");
+        assert!(stage.picture().lines().any(whole), "{size:?}: {}", stage.picture());
+        assert!(stage.shows("RTD2 temperature") && stage.shows("RTD1 resistance  "), "{}", stage.picture());
+        let mut seen = stage.picture();
+        for _ in 0..30 {
+            stage.press(KeyCode::Down);
+            seen.push_str(&stage.picture());
+        }
+        assert!(seen.contains("RTD8 resistance") && seen.contains("Active Errors   "), "all can be reached: {seen}");
+        assert!(!stage.shows("─ ↓ ") && !stage.shows("and ↓"), "the end: {}", stage.picture());
+        assert!(seen.contains("─ ↓ ") || size != SMALL, "{size:?}: {seen}");
+    }
+}
+
+#[test]
+fn averages_and_states_are_said_in_full_or_not_at_all() {
+    for columns in [140, 150, 200] {
+        let mut stage = Stage::with_dictionary((columns, 40)).with_rows();
+        stage.keys("2");
+        let picture = stage.picture();
+        let line = picture.lines().find(|line| line.contains("Averages in °C")).expect("the line");
+        assert!(line.contains("Bank 1") && line.contains("138.5") && line.contains("All 140.5"), "{columns}: {line}");
+    }
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("s").wait(2000).bytes(b"Supply 24.1 V\r\nCAN State   Pre-Operational\r\n").wait(1500).keys("2");
+    let picture = stage.picture();
+    let line = picture.lines().find(|line| line.contains("CANopen")).expect("the line");
+    let state = line.split("CANopen").nth(1).unwrap_or_default();
+    assert!(state.contains("pre-operational") && (!state.contains('(') || state.ends_with(')')), "{line}");
+}
+
+#[test]
+fn an_answer_of_the_bench_is_read_to_its_end_at_80_columns() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("emu:axtc4co").keys("9/set 1 temperature 9999").press(KeyCode::Enter);
+    let why = "column 19: a temperature cannot be 9999; it is between -270 and 1820 in °C here";
+    stage.input(Input::Ordered { line: "set 1 temperature 9999".into(), answer: Err(why.into()) });
+    let picture = stage.picture();
+    for word in why.split(' ') {
+        assert!(picture.contains(word), "no '{word}': {picture}");
+    }
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("9");
+    assert!(stage.shows("in your") && stage.shows("hands."), "{}", stage.picture());
+}
+
+#[test]
+fn the_footer_names_as_many_keys_as_have_room_and_always_the_way_out() {
+    let footer = |stage: &Stage| stage.picture().lines().last().unwrap_or_default().to_owned();
+    let mut small = Stage::streaming(SMALL);
+    let mut large = Stage::streaming(LARGE);
+    small.keys("6");
+    large.keys("6");
+    for words in ["Enter alone", "←→ cursor", "End follow", "R restart", "Q quit"] {
+        assert!(footer(&large).contains(words), "{words}: {}", footer(&large));
+    }
+    assert!(footer(&small).ends_with("F1 help  Q quit"), "{}", footer(&small));
+    let large = Stage::connected(LARGE).with_image(good_image());
+    assert!(footer(&large).contains("G loader") && footer(&large).contains("R read again"), "{}", footer(&large));
+    let mut bench = Stage::with_ports(SMALL);
+    bench.press(KeyCode::Enter).opened("emu:axtc4co").keys("9");
+    assert!(footer(&bench).contains("O open") && footer(&bench).ends_with("Q quit"), "{}", footer(&bench));
+    for size in [SMALL, LARGE] {
+        let mut terminal = Stage::connected(size);
+        terminal.keys("3");
+        assert!(footer(&terminal).ends_with("F1 help  Q quit"), "{}", footer(&terminal));
+    }
+    bench.click("Q quit");
+    assert!(bench.asked().contains(&Effect::Quit), "a click finds it where it is");
+}
+
+#[test]
+fn a_recording_s_name_stays_in_one_piece_and_the_one_being_written_is_called_that() {
+    let name = "2026-01-31T12-00-00.cast";
+    let entry = |path: String| RecordingEntry {
+        link: format!("replay:{path}"),
+        begun: "2026-01-31 12:00:00".into(),
+        port: "/dev/ttyUSB0".into(),
+        part: 1,
+        length: Some(Duration::from_secs(1)),
+        bytes: 99,
+    };
+    let mut stage = Stage::connected(SMALL);
+    let written = link_info("x").recording.expect("one");
+    let long = format!("/home/{}/{name}", "a".repeat(47));
+    stage.keys("8").input(Input::RecordingsListed(Ok(vec![entry(long), entry(written)])));
+    let picture = stage.picture();
+    assert!(picture.contains(name), "{picture}");
+    let rows: Vec<&str> = picture.lines().filter(|line| line.contains("ttyUSB0") && line.contains("2026")).collect();
+    assert!(!rows[0].contains("being written") && rows[1].contains("being written"), "{picture}");
+}
+
+#[test]
+fn the_dictionary_gives_what_it_does_not_need_to_what_explains() {
+    let blanks = |columns: u16| {
+        let mut stage = Stage::with_dictionary((columns, 40));
+        stage.press(KeyCode::End);
+        let picture = stage.picture();
+        let heads = picture.lines().find(|line| line.contains("Address  Name")).expect("the headings").to_owned();
+        heads.find("Value").unwrap_or_default() - heads.find("Name").unwrap_or_default()
+    };
+    assert!(blanks(300) <= blanks(200) + 4 && blanks(200) < 75, "{} {}", blanks(300), blanks(200));
+    let mut stage = Stage::with_dictionary(LARGE);
+    stage.keys("/4000");
+    assert!(stage.picture().lines().any(|line| line.contains("100.0 °C") && line.contains("-20.0 °C")));
+}
+
+#[test]
+fn help_says_that_more_follows_and_keeps_keys_apart_from_what_they_do() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("4").press(KeyCode::F(1));
+    assert!(stage.shows("more lines below") && stage.shows("Esc or Backspace folder above"), "{}", stage.picture());
+    for _ in 0..60 {
+        stage.press(KeyCode::Down);
+    }
+    assert!(stage.shows("lines above") && !stage.shows("below"), "{}", stage.picture());
+}

@@ -1,0 +1,171 @@
+//! What is said to the user: what is old, what is not there, what cannot be done and why.
+
+use ratatui::crossterm::event::{KeyCode, KeyModifiers};
+
+use super::stage::*;
+use crate::device::Product;
+use crate::dump::Dump;
+use crate::image::DefectId;
+use crate::session::{Event, Facts, UnitState};
+use crate::tui::popup::ORDERS;
+use crate::tui::{Effect, Input, LinkInfo};
+
+/// Connected to an emulated unit that streams.
+fn on_the_bench() -> Stage {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("emu:axtc4co").bytes(BANNER).bytes(MENU).wait(3000);
+    let mut stage = stage.with_rows();
+    stage.keys("9");
+    stage
+}
+
+#[test]
+fn the_bench_calls_values_old_as_the_other_screens_do() {
+    let mut stage = on_the_bench();
+    assert!(stage.shows("newest row 12:01:33") && !stage.shows("old"), "{}", stage.picture());
+    stage.wait(10_000);
+    assert!(stage.shows("No new row: these values are old.") && stage.shows("old: ok"), "{}", stage.picture());
+    let mut stage = on_the_bench();
+    stage.fold_with(Event::FactsChanged, &Facts { state: UnitState::Loader, ..Facts::default() });
+    assert!(stage.shows("waits in its loader: these are its last values") && stage.shows("old: open"));
+}
+
+#[test]
+fn a_path_of_nothing_is_told_where_it_was_typed_and_can_be_mended() {
+    let mut stage = Stage::connected(SMALL).picking();
+    stage.keys("pnew.S").press(KeyCode::Enter).asked();
+    let unreadable = |why: &str| Input::ImageUnreadable { path: "/home/service/images/new.S".into(), why: why.into() };
+    stage.input(unreadable("there is no such file"));
+    let picture = stage.picture();
+    assert!(picture.contains("There is no such file: /home/service/images/new.S"), "{picture}");
+    assert!(picture.contains("› new.S") && !picture.contains("Software  "), "the box is still open: {picture}");
+    stage.press(KeyCode::Backspace).keys("s19");
+    assert!(!stage.shows("There is no such file"), "{}", stage.picture());
+    stage.press(KeyCode::Enter);
+    let path = "/home/service/images/new.s19".into();
+    assert_eq!(stage.asked(), [Effect::CheckImage { path, loader: None, allow: Vec::new() }]);
+    stage.input(unreadable("nobody waits for that any more"));
+    assert!(!stage.shows("Nobody waits"), "{}", stage.picture());
+    // One that was chosen and cannot be read.
+    let mut stage = Stage::connected(SMALL).picking();
+    stage.click("AXTC4CO_V1.1.0").click("AXTC4CO_V1.1.0");
+    let path = "/home/service/images/AXTC4CO_V1.1.0.elf.S".into();
+    stage.input(Input::ImageUnreadable { path, why: "it may not be read".into() });
+    assert!(stage.shows("It may not be read: /home") && stage.shows("Not read"), "{}", stage.picture());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("Choose a file"), "{}", stage.picture());
+}
+
+#[test]
+fn the_order_box_says_what_there_is_and_so_does_help() {
+    let mut stage = on_the_bench();
+    stage.keys("/").asked();
+    for (orders, does) in ORDERS {
+        assert!(stage.shows(&orders.join(", ")) && stage.shows(does), "{orders:?}: {}", stage.picture());
+    }
+    stage.keys("Help").press(KeyCode::Enter);
+    assert!(stage.shows("They stand above") && stage.shows("Enter do it"), "{}", stage.picture());
+    assert_eq!(stage.asked(), []);
+    stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("heal").press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::Order("heal".into())]);
+}
+
+#[test]
+fn a_key_is_named_as_it_is_pressed_on_the_terminal() {
+    let mut stage = Stage::new(SMALL);
+    stage.keys("3m");
+    assert!(stage.shows("Press Ctrl-] 1 to choose a link."), "{}", stage.picture());
+    stage.prefix().keys("1m");
+    assert!(stage.shows("Press 1 to choose a link."), "{}", stage.picture());
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").lost().keys("m");
+    assert!(stage.shows("Press Ctrl-] C to connect") && stage.shows("Ctrl-] 1 lists links."), "{}", stage.picture());
+}
+
+#[test]
+fn v_reads_no_dictionary_where_no_unit_is() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.keys("5");
+    assert!(stage.shows("Not connected: press 1") && !stage.shows("V reads"), "{}", stage.picture());
+    stage.keys("e");
+    assert!(stage.shows("Nothing has been read. Not connected"), "{}", stage.picture());
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("5");
+    assert!(stage.shows("V reads the unit's") && stage.shows("V reads it"), "{}", stage.picture());
+    stage.keys("w");
+    assert!(stage.shows("Nothing has been read yet: V reads"), "{}", stage.picture());
+    stage.lost();
+    assert!(!stage.shows("V reads it") && stage.shows("C connects again"), "{}", stage.picture());
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter);
+    stage.input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") })).bytes(BANNER).keys("5");
+    assert!(!stage.shows("V reads") && stage.shows("read it in this recording"), "{}", stage.picture());
+}
+
+#[test]
+fn a_file_without_a_name_is_sound_named_once_and_goes_if_the_user_answers_for_it() {
+    let facts = nameless_image(&[]);
+    assert_eq!(facts.defects.iter().filter(|text| text.contains("no-identity")).count(), 1, "{:?}", facts.defects);
+    let mut stage = Stage::connected(SMALL).with_image(facts);
+    assert!(stage.shows("passed as a file, but it has no name, one finding"), "{}", stage.picture());
+    assert!(
+        stage.shows("does not say what it is. O sends it all the same.") && stage.shows("O override"),
+        "{}",
+        stage.picture()
+    );
+    stage.keys("ono-identity").press(KeyCode::Enter);
+    let allowed = nameless_image(&[DefectId::NoIdentity]);
+    stage.input(Input::ImageChecked(Box::new(allowed)));
+    assert!(stage.shows("passed in spite of no-identity") && stage.shows("Enter start"), "{}", stage.picture());
+}
+
+#[test]
+fn a_dump_of_another_product_is_called_that() {
+    let mut stage = Stage::with_dictionary(SMALL);
+    for (product, is_other) in [("AXRTD8CO", true), ("AXTC4CO", false)] {
+        let dump = Dump::factory(Product::named(product).expect("built in"));
+        stage.input(Input::FileRead { path: "d1.json".into(), text: Ok(dump.json()) });
+        assert_eq!(
+            stage.shows("d1.json is of another product, an AXRTD8CO; this unit is"),
+            is_other,
+            "{}",
+            stage.picture()
+        );
+        assert_eq!(stage.shows("dump of an AXRTD8CO"), is_other, "also when the word has gone: {}", stage.picture());
+        assert!(stage.shows("  d1.json has"), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn keys_that_do_nothing_now_are_not_offered_and_say_why() {
+    let mut stage = Stage::with_ports(SMALL);
+    assert!(!stage.shows("X close"), "{}", stage.picture());
+    for (keys, offered, why) in [
+        ("x", "X close", "No link is open."),
+        ("6k", "K mark", "Nothing to mark: no unit is connected."),
+        ("6e", "E export", "There are no rows to write to a file yet."),
+        ("5w", "W with", "Nothing has been read."),
+        ("8 ", "Space pause", "Nothing is being played."),
+        ("9o", "O open", "No emulated unit is connected"),
+    ] {
+        stage.keys(keys);
+        assert!(!stage.shows(offered) && stage.shows(why), "{keys}: {}", stage.picture());
+    }
+    let mut stage = Stage::streaming(SMALL);
+    for (keys, offered) in [("1", "X close"), ("6", "K mark"), ("6", "E export")] {
+        stage.keys(keys);
+        assert!(stage.shows(offered), "{}", stage.picture());
+    }
+    let stage = Stage::with_ports(SMALL).with_image(good_image());
+    assert!(!stage.shows("findings"), "{}", stage.picture());
+}
+
+#[test]
+fn packed_records_are_counted_before_they_are_sent() {
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    assert!(stage.shows("3,074 records, 242,742 characters") && stage.shows("K pack "), "{}", stage.picture());
+    stage.keys("k");
+    let picture = stage.picture();
+    assert!(picture.contains("packed from 242,742") && picture.contains("K packed: on"), "{picture}");
+    assert!(!picture.contains("3,074 records"), "{picture}");
+}
