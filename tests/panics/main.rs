@@ -85,9 +85,9 @@ mod story {
         screen.wait("Serial ports");
         screen.keys("l");
         screen.wait("Choose a file");
-        screen.keys("pnew.S\r");
+        screen.keys("pCargo.toml\r");
         assert_eq!(screen.wait_end(), PANICKED, "half a program must not go on: {}", screen.text());
-        is_told(&screen, "new.S is no image, said by a worker");
+        is_told(&screen, "Cargo.toml is no image, said by a worker");
     }
 
     /// The terminal is the shell's again, and the panic stands on it: whole, and each line at the left edge, which raw mode
