@@ -8,7 +8,7 @@ use super::job::{Desk, Signal, Work};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
-use crate::wire::{Message, Prompt, SourceKeys, Text};
+use crate::wire::{Message, Prompt, SourceKeys, Text, visible};
 
 /// How long a unit may take to ask or to answer.
 const ANSWER: Duration = Duration::from_millis(1500);
@@ -74,12 +74,16 @@ impl StreamOn {
             }
             (OnStage::Source { .. } | OnStage::Toggled, Message::Prompt(Prompt::Period)) => {
                 desk.send(format!("{}\r", self.period.as_millis()).as_bytes());
-                self.question = Some(text.text.trim().to_owned());
+                self.question = Some(visible::line(text.text.trim().as_bytes()));
                 self.stage = OnStage::Period { again: false };
                 self.deadline = Some(desk.now + TAKEN);
             }
             (OnStage::Period { .. }, Message::Prompt(Prompt::Period)) => {
                 self.stage = OnStage::Period { again: true };
+            }
+            (OnStage::Row, Message::Prompt(Prompt::Period)) => {
+                desk.leave_dialogue();
+                return Some(self.refused(desk));
             }
             (OnStage::Toggled, Message::Prompt(_)) => return Some(self.give_up(desk)),
             (OnStage::Toggled, Message::Row(_)) => {}
