@@ -557,6 +557,30 @@ mod tests {
     }
 
     #[test]
+    fn each_end_of_an_upload_has_advice_that_fits_it() {
+        let advice = |report: LoadReport| report.advice().split([':', ';']).next().unwrap_or_default().to_owned();
+        let refused = || report(Verdict::Refused, UnitNow::Application, 0);
+        assert_eq!(
+            advice(LoadReport { product: None, ..refused() }),
+            "look at the label of the unit and say which product it is"
+        );
+        let older = LoadReport { misfit: Some(DefectId::Downgrade), ..refused() };
+        assert!(older.advice().contains("take newer software"), "{}", older.advice());
+        assert!(refused().advice().contains("made for this unit"), "{}", refused().advice());
+        let waits = |records, phase, found_in_loader| {
+            LoadReport { phase, found_in_loader, ..report(Verdict::Failed, UnitNow::Loader, records) }.advice()
+        };
+        assert!(waits(0, Phase::Transfer, true).contains("as it was found"));
+        assert!(waits(0, Phase::Transfer, false).contains("with the software it had"));
+        assert!(waits(3074, Phase::Finish, false).contains("send a file that is made for it"));
+        for (records, phase, found) in
+            [(1, Phase::Transfer, true), (3073, Phase::Finish, false), (3074, Phase::Transfer, false)]
+        {
+            assert!(waits(records, phase, found).contains("no complete software"), "{records} {phase:?}");
+        }
+    }
+
+    #[test]
     fn the_time_left_counts_from_the_first_data_and_not_from_the_erasing_before_it() {
         let mut progress = Progress {
             phase: Phase::Transfer,

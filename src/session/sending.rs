@@ -49,6 +49,9 @@ impl SendFile {
         let end = self.bytes.len().min(self.handed + room);
         desk.typed.extend_from_slice(&self.bytes[self.handed..end]);
         self.handed = end;
+        // The line asks for more as long as something waits; when the last piece has left nobody says so.
+        let waiting = desk.transmitter.waiting() + desk.typed.len();
+        self.deadline = desk.transmitter.held_since().is_none().then(|| desk.now + desk.transmitter.time_for(waiting));
         None
     }
 

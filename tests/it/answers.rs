@@ -2,7 +2,7 @@
 //! the session but its own deadlines, so a wait that does not end by itself shows here and nowhere else.
 
 use axcon::endpoint::Endpoint;
-use axcon::session::{Command, Event, Job, LoadReport, Outcome, Phase, Session, UnitNow, Verdict};
+use axcon::session::{Command, Event, FileEnd, Job, LoadReport, Outcome, Phase, Refusal, Session, UnitNow, Verdict};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::stream::Source;
@@ -218,6 +218,85 @@ fn a_slow_stream_counts_as_on_once_its_time_is_taken_and_a_refused_time_is_told_
     let (outcome, _) = alone.ask(slow());
     assert!(matches!(outcome, Outcome::NoAnswer { awaited: "a row of the stream", .. }), "{outcome:?}");
     assert_eq!(alone.session.facts().stream, None);
+}
+
+#[test]
+fn a_dialogue_that_is_cancelled_is_left_with_enter_and_one_that_is_over_is_not() {
+    let cancelled = |command: Command, script: &[(&'static str, u64, &'static str)], behind: &str| {
+        let mut alone = Alone::with(script);
+        alone.session.command(alone.now, command).expect("it is free");
+        alone.take_sent(Instant::ZERO);
+        while !alone.log().contains(behind) {
+            alone.step();
+            alone.take_sent(Instant::ZERO);
+        }
+        alone.session.command(alone.now, Command::Cancel).expect("always");
+        let (outcome, _) = alone.end(Instant::ZERO);
+        (
+            outcome,
+            alone.log().split(' ').next_back().unwrap_or_default().split(':').nth(1).unwrap_or_default().to_owned(),
+        )
+    };
+    let defaults = [("d", 3, "Enter Yes to restore the default object dictionary: ")];
+    let stream =
+        [("t", 5, "F - field value, P - process value: "), ("f", 5, "Every how many ms? "), ("200~", 5, "OK\r\n")];
+    let table = [
+        (on(), &[][..], ":t", Job::StreamOn, "~"),
+        (on(), &stream, ":f", Job::StreamOn, "~"),
+        (on(), &stream, ":200~", Job::StreamOn, "200~"),
+        (Command::StreamOff, &[], ":t", Job::StreamOff, "~"),
+        (Command::RestoreDefaults, &defaults, ":d", Job::RestoreDefaults, "~"),
+        (Command::RestoreDefaults, &defaults, ":Yes~", Job::RestoreDefaults, "Yes~"),
+    ];
+    for (command, script, behind, job, last) in table {
+        assert_eq!(cancelled(command, script, behind), (Outcome::Cancelled(job), last.to_owned()), "{job:?} {behind}");
+    }
+}
+
+#[test]
+fn a_question_that_nobody_expects_is_left_and_a_refusal_is_one() {
+    // Somebody has left L open.
+    let mut alone = Alone::with(&[("t", 5, "Password: ")]);
+    let (outcome, _) = alone.ask(on());
+    assert!(
+        matches!(outcome, Outcome::NoAnswer { awaited: "the question for the stream's source", .. }),
+        "{outcome:?}"
+    );
+    assert!(alone.log().ends_with(":~"), "{}", alone.log());
+    let mut alone = Alone::with(&[("s", 5, "Password: ")]);
+    let (outcome, _) = alone.ask(Command::Diagnostics { pages: Some(1) });
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "a page of diagnostics", .. }), "{outcome:?}");
+    assert!(alone.log().ends_with(":~"), "{}", alone.log());
+    // The unit refuses in words that are known; rows of the other source are no proof.
+    let period = ("f", 5, "Every how many ms? ");
+    let script =
+        [("t", 5, "F - field value, P - process value: "), period, ("200~", 5, "Invalid rate: not 1..100\r\n")];
+    let (outcome, time) = Alone::with(&script).ask(on());
+    assert!(matches!(outcome, Outcome::Refused { job: Job::StreamOn, .. }) && time < 600, "{outcome:?} {time}");
+    let other = " 4768;    0;Null ;Open ;32128\r\n";
+    let script = [script[0], period, ("200~", 5, other), ("", 900, ROW)];
+    let (outcome, time) = Alone::with(&script).ask(on());
+    assert!(outcome == Outcome::StreamRuns { was_on: false } && time > 900, "{outcome:?} {time}");
+}
+
+#[test]
+fn a_file_goes_as_fast_as_the_line_and_not_to_a_unit_that_does_not_take_what_was_typed() {
+    let mut alone = Alone::with(&[]);
+    let (outcome, time) = alone.ask(Command::SendFile(vec![b'x'; 11_520]));
+    assert_eq!(outcome, Outcome::FileSent { sent: 11_520, total: 11_520, end: FileEnd::Whole });
+    assert!((990..1_010).contains(&time), "a second's worth of characters: {time}");
+    let mut alone = Alone::with(&[]);
+    alone.session.handle_bytes(alone.now, b"\x13");
+    assert_eq!(alone.session.may_send_file(), Ok(()), "nothing waits");
+    alone.session.command(alone.now, Command::Keys(b"m".to_vec())).expect("it waits");
+    assert_eq!(alone.session.command(alone.now, Command::SendFile(b"x".to_vec())), Err(Refusal::Held));
+    // A cable that comes back has no hold, no question, and nothing of what waited.
+    alone.session.handle_bytes(alone.now, b"\x11Password: ");
+    assert!(alone.session.password_open());
+    alone.session.link_lost(alone.now);
+    assert_eq!(alone.session.waiting(), 0);
+    alone.session.link_back(alone.now);
+    assert!(!alone.session.password_open() && alone.session.held_since().is_none());
 }
 
 #[test]

@@ -27,6 +27,7 @@ mod ptys;
 #[cfg(unix)]
 mod recordings;
 mod reference;
+mod replays;
 mod stranger;
 mod support;
 mod swarm;
