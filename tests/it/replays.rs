@@ -53,13 +53,13 @@ fn values(reading: &DictionaryReading) -> Vec<String> {
 }
 
 fn pages(told: &[Event]) -> Vec<Vec<&str>> {
-    let of_page = |event| match event {
-        &Event::Page { ref lines, .. } => {
-            Some(lines.iter().map(|line: &axcon::wire::Text| line.text.as_str()).collect())
+    let mut pages = Vec::new();
+    for event in told {
+        if let Event::Page { lines, .. } = event {
+            pages.push(lines.iter().map(|line| line.text.as_str()).collect());
         }
-        _ => None,
-    };
-    told.iter().filter_map(of_page).collect()
+    }
+    pages
 }
 
 #[test]
