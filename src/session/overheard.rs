@@ -78,6 +78,8 @@ pub(super) struct Diagnostics {
     switched_on: bool,
     /// They were switched on when the page under construction began: the key that stops them may come in its middle.
     begun_on: bool,
+    /// What is typed is the answer to D's question, up to Enter: the `s` of `Yes` is no key.
+    answers: bool,
     /// The recording holds keys.
     has_keys: bool,
     /// The labels of what was a page before there was a key.
@@ -95,6 +97,7 @@ impl Diagnostics {
             page: Assembler::default(),
             switched_on: false,
             begun_on: false,
+            answers: false,
             has_keys: false,
             known: None,
             before: None,
@@ -137,7 +140,7 @@ impl Work for Diagnostics {
             Signal::Heard(_, Message::Prompt(_)) => None,
             // No page says the name: the unit has started anew, and shows none any more.
             Signal::Heard(_, Message::Software(name)) if name.product.is_some() => {
-                self.switched_on = false;
+                (self.switched_on, self.begun_on, self.answers) = (false, false, false);
                 None
             }
             Signal::Heard(text, _) => {
@@ -152,6 +155,9 @@ impl Work for Diagnostics {
                 self.has_keys = true;
                 for key in keys {
                     match key {
+                        b'\r' => self.answers = false,
+                        _ if self.answers => {}
+                        b'd' | b'D' => self.answers = true,
                         b's' | b'S' => self.switched_on = !self.switched_on,
                         b'v' | b'V' | b'm' | b'M' | b'l' | b'L' => self.switched_on = false,
                         _ => {}
@@ -277,7 +283,10 @@ mod tests {
 
     #[test]
     fn a_unit_that_starts_anew_shows_no_pages_any_more() {
-        let banner = "AXTC4CO V1.1.0\r\nNode-ID: 127\r\n";
+        let banner = "Some Corporation 1\r\nAXTC4CO V1.1.0\r\nNode-ID: 127\r\n";
+        let defaults =
+            [(0, ">d"), (10, "Enter Yes to restore the defaults: "), (900, ">Yes\r"), (10, "Yes\r\n"), (10, banner)];
+        assert!(pages(&defaults).is_empty(), "{:?}", pages(&defaults));
         let story = [(0, ">s"), (500, PAGE), (1_000, PAGE), (5_000, banner), (5_000, "Node-ID: 127\r\n")];
         assert_eq!(pages(&story).len(), 2, "{:?}", pages(&story));
     }

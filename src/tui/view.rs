@@ -11,7 +11,6 @@ use crate::dump::Dump;
 use crate::monitor::{Mark, Monitor};
 use crate::session::{DictionaryReading, Event, Facts, FileEnd, Job, LoadReport, Origin, Outcome, Progress, UnitState};
 use crate::time::{Duration, Instant};
-use crate::wire::{Message, Prompt};
 
 /// Everything a screen may read.
 #[derive(Debug, Default)]
@@ -44,8 +43,6 @@ pub struct View {
     pub wanted_period: Option<Duration>,
     /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
     pub viewing: bool,
-    /// The unit has asked whether it is to restore its defaults: if it starts anew now, it has.
-    defaults_asked: bool,
     /// When the unit said last which CANopen state it is in: it says so on request, and changes it without a word.
     pub nmt_heard: Option<Instant>,
     /// When that has become old enough for another word.
@@ -123,7 +120,7 @@ pub struct DictionaryRead {
     pub reading: DictionaryReading,
     /// When it was complete.
     pub at: Instant,
-    /// The unit has started with other values since: the factory's, or other software's.
+    /// The unit has started anew since, or is in its loader: it may have other values.
     pub is_outdated: bool,
 }
 
@@ -199,7 +196,6 @@ impl View {
     /// Takes in one event; `facts` are the session's at that moment.
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         match event {
-            Event::Heard { message: Message::Prompt(Prompt::ConfirmDefaults), .. } => self.defaults_asked = true,
             Event::Heard { .. } => {}
             Event::Overheard(reading) => self.dictionary_read(now, reading),
             Event::EntriesRead(count) => self.entries_read = *count,
@@ -285,7 +281,7 @@ impl View {
     pub fn begin_unit(&mut self) {
         self.monitor = Monitor::default();
         (self.dictionary, self.entries_read, self.serial) = (None, 0, None);
-        (self.wanted_period, self.viewing, self.defaults_asked) = (None, false, false);
+        (self.wanted_period, self.viewing) = (None, false);
         self.load.product_unknown = false;
     }
 
@@ -384,7 +380,8 @@ impl View {
         if has_started || was_loader {
             self.monitor.stream.interrupt();
         }
-        if was_loader || has_started && std::mem::take(&mut self.defaults_asked) {
+        // What was written and not stored is gone, and the defaults or other software bring other values.
+        if has_started || was_loader || facts.state == UnitState::Loader {
             self.outdate_dictionary();
         }
         if self.job == Some(Job::StreamOn) && facts.stream.is_some() && self.facts.stream.is_none() {

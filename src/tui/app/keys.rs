@@ -355,6 +355,9 @@ impl App {
             (_, Some(Job::Diagnostics), _) => Some("the unit prints its diagnostics: S stops them first"),
             (_, Some(_), _) => Some("a job runs: wait for its end, or cancel it with Esc on its screen"),
             (MenuCmd::Menu, ..) => None,
+            (MenuCmd::Defaults | MenuCmd::Stream | MenuCmd::Diagnostics, None, _) if self.view.viewing => {
+                Some("the view is open and has keys of its own: M closes it")
+            }
             (_, None, UnitState::Loader) => {
                 Some("the unit is in its loader, which takes every key for an error: L sends software")
             }

@@ -88,6 +88,12 @@ fn an_open_view_is_told_and_closed_with_m() {
     let told = desk.picture();
     assert!(told.contains("the view is open and halts the unit. M closes it."), "{told}");
     assert!(told.contains("view open, halted") && !told.contains("application runs"), "{told}");
+    desk.sent.clear();
+    for key in ["s", "t", "d"] {
+        desk.keys(key);
+        assert!(desk.picture().contains("Not sent: the view is open"), "{key}: {}", desk.picture());
+    }
+    assert!(desk.sent.is_empty());
     desk.keys("m").run(Duration::from_secs(4));
     let told = desk.picture();
     assert!(told.contains("application runs") && !told.contains("M closes it"), "{told}");
@@ -115,4 +121,23 @@ fn rows_that_the_line_has_no_room_for_are_no_page_of_diagnostics() {
     let told = desk.picture();
     let labels = told.lines().find(|line| line.contains("Diagnosed")).unwrap_or_default();
     assert!(labels.is_empty() || labels.contains("Supply") || labels.contains("CJ"), "{told}");
+}
+
+#[test]
+fn a_power_cycle_and_a_loader_make_history_of_what_was_read() {
+    let mut desk = Desk::new();
+    desk.keys("v").press(KeyCode::Enter);
+    desk.wait_for("0 not as factory");
+    let now = desk.now;
+    desk.unit.unit_mut().power_off(now);
+    desk.run(Duration::from_secs(2));
+    let now = desk.now;
+    desk.unit.unit_mut().power_on(now);
+    desk.run(Duration::from_secs(5)).keys("5");
+    assert!(desk.picture().contains("from before the restart"), "{}", desk.picture());
+    desk.keys("v").press(KeyCode::Enter);
+    desk.wait_for("0 not as factory");
+    desk.keys("3l").run(Duration::from_secs(1)).keys("AXIO-2010").press(KeyCode::Enter);
+    desk.run(Duration::from_secs(3)).key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("5");
+    assert!(desk.picture().contains("from before the restart"), "{}", desk.picture());
 }
