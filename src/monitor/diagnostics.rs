@@ -1,7 +1,8 @@
 //! The unit's diagnostics: the newest page as printed, and what its numbers have been since the first.
 
 use crate::time::Instant;
-use crate::wire::{Text, diagnostics, visible};
+use crate::wire::diagnostics::{self, Quantity};
+use crate::wire::{Text, visible};
 
 /// Numbers of a page that are followed at most.
 const MOST_TRACKED: usize = 200;
@@ -36,6 +37,14 @@ pub struct Tracked {
     pub max: f64,
 }
 
+impl From<Quantity> for Tracked {
+    /// As it stands on its first page.
+    fn from(quantity: Quantity) -> Self {
+        let Quantity { label, value, decimals, unit } = quantity;
+        Tracked { label, unit, decimals, value: Some(value), min: value, max: value }
+    }
+}
+
 impl Diagnostics {
     pub(super) fn page(&mut self, at: Instant, lines: &[Text]) {
         self.lines = lines.iter().map(|line| visible::line(line.text.trim_end().as_bytes())).collect();
@@ -56,14 +65,7 @@ impl Diagnostics {
                     tracked.min = tracked.min.min(quantity.value);
                     tracked.max = tracked.max.max(quantity.value);
                 }
-                None if self.found.len() < MOST_TRACKED => self.found.push(Tracked {
-                    label: quantity.label,
-                    unit: quantity.unit,
-                    decimals: quantity.decimals,
-                    value: Some(quantity.value),
-                    min: quantity.value,
-                    max: quantity.value,
-                }),
+                None if self.found.len() < MOST_TRACKED => self.found.push(quantity.into()),
                 None => {}
             }
         }

@@ -134,6 +134,36 @@ fn a_power_cut_at_any_record_leaves_a_unit_that_a_second_upload_saves() {
 }
 
 #[test]
+fn a_unit_without_power_is_not_taken_for_another_kind_of_loader() {
+    for loader in LoaderKind::ALL {
+        for (begun_ms, off_s) in [(30, 1), (30, 10), (70, 10), (150, 60)] {
+            let image = small_image("AXRTD8CO", "2.2.0");
+            let flash = flash_with(&small_image("AXRTD8CO", "2.1.1"));
+            let mut bench = Bench::of(axrtd8co(), loader, flash, Duration::from_millis(1));
+            bench.run_for(Duration::from_secs(7));
+            // The unit waits in its loader: an upload was left in the middle.
+            bench.command(Command::Load(Box::new(order(image.clone()))));
+            let limit = bench.now + Duration::from_secs(60);
+            bench.run_until(limit, |event| matches!(event, Event::Progress(progress) if progress.records > 3));
+            bench.ask(Command::Cancel);
+            let again = LoadOrder { product: Some("AXRTD8CO".into()), ..order(image) };
+            bench.command(Command::Load(Box::new(again)));
+            let limit = bench.now + Duration::from_secs(60);
+            bench.run_until(limit, |event| matches!(event, Event::Progress(progress) if progress.records > 3));
+            bench.run_for(Duration::from_millis(begun_ms));
+            let now = bench.now;
+            bench.unit.unit_mut().power_off(now);
+            bench.run_for(Duration::from_secs(off_s));
+            let now = bench.now;
+            bench.unit.unit_mut().power_on(now);
+            let Outcome::Loaded(report) = bench.outcome() else { panic!("no report") };
+            let story = format!("{loader:?}, off for {off_s} s: {report:?}");
+            assert!(report.verdict != Verdict::Done && report.remark.is_none(), "{story}");
+        }
+    }
+}
+
+#[test]
 fn nobody_at_the_other_end_is_said_within_seconds() {
     let mut bench = Bench::new();
     bench.run_for(Duration::from_secs(4));

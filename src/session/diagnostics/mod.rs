@@ -25,7 +25,7 @@ const NEXT_PAGE: Duration = Duration::from_millis(2500);
 const STOPPED: Duration = Duration::from_millis(1500);
 /// A page that comes so soon behind that key was under way before it.
 const UNDER_WAY: Duration = Duration::from_millis(700);
-/// Silence that ends the menu.
+/// How long the rest of the menu may take.
 const MENU: Duration = Duration::from_millis(300);
 /// How often the key is pressed to stop them.
 const MOST_STOPS: u32 = 3;
@@ -159,7 +159,9 @@ impl Work for Diagnostics {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.answered |= matches!(signal, Signal::Heard(..));
         if matches!((self.stage, &signal), (Stage::AskingForMenu { .. }, Signal::Heard(..))) {
-            self.deadline = Some(desk.now + MENU);
+            // Rows may go on for ever behind the menu.
+            let soon = desk.now + MENU;
+            self.deadline = self.deadline.map(|deadline| deadline.min(soon));
             return None;
         }
         match signal {

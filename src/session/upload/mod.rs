@@ -520,7 +520,8 @@ impl Upload {
             what: what.into(),
             heard: self.heard.clone(),
             misfit: self.misfit,
-            remark: transfer.and_then(Transfer::remark),
+            // Before a loader has taken everything, what it seems to be may have been a unit without power.
+            remark: transfer.and_then(Transfer::remark).filter(|_| verdict == Verdict::Done),
         })))
     }
 

@@ -278,19 +278,7 @@ mod tests {
 
     /// The names under which the numbers of these lines are shown, with the value they have now.
     fn names(lines: &[&str]) -> Vec<String> {
-        let tracked = |line: &&str| quantities(line).into_iter();
-        let found: Vec<Tracked> = lines
-            .iter()
-            .flat_map(tracked)
-            .map(|quantity| Tracked {
-                label: quantity.label,
-                unit: quantity.unit,
-                decimals: quantity.decimals,
-                value: Some(quantity.value),
-                min: quantity.value,
-                max: quantity.value,
-            })
-            .collect();
+        let found: Vec<Tracked> = lines.iter().flat_map(|line| quantities(line)).map(Tracked::from).collect();
         named(&found).into_iter().map(|tracked| tracked.label).collect()
     }
 
