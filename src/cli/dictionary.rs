@@ -173,9 +173,11 @@ fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), C
         let differences: Vec<_> = differences.collect();
         output.object(&DiffObject { schema: "axcon.dictionary-diff/1", equal: differences.is_empty(), differences })?;
     } else {
-        for Difference { index, subindex, name, left, right, setting: _ } in &found {
-            let side = |value: &Option<String>| value.clone().unwrap_or_else(|| "not there".into());
-            let line = format!("{index}:{subindex:02X}  {name:<58} {:>14}  {:>14}\n", side(left), side(right));
+        for difference in &found {
+            let Difference { index, subindex, name, .. } = difference;
+            let side = |value: Option<String>| value.unwrap_or_else(|| "not there".into());
+            let (left, right) = (side(difference.shown_left()), side(difference.shown_right()));
+            let line = format!("{index}:{subindex:02X}  {name:<58} {left:>14}  {right:>14}\n");
             output.data(line.as_bytes())?;
         }
     }

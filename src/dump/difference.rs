@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Dump, DumpEntry, rounding};
+use super::{Dump, DumpEntry, hexadecimal, rounding};
 use crate::device::Product;
 use crate::device::dictionary::Access;
 
@@ -19,8 +19,29 @@ pub struct Difference {
     pub left: Option<String>,
     /// Its value on the right; `None` if it is not there.
     pub right: Option<String>,
+    /// Bits, and not a number of something: people read these in hexadecimal digits.
+    bits: bool,
     /// Somebody has set it. What a unit measures, and what is its own, differs without anybody's doing.
     pub setting: bool,
+}
+
+impl Difference {
+    /// The value on the left for a person; `None` if the entry is not there.
+    pub fn shown_left(&self) -> Option<String> {
+        self.shown(self.left.as_deref())
+    }
+
+    /// The value on the right for a person; `None` if the entry is not there.
+    pub fn shown_right(&self) -> Option<String> {
+        self.shown(self.right.as_deref())
+    }
+
+    fn shown(&self, number: Option<&str>) -> Option<String> {
+        number.map(|number| match number.parse() {
+            Ok(bits) if self.bits => hexadecimal(bits),
+            _ => number.to_owned(),
+        })
+    }
 }
 
 /// Every entry that differs, by index and sub-index. Against the factory only what it sets can differ.
@@ -61,8 +82,16 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
         let shown = |entry: Option<&DumpEntry>| entry.map(DumpEntry::number);
         let name = left.or(right).map(|entry| entry.name.clone()).unwrap_or_default();
         let (index, subindex) = address.clone();
-        let setting = is_setting(left.or(right));
-        (!same).then(|| Difference { index, subindex, name, left: shown(left), right: shown(right), setting })
+        let entry = left.or(right);
+        (!same).then(|| Difference {
+            index,
+            subindex,
+            name,
+            left: shown(left),
+            right: shown(right),
+            bits: entry.is_some_and(|entry| entry.bits),
+            setting: is_setting(entry),
+        })
     };
     addresses.into_iter().filter_map(differs).collect()
 }

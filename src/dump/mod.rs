@@ -82,6 +82,9 @@ pub struct Missing {
     pub subindex: u8,
 }
 
+/// What FFFFFFFFh, `nan`, or dashes stand for in an entry that is measured (AXTC4CO manual, section 3.3.3).
+const NO_READING: &str = "no reading";
+
 /// Why a text is no dump.
 #[derive(Debug, thiserror::Error)]
 pub enum DumpError {
@@ -120,7 +123,10 @@ impl Dump {
                 default: default.and_then(number),
                 deviates: entry.is_some_and(|entry| deviates(read, entry, default)),
                 unit: entry.and_then(|entry| entry.unit.clone()),
-                meaning: entry.zip(read.value).and_then(|(entry, value)| meaning(product?, read.at, entry, value)),
+                meaning: entry.and_then(|entry| match read.value {
+                    Some(value) => meaning(product?, read.at, entry, value),
+                    None => (entry.data_type == DataType::Real32).then(|| NO_READING.to_owned()),
+                }),
                 bits: entry.is_some_and(is_bits),
             }
         });
@@ -155,7 +161,7 @@ impl Dump {
                 deviates: false,
                 unit: entry.unit.clone(),
                 meaning: entry.meaning(default).map(str::to_owned),
-                bits: false,
+                bits: is_bits(entry),
             })
         });
         Dump {
@@ -189,6 +195,12 @@ impl Dump {
             [&mut entry.unit, &mut entry.meaning].into_iter().flatten().for_each(clean);
         }
         dump.missing.iter_mut().for_each(|missing| clean(&mut missing.index));
+        if let Some(product) = dump.product.as_deref().and_then(Product::named) {
+            let known = |at: ObjectAddress| product.dictionary.object(at.index)?.entry(at.sub);
+            for entry in &mut dump.entries {
+                entry.bits = entry.at().and_then(known).is_some_and(is_bits);
+            }
+        }
         Ok(dump)
     }
 
@@ -232,7 +244,7 @@ impl DumpEntry {
     fn person(&self, value: Option<&serde_json::Number>) -> String {
         match value.map(|value| (value, value.as_u64())) {
             None => "-".to_owned(),
-            Some((_, Some(bits))) if self.bits => format!("0x{bits:08X}"),
+            Some((_, Some(bits))) if self.bits => hexadecimal(bits),
             Some((value, _)) => value.to_string(),
         }
     }
@@ -258,9 +270,13 @@ pub fn name(object: &Object, entry: &Entry) -> String {
 /// A value of an entry for a person: bits in hexadecimal digits.
 pub fn shown(entry: &Entry, value: Value) -> String {
     match value.as_integer() {
-        Some(bits) if is_bits(entry) => format!("0x{bits:08X}"),
+        Some(bits) if is_bits(entry) => hexadecimal(bits as u64),
         _ => value.to_string(),
     }
+}
+
+fn hexadecimal(bits: u64) -> String {
+    format!("0x{bits:08X}")
 }
 
 /// What a value stands for; an error of the list 1003h in words.
@@ -345,6 +361,24 @@ pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Fac
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::Span;
+
+    #[test]
+    fn what_is_measured_and_shown_as_nothing_is_no_reading() {
+        let product = Product::named("AXTC4CO").expect("built in");
+        let facts = Facts::default();
+        let at = ObjectAddress::new(0x6100, 1);
+        let read = |value| ReadEntry { at, value, text: "TC1 0xFFFFFFFF".into(), span: Span::default(), known: true };
+        let dump = |value| {
+            let entries = vec![read(value)];
+            Dump::of(&DictionaryReading { entries, complete: true, unrecognised_lines: 0 }, Some(product), &facts)
+        };
+        let (nothing, something) = (dump(None), dump(Some(Value::Real32(23.5))));
+        assert_eq!(nothing.entries[0].meaning.as_deref(), Some("no reading"));
+        assert!(nothing.table().contains(" -  no reading\n"), "{}", nothing.table());
+        assert_eq!(something.entries[0].meaning, None);
+        assert!(something.table().contains("23.5 °C"), "{}", something.table());
+    }
 
     #[test]
     fn a_dump_that_somebody_has_edited_says_nothing_to_the_terminal() {

@@ -13,11 +13,12 @@ impl Dump {
         for entry in &self.entries {
             let DumpEntry { index, subindex, name, unit, meaning, .. } = entry;
             let value = entry.shown();
-            let unit = unit.as_deref().map(|unit| format!(" {unit}")).unwrap_or_default();
+            let unit =
+                unit.as_deref().filter(|_| entry.value.is_some()).map(|unit| format!(" {unit}")).unwrap_or_default();
             let meaning = meaning.as_deref().map(|meaning| format!("  {meaning}")).unwrap_or_default();
             let mark = if entry.deviates { "*" } else { " " };
             let factory = entry.default.as_ref().filter(|_| entry.deviates);
-            let factory = factory.map(|default| format!("  (factory {default})")).unwrap_or_default();
+            let factory = factory.map(|_| format!("  (factory {})", entry.shown_default())).unwrap_or_default();
             text.push_str(&format!("{mark} {index}:{subindex:02X}  {name:<58} {value:>14}{unit}{meaning}{factory}\n"));
         }
         text.push_str(&format!("{} entries, {compared}\n", self.entries.len()));

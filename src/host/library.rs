@@ -44,13 +44,15 @@ pub fn list(folder: &Path) -> io::Result<Vec<Listed>> {
     // Names begin with the time.
     files.sort_by(|a, b| b.file_name().cmp(&a.file_name()));
     files.truncate(MOST);
-    let look = |path: PathBuf| {
-        let header = Recording::open(&path).ok()?.header().clone();
-        let bytes = fs::metadata(&path).ok()?.len();
-        let length = length(&path).ok().flatten();
-        Some(Listed { path, header, length, bytes })
-    };
     Ok(files.into_iter().filter_map(look).collect())
+}
+
+/// One recording, wherever it lies; `None` for what cannot be read as one.
+pub fn look(path: PathBuf) -> Option<Listed> {
+    let header = Recording::open(&path).ok()?.header().clone();
+    let bytes = fs::metadata(&path).ok()?.len();
+    let length = length(&path).ok().flatten();
+    Some(Listed { path, header, length, bytes })
 }
 
 /// The moment of the last event: a recording's lines are `[seconds, kind, text]`.

@@ -47,6 +47,8 @@ pub struct Stream {
     interrupted: bool,
     /// No row for longer than the stream's period explains.
     pub late: bool,
+    /// When the stream was switched on last, where that was seen.
+    on_since: Option<Instant>,
     /// Moments the user has marked, oldest first.
     pub marks: VecDeque<Mark>,
 }
@@ -146,6 +148,17 @@ impl Stream {
         }
     }
 
+    /// The unit sends from now on, so that its first row is awaited from now on.
+    pub fn switched_on(&mut self, at: Instant) {
+        self.on_since = Some(at);
+        self.late = false;
+    }
+
+    /// Whether all rows are from before the stream was switched on.
+    pub fn awaits_first_row(&self) -> bool {
+        self.on_since > self.newest
+    }
+
     /// The unit or its link is away for a moment: no curve is drawn across it.
     pub fn interrupt(&mut self) {
         self.interrupted = true;
@@ -180,7 +193,8 @@ impl Stream {
     /// When the newest row is too old.
     pub fn late_at(&self) -> Option<Instant> {
         let newest = self.newest.filter(|_| !self.late)?;
-        Some(newest + (self.slowest().unwrap_or_default() * LATE_PERIODS).max(LATE_AT_LEAST))
+        let since = self.on_since.map_or(newest, |on| on.max(newest));
+        Some(since + (self.slowest().unwrap_or_default() * LATE_PERIODS).max(LATE_AT_LEAST))
     }
 
     /// Marks a moment, behind the marks so far.

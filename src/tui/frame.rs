@@ -73,7 +73,11 @@ pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
     let unit = match (product, facts.state) {
         (Some(product), _) => version.map_or_else(|| product.clone(), |version| format!("{product} {version}")),
         (None, UnitState::Silent) => "no unit".into(),
-        (None, UnitState::Unknown | UnitState::Application | UnitState::Loader) => "unknown unit".into(),
+        (None, UnitState::Unknown | UnitState::Application | UnitState::Loader) => match view.noted() {
+            // What nobody but our own notes says is marked as such.
+            Some(noted) => format!("{}?", noted.product),
+            None => "unknown unit".into(),
+        },
     };
     let state = match facts.state {
         UnitState::Loader => Some("in loader"),

@@ -9,6 +9,7 @@ use crate::image::DefectId;
 use crate::session::{Event, Facts, UnitState};
 use crate::tui::popup::ORDERS;
 use crate::tui::{Effect, Input, LinkInfo};
+use crate::wire::stream::Source;
 
 /// Connected to an emulated unit that streams.
 fn on_the_bench() -> Stage {
@@ -24,10 +25,76 @@ fn the_bench_calls_values_old_as_the_other_screens_do() {
     let mut stage = on_the_bench();
     assert!(stage.shows("newest row 12:01:33") && !stage.shows("old"), "{}", stage.picture());
     stage.wait(10_000);
-    assert!(stage.shows("No new row: these values are old.") && stage.shows("old: ok"), "{}", stage.picture());
+    for screen in ["9", "2", "6"] {
+        stage.keys(screen);
+        assert!(stage.shows("No new row: these values are old."), "{}", stage.picture());
+    }
     let mut stage = on_the_bench();
     stage.fold_with(Event::FactsChanged, &Facts { state: UnitState::Loader, ..Facts::default() });
-    assert!(stage.shows("waits in its loader: these are its last values") && stage.shows("old: open"));
+    for screen in ["9", "2", "6"] {
+        stage.keys(screen);
+        assert!(stage.shows("is in its loader: these are its last values"), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn a_stream_that_was_just_switched_on_is_waited_for_and_not_called_late() {
+    let facts = |stream| Facts { stream, ..Facts::default() };
+    let mut stage = Stage::streaming(SMALL);
+    stage.fold_with(Event::FactsChanged, &facts(None));
+    stage.wait(600_000).keys("2");
+    assert!(stage.shows("The stream is off: these are its last values."), "{}", stage.picture());
+    stage.fold_with(Event::FactsChanged, &facts(Some(Source::FieldValue)));
+    assert!(stage.shows("no row has come yet, these values are from before."), "{}", stage.picture());
+    stage.keys("6").wait(2000);
+    assert!(stage.shows("no row has come yet, these values are from before."), "{}", stage.picture());
+    stage.wait(10_000);
+    assert!(stage.shows("No new row: these values are old."), "the stream had a row a second: {}", stage.picture());
+    stage.bytes(b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n");
+    assert!(!stage.shows("values are"), "{}", stage.picture());
+}
+
+#[test]
+fn a_dictionary_from_before_a_restart_is_compared_with_nothing() {
+    let mut stage = Stage::with_dictionary(SMALL);
+    assert!(stage.shows("W with"), "{}", stage.picture());
+    stage.fold_with(Event::FactsChanged, &Facts { state: UnitState::Loader, ..Facts::default() });
+    assert!(stage.shows("from before the restart") && !stage.shows("W with"), "{}", stage.picture());
+    stage.keys("w");
+    assert!(stage.shows("V reads it again.") && !stage.shows("Compare with a saved"), "{}", stage.picture());
+}
+
+#[test]
+fn a_heading_leaves_out_what_can_be_missed_before_what_cannot() {
+    let mut stage = Stage::with_dictionary(SMALL);
+    stage.input(Input::FileRead { path: "d1.json".into(), text: Ok(Dump::factory(axtc4co()).json()) });
+    assert!(stage.shows("3 not as factory, only differences"), "{}", stage.picture());
+    stage.keys("/threshold");
+    assert!(stage.shows("with 'threshold'") && stage.shows("only differences"), "{}", stage.picture());
+    stage.press(KeyCode::Enter).press(KeyCode::Esc).keys("o");
+    assert!(stage.shows("3 of 227, 3 not as factory, 12:00:03, only those ──"), "{}", stage.picture());
+    stage.resized(LARGE);
+    assert!(stage.shows("3 of 227, 3 not as factory, 12:00:03, only those ──"), "{}", stage.picture());
+}
+
+#[test]
+fn bits_are_compared_in_the_digits_they_are_read_in() {
+    let mut stage = Stage::with_dictionary(SMALL);
+    let mut dump = Dump::factory(axtc4co());
+    let cob_id = dump.entries.iter_mut().find(|entry| entry.index == "1800" && entry.subindex == 1).expect("there");
+    cob_id.value = Some(0x8000_01FFu32.into());
+    stage.input(Input::FileRead { path: "d1.json".into(), text: Ok(dump.json()) });
+    let picture = stage.picture();
+    let row = picture.lines().find(|line| line.contains("1800:01")).unwrap_or_default();
+    assert!(row.contains("0x400001FF") && row.contains("0x800001FF"), "{picture}");
+}
+
+#[test]
+fn a_unit_that_only_notes_know_is_named_as_what_it_may_be() {
+    let stage = Stage::in_loader(SMALL, noted("AXTC4CO"));
+    assert!(stage.shows(" axcon │ AXTC4CO? │ in loader │"), "{}", stage.picture());
+    let stage = Stage::in_loader(SMALL, None);
+    assert!(stage.shows(" axcon │ unknown unit │ in loader │"), "{}", stage.picture());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::super::picker::is_image_name;
 use super::super::{FIRST_BYTES, FileEntry, FileKind, Input, LARGEST_TEXT, PortEntry, RecordingEntry};
@@ -76,10 +76,21 @@ fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The recordings.
-pub(super) fn recordings() -> Result<Vec<RecordingEntry>, String> {
-    let folder = recorder::folder().ok_or("this system does not say where programs keep their state")?;
-    let listed = library::list(&folder).map_err(|error| format!("cannot read '{}': {error}", folder.display()))?;
+/// The recordings: those of the state directory, and the one that this console writes, which may lie elsewhere.
+pub(super) fn recordings(written: Option<PathBuf>) -> Result<Vec<RecordingEntry>, String> {
+    let written = written.and_then(library::look);
+    let in_state =
+        recorder::folder().ok_or("this system does not say where programs keep their state").map_err(str::to_owned);
+    let in_state = in_state.and_then(|folder| {
+        library::list(&folder).map_err(|error| format!("cannot read '{}': {error}", folder.display()))
+    });
+    let mut listed = match in_state {
+        Err(_) if written.is_some() => Vec::new(),
+        in_state => in_state?,
+    };
+    if let Some(written) = written.filter(|written| listed.iter().all(|listed| listed.path != written.path)) {
+        listed.insert(0, written);
+    }
     let entry = |listed: library::Listed| RecordingEntry {
         link: format!("replay:{}", listed.path.display()),
         begun: host::clock::local_text(listed.header.unix_millis),
@@ -139,5 +150,24 @@ fn said(error: &io::Error) -> String {
         io::ErrorKind::NotFound => "there is no such file".to_owned(),
         io::ErrorKind::PermissionDenied => "it may not be read".to_owned(),
         _ => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_elsewhere_that_is_being_written_is_the_first_of_the_list() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("mine.cast");
+        fs::write(&path, "{\"version\": 2, \"width\": 80, \"height\": 24}\n[1.5, \"o\", \"hello\"]\n")
+            .expect("written");
+        let listed = recordings(Some(path.clone())).expect("listed");
+        assert_eq!(listed[0].link, format!("replay:{}", path.display()));
+        assert_eq!(listed[0].length, Some(crate::time::Duration::from_millis(1500)));
+        fs::remove_file(&path).expect("removed");
+        let without = recordings(Some(path)).unwrap_or_default();
+        assert_eq!(without.len(), listed.len() - 1, "what is not there is not listed");
     }
 }

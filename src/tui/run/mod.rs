@@ -362,7 +362,10 @@ impl Console {
                 }
                 Effect::ListPorts => self.ask(|| Input::PortsListed(files::ports())),
                 Effect::ListFiles(directory) => self.ask(move || files::folder(&directory)),
-                Effect::ListRecordings => self.ask(|| Input::RecordingsListed(files::recordings())),
+                Effect::ListRecordings => {
+                    let written = self.recorder.path().map(ToOwned::to_owned);
+                    self.ask(move || Input::RecordingsListed(files::recordings(written)));
+                }
                 Effect::ReadFile(path) => self.ask(move || {
                     let text = files::text(&path);
                     Input::FileRead { path, text }

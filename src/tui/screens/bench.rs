@@ -12,7 +12,6 @@ use ratatui::text::{Line, Span};
 
 use super::Scene;
 use crate::device::Product;
-use crate::session::UnitState;
 use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
@@ -209,7 +208,10 @@ impl Bench {
         let heads = format!("    {:<8}{:<20}{:<10}{:>16}   {}", "Input", "Set to", "Wire", "The unit says", "State");
         rows.push(Line::styled(heads, theme.quiet()));
         rows.extend((0..usize::from(product.measurement.channels)).map(|place| self.row(scene, product, place)));
-        rows.push(Line::styled(why_old(scene.view).map(|why| format!("  {why}")).unwrap_or_default(), theme.warning()));
+        rows.push(Line::styled(
+            scene.view.why_old().map(|why| format!("  {}", why.text())).unwrap_or_default(),
+            theme.warning(),
+        ));
         let (upper, rest) = lines::split(area, rows.len() as u16);
         lines::draw(frame, upper, rows);
         let (heading, log) = lines::split(rest, 1);
@@ -247,29 +249,14 @@ impl Bench {
             },
         );
         let words = channel.map_or("", |channel| channel.reading.words());
-        let (state, says_style) = match why_old(scene.view) {
-            Some(_) if !words.is_empty() => (format!("old: {words}"), theme.quiet()),
-            _ => (words.to_owned(), Style::new()),
-        };
+        let says_style = if scene.view.why_old().is_some() { theme.quiet() } else { Style::new() };
         let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, place + 1);
         Line::from(vec![
             Span::styled(name, if is_chosen { theme.strong() } else { Style::new() }),
             Span::raw(format!("{set:<20}")),
             Span::styled(format!("{wire:<10}"), style),
-            Span::styled(format!("{says:>16}   {state}"), says_style),
+            Span::styled(format!("{says:>16}   {words}"), says_style),
         ])
-    }
-}
-
-/// Why what the unit says here is not what it says now, where it has said something.
-fn why_old(view: &View) -> Option<&'static str> {
-    let stream = &view.monitor.stream;
-    stream.newest?;
-    match (view.facts.state, view.facts.stream) {
-        (UnitState::Loader, _) => Some("The unit waits in its loader: these are its last values."),
-        (_, None) => Some("The stream is off: these are its last values. T switches it on."),
-        _ if stream.late => Some("No new row: these values are old. M asks whether the unit still answers."),
-        _ => None,
     }
 }
 

@@ -59,6 +59,7 @@ pub const BINDINGS: &[Binding] = &[
     Binding { keys: &[Press::Plain(KeyCode::Esc)], cmd: Cmd::Back, short: "everything", long: "show everything again" },
 ];
 
+const HEADING: &str = "Object dictionary";
 /// Rows of the pane that explains the chosen entry, its heading included.
 const DETAIL_ROWS: u16 = 8;
 /// From this width on that pane stands beside the table ...
@@ -174,6 +175,9 @@ impl Dictionary {
                 };
                 return Some(Action::Tell(what));
             }
+            Cmd::Compare if view.current_dictionary().is_none() => {
+                return Some(Action::Tell("What was read is from before the restart: V reads it again.".to_owned()));
+            }
             Cmd::Compare => return Some(Action::Choose(Wanted::Dump)),
             Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportDictionary, view))),
             _ => {}
@@ -249,7 +253,7 @@ impl Dictionary {
         let rows = self.chosen(all);
         let (upper, detail) = parts(area);
         let (head, table) = lines::split(upper, 2);
-        let heading = [lines::rule(theme, upper.width, "Object dictionary", &self.remark(scene, rows.len(), total))];
+        let heading = [lines::rule(theme, upper.width, HEADING, &self.remark(scene, rows.len(), total, upper.width))];
         let columns = usize::from(upper.width);
         let factory = match &self.other {
             // Beside the heading of the values `in d1.json` would read as part of it.
@@ -310,41 +314,45 @@ impl Dictionary {
         self.cursor = row;
     }
 
-    fn remark(&self, scene: Scene, shown: usize, total: usize) -> String {
+    /// What the table shows, in as many words as there is room for: what is left out goes before what it is left out of.
+    fn remark(&self, scene: Scene, shown: usize, total: usize, columns: u16) -> String {
         let view = scene.view;
-        let mut parts = Vec::new();
-        if view.job == Some(Job::ReadDictionary) {
-            parts.push(format!("reading: {} so far", format::grouped(view.entries_read)));
-        } else {
-            match &view.dictionary {
-                None if view.can_send() => parts.push("the manual's; V reads the unit's".to_owned()),
-                None if view.product().is_some() => parts.push("the manual's".to_owned()),
-                None => {}
-                Some(read) => {
-                    let time = format::time_of_day(scene.start_of_day, read.at);
-                    let compared = match view.product() {
-                        _ if read.is_outdated => "from before the restart".to_owned(),
-                        Some(_) => format!("{} not as factory", read.dump.deviations()),
-                        // Nobody knows what the factory's values are: none of them differs, and none is the same.
-                        None => "compared with nothing".into(),
-                    };
-                    parts.push(format!("{shown} of {total}, {compared}, {time}"));
-                }
+        let dump = self.other.as_ref().and_then(|other| other_product(&other.dump, view));
+        let dump = dump.map(|(theirs, _)| format!("dump of an {theirs}"));
+        let only = match self.only {
+            Only::Everything => None,
+            Only::Deviations => Some("only those".to_owned()),
+            Only::Differences => Some("only differences".into()),
+        };
+        let words = (!self.words.is_empty()).then(|| format!("with '{}'", visible::text(&self.words)));
+        let is_outdated = view.dictionary.as_ref().is_some_and(|read| read.is_outdated);
+        let (mut compared, mut time) = (None, None);
+        let counted = match &view.dictionary {
+            _ if view.job == Some(Job::ReadDictionary) => {
+                Some(format!("reading: {} so far", format::grouped(view.entries_read)))
             }
-        }
-        match self.only {
-            Only::Everything => {}
-            Only::Deviations => parts.push("only those".into()),
-            Only::Differences => parts.push("only differences".into()),
-        }
-        if let Some((theirs, _)) = self.other.as_ref().and_then(|other| other_product(&other.dump, view)) {
-            // What is cut off for want of room must not be this.
-            parts.insert(0, format!("dump of an {theirs}"));
-        }
-        if !self.words.is_empty() {
-            parts.push(format!("with '{}'", visible::text(&self.words)));
-        }
-        parts.join(", ")
+            None if view.can_send() => Some("the manual's; V reads the unit's".to_owned()),
+            None => view.product().map(|_| "the manual's".into()),
+            Some(read) => {
+                compared = Some(match view.product() {
+                    _ if is_outdated => "from before the restart".to_owned(),
+                    Some(_) => format!("{} not as factory", read.dump.deviations()),
+                    // Nobody knows what the factory's values are: none of them differs, and none is the same.
+                    None => "compared with nothing".into(),
+                });
+                time = Some(format::time_of_day(scene.start_of_day, read.at));
+                Some(format!("{shown} of {total}"))
+            }
+        };
+        // `only those` are those that are not as the factory made them, and what is old is never shown as if it were not.
+        let least = compared.clone().filter(|_| self.only == Only::Deviations || is_outdated);
+        let text = |compared: &Option<String>, time: &Option<String>| {
+            let parts = [&dump, &counted, compared, time, &only, &words];
+            parts.into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join(", ")
+        };
+        let room = usize::from(columns).saturating_sub(format::width(HEADING) + RULE_COLUMNS);
+        let longer = [text(&compared, &time), text(&compared, &None)];
+        longer.into_iter().find(|text| format::width(text) <= room).unwrap_or_else(|| text(&least, &None))
     }
 }
 
@@ -435,7 +443,7 @@ impl Row<'_> {
     /// The value without its unit.
     fn bare_value(&self) -> String {
         match self.read {
-            Some(read) if read.value.is_none() => visible::text(&read.text),
+            Some(read) if read.value.is_none() => read.meaning.clone().unwrap_or_else(|| visible::text(&read.text)),
             Some(read) => self.number(read.shown()),
             None => "-".into(),
         }
@@ -466,7 +474,7 @@ impl Row<'_> {
     /// What the value is compared with.
     fn other(&self) -> String {
         match &self.difference {
-            Some(difference) => difference.left.clone().map_or_else(|| "not there".into(), |raw| self.number(raw)),
+            Some(difference) => difference.shown_left().map_or_else(|| "not there".into(), |raw| self.number(raw)),
             None => self.default(),
         }
     }
@@ -479,8 +487,9 @@ impl Row<'_> {
         with_unit.filter(|text| is_number && format::width(text) <= columns).unwrap_or(bare)
     }
 
+    /// What the value stands for; what stands in place of one needs no other words.
     fn meaning(&self) -> Option<&str> {
-        self.read.and_then(|read| read.meaning.as_deref())
+        self.read.filter(|read| read.value.is_some()).and_then(|read| read.meaning.as_deref())
     }
 
     /// What is searched, in lower case.

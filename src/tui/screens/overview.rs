@@ -8,7 +8,7 @@ use ratatui::text::{Line, Span};
 use super::{Scene, terminal};
 use crate::device::Product;
 use crate::monitor::{Channel, Fault, Tracked};
-use crate::session::{Job, Known, Origin, UnitState};
+use crate::session::{Known, Origin, UnitState};
 use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
@@ -177,8 +177,8 @@ impl Overview {
         if area.height >= CHART_ROWS {
             shown.extend(averages(scene, columns));
         }
-        shown.push(match why_old(scene) {
-            Some(why) => Line::styled(format!("  {why}"), theme.warning()),
+        shown.push(match scene.view.why_old() {
+            Some(why) => Line::styled(format!("  {}", why.text()), theme.warning()),
             None => {
                 let chosen = stream.channels.get(self.cursor).map(|channel| channel.name.as_str());
                 limits_line(scene, source, chosen.unwrap_or_default(), has_columns)
@@ -195,24 +195,7 @@ fn page(area: Rect) -> Rect {
 
 /// Whether the values are those of now, so that nothing has to be said about them.
 fn is_current(scene: Scene) -> bool {
-    scene.view.monitor.stream.source.is_some() && why_old(scene).is_none()
-}
-
-/// Why the values that are shown are those of before, if they are, and what to do.
-fn why_old(scene: Scene) -> Option<&'static str> {
-    let view = scene.view;
-    match view.facts.state {
-        UnitState::Loader => Some("The unit is in its loader: these are its last values. L loads software."),
-        _ if view.job == Some(Job::ReadDictionary) => {
-            Some("These values are old: the unit measures nothing while its dictionary is read.")
-        }
-        _ if view.viewing => Some("These values are old: the view is open and halts the unit. M closes it."),
-        _ if view.facts.stream.is_none() => Some("The stream is off: these are its last values. T switches it on."),
-        _ if view.monitor.stream.late => {
-            Some("No new row: these values are old. M asks whether the unit still answers.")
-        }
-        UnitState::Silent | UnitState::Unknown | UnitState::Application => None,
-    }
+    scene.view.monitor.stream.source.is_some() && scene.view.why_old().is_none()
 }
 
 /// The limits of one channel in a line, or how to see them.
@@ -487,8 +470,7 @@ fn value_row(
     };
     let since = since.map(|since| if trend.is_empty() { since } else { since + "  " }).unwrap_or_default();
     let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, channel.name);
-    let is_old = scene.view.monitor.stream.late || scene.view.facts.stream.is_none();
-    let value_style = if is_old { theme.quiet() } else { theme.strong() };
+    let value_style = if scene.view.why_old().is_some() { theme.quiet() } else { theme.strong() };
     Line::from(vec![
         Span::styled(name, if is_chosen { theme.strong() } else { ratatui::style::Style::new() }),
         Span::styled(format!("{value:>13}"), value_style),
@@ -513,7 +495,7 @@ impl Overview {
         let lasting = all.iter().filter(|fault| fault.until.is_none()).count();
         let mut remark = Vec::new();
         if !all.is_empty() {
-            let when = if why_old(scene).is_none() { "now" } else { "when last seen" };
+            let when = if is_current(scene) { "now" } else { "when last seen" };
             remark.push(format!("{lasting} {when}, {} since connecting", all.len()));
         }
         // How far it can be scrolled stands in the heading: a row of its own would take that of a fault.

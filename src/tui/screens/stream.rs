@@ -325,7 +325,7 @@ impl Stream {
             Some(held) => channel.at(held.cursor).map(|(_, reading)| reading),
         };
         let is_chosen = number == self.channel;
-        let is_old = stream.late || scene.view.facts.stream.is_none() || self.held.is_some();
+        let is_old = scene.view.why_old().is_some() || self.held.is_some();
         let (state, style) = state(theme, reading);
         let unit = if source == Source::FieldValue { " °C" } else { "   " };
         // Where there is no value its state says why; a unit behind nothing would look like a value.
@@ -376,19 +376,16 @@ fn state(theme: Theme, reading: Option<Reading>) -> (&'static str, Style) {
 /// What has to be said below the table: where rows go, or that none come.
 fn note(scene: Scene, columns: usize) -> Line<'static> {
     let (theme, view) = (scene.theme, scene.view);
-    let exports = view.export.is_some();
     // Where rows go says nothing of whether any come: that stands first, shorter where both have to.
-    let warning = match (view.facts.stream.is_none(), view.monitor.stream.late) {
-        (true, _) if exports => "  The stream is off. ",
-        (true, _) => "  The stream is off: these are its last values. T switches it on.",
-        (false, true) if exports => "  No new row: old values. ",
-        (false, true) => "  No new row: these values are old. M asks whether the unit still answers.",
-        (false, false) => "",
+    let warning = match view.why_old() {
+        Some(old) if view.export.is_some() => format!("  {} ", old.reason()),
+        Some(old) => format!("  {}", old.text()),
+        None => String::new(),
     };
-    let mut line = Line::from(Span::styled(warning, theme.warning()));
+    let mut line = Line::from(Span::styled(warning.clone(), theme.warning()));
     if let Some(export) = &view.export {
         let (begin, end) = (format!("  {} written to ", format::counted(export.rows, "row")), "; E ends it.");
-        let room = columns.saturating_sub(format::width(warning) + format::width(&begin) + format::width(end));
+        let room = columns.saturating_sub(format::width(&warning) + format::width(&begin) + format::width(end));
         let path = format::keep_end(&visible::text(&export.path.to_string_lossy()), room);
         let style = if warning.is_empty() { theme.good() } else { theme.quiet() };
         line.push_span(Span::styled(format!("{begin}{path}{end}"), style));

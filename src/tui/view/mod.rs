@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+mod limits;
+mod old;
+
 use super::input::{Failure, Noted, Playing};
 use super::returning::Returning;
 use super::widgets::format;
@@ -124,40 +127,8 @@ pub struct DictionaryRead {
     pub is_outdated: bool,
 }
 
-/// A channel's temperature limits in °C, as far as the unit showed them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Limits {
-    /// Below it there is a low warning (4000h).
-    pub low: Option<f64>,
-    /// From it on there is a high warning (4010h).
-    pub high: Option<f64>,
-    /// From it on there is a high shutdown (4020h).
-    pub shutdown: Option<f64>,
-}
-
-impl Limits {
-    /// What a value is beyond these, in a word. The unit itself waits for its reaction delay (4030h) before it says so.
-    pub fn word(self, value: f64) -> Option<&'static str> {
-        match self {
-            Limits { shutdown: Some(limit), .. } if value >= limit => Some("shutdown"),
-            Limits { high: Some(limit), .. } if value >= limit => Some("high"),
-            Limits { low: Some(limit), .. } if value < limit => Some("low"),
-            Limits { .. } => None,
-        }
-    }
-}
-
-/// Objects of both products with a limit for each channel (manuals, sections 3.4.12 to 3.4.14).
-const LOW_WARNING: u16 = 0x4000;
-const HIGH_WARNING: u16 = 0x4010;
-const HIGH_SHUTDOWN: u16 = 0x4020;
-/// Means of the valid channels, by bank and of all (manuals, section 3.4.3).
-const AVERAGES: u16 = 0x2100;
 /// Serial number of the identity object (CiA 301; both manuals, section 3.3).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
-/// They are in tenths of a degree.
-const LIMIT_STEPS: f64 = 10.0;
-
 /// How a recording says that a moment was marked; the mark's number follows.
 pub const MARK: &str = "mark ";
 
@@ -311,33 +282,6 @@ impl View {
         self.facts.product.as_ref().and_then(|known| Product::named(&known.value))
     }
 
-    /// The limits of a channel, once the object dictionary has been read; `None` for one without.
-    pub fn limits(&self, channel: &str) -> Option<Limits> {
-        let dictionary = &self.product()?.dictionary;
-        let limit = |index| {
-            let sub = dictionary.object(index)?.entries.iter().find(|entry| entry.name == channel)?.sub;
-            Some(self.read_value(index, sub)?.as_integer()? as f64 / LIMIT_STEPS)
-        };
-        let limits = Limits { low: limit(LOW_WARNING), high: limit(HIGH_WARNING), shutdown: limit(HIGH_SHUTDOWN) };
-        (limits != Limits::default()).then_some(limits)
-    }
-
-    /// The averages as they were when the object dictionary was read: of what, and in °C.
-    pub fn averages(&self) -> Vec<(&str, f64)> {
-        let object = self.product().and_then(|product| product.dictionary.object(AVERAGES));
-        let entries = object.into_iter().flat_map(|object| &object.entries).filter(|entry| entry.sub > 0);
-        let read = |sub| match self.read_value(AVERAGES, sub)? {
-            Value::Real32(value) => Some(f64::from(value)),
-            _ => None,
-        };
-        entries.filter_map(|entry| Some((entry.name.as_str(), read(entry.sub)?))).collect()
-    }
-
-    fn read_value(&self, index: u16, sub: u8) -> Option<Value> {
-        let entries = &self.current_dictionary()?.reading.entries;
-        entries.iter().find(|read| read.at == ObjectAddress::new(index, sub))?.value
-    }
-
     /// Whether the user has to say what the unit is, because nobody else can.
     pub fn needs_label(&self) -> bool {
         let is_mute = self.facts.state == UnitState::Loader || self.load.product_unknown;
@@ -361,8 +305,10 @@ impl View {
             self.nmt_heard = said(facts).map(|_| now);
             self.ages_at = self.nmt_heard.map(|heard| format::ages_at(heard, now));
         }
-        if facts.stream.is_none() {
-            self.monitor.stream.late = false;
+        match (self.facts.stream, facts.stream) {
+            (_, None) => self.monitor.stream.late = false,
+            (None, Some(_)) => self.monitor.stream.switched_on(now),
+            (Some(_), Some(_)) => {}
         }
         if facts.state == UnitState::Application && self.facts.state != UnitState::Application {
             // Whatever sub-menu was open, a restart has closed it.

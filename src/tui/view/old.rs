@@ -1,0 +1,64 @@
+//! When the values on the screen are not those of now.
+
+use super::View;
+use crate::session::{Job, UnitState};
+
+/// Why the values that are shown are those of before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Old {
+    /// The unit runs its loader, and measures nothing.
+    InLoader,
+    /// It measures nothing while it shows its object dictionary ...
+    DictionaryIsRead,
+    /// ... nor while its view is open.
+    Viewing,
+    /// It measures, and does not say what.
+    StreamOff,
+    /// It should have said something by now.
+    NoRow,
+    /// It will say something, but has not yet.
+    NoRowYet,
+}
+
+impl Old {
+    /// The reason alone, for a line that has more to say.
+    pub fn reason(self) -> &'static str {
+        match self {
+            Old::InLoader => "The unit is in its loader.",
+            Old::DictionaryIsRead => "The dictionary is being read.",
+            Old::Viewing => "The view is open.",
+            Old::StreamOff => "The stream is off.",
+            Old::NoRow => "No new row: old values.",
+            Old::NoRowYet => "No row yet.",
+        }
+    }
+
+    /// The reason, what it means for the values, and what to do about it.
+    pub fn text(self) -> &'static str {
+        match self {
+            Old::InLoader => "The unit is in its loader: these are its last values. L loads software.",
+            Old::DictionaryIsRead => "These values are old: the unit measures nothing while its dictionary is read.",
+            Old::Viewing => "These values are old: the view is open and halts the unit. M closes it.",
+            Old::StreamOff => "The stream is off: these are its last values. T switches it on.",
+            Old::NoRow => "No new row: these values are old. M asks whether the unit still answers.",
+            Old::NoRowYet => "The stream is on: no row has come yet, these values are from before.",
+        }
+    }
+}
+
+impl View {
+    /// Why the values that are shown are those of before, if there are any and they are.
+    pub fn why_old(&self) -> Option<Old> {
+        let stream = &self.monitor.stream;
+        stream.newest?;
+        match self.facts.state {
+            UnitState::Loader => Some(Old::InLoader),
+            _ if self.job == Some(Job::ReadDictionary) => Some(Old::DictionaryIsRead),
+            _ if self.viewing => Some(Old::Viewing),
+            _ if self.facts.stream.is_none() => Some(Old::StreamOff),
+            _ if stream.late => Some(Old::NoRow),
+            _ if stream.awaits_first_row() => Some(Old::NoRowYet),
+            UnitState::Silent | UnitState::Unknown | UnitState::Application => None,
+        }
+    }
+}
