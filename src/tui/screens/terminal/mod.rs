@@ -9,13 +9,16 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
+mod hex;
+
+use hex::HexPlace;
+
 use super::Scene;
 use crate::monitor::{Origin, Scrollback, TextLine};
-use crate::record::{Direction, Record};
+use crate::record::Record;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::popup::{Question, Wanted};
-use crate::tui::theme::Theme;
 use crate::tui::view::{Sending, View};
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
@@ -81,8 +84,6 @@ const SENDING_ROWS: u16 = 3;
 const ROWS_BELOW_FOUND: usize = 8;
 /// Columns of a time with its milliseconds, the blank behind it included.
 const TIME_COLUMNS: usize = 13;
-/// Bytes in a row of the hex view.
-const HEX_BYTES: u64 = 16;
 
 /// The terminal.
 #[derive(Debug, Default)]
@@ -109,14 +110,6 @@ impl Default for Mode {
     fn default() -> Self {
         Mode::Text(None)
     }
-}
-
-/// Where the hex view has been stopped: later bytes are not shown, and so many rows above them neither.
-#[derive(Debug, Clone, Copy)]
-struct HexPlace {
-    received: u64,
-    sent: u64,
-    rows: usize,
 }
 
 /// What a key means here.
@@ -265,7 +258,7 @@ impl Terminal {
         lines::draw(frame, heading, [lines::rule(scene.theme, area.width, name, &remark)]);
         let rows = match self.mode {
             Mode::Text(place) => text_rows(scene, body, place, self.with_times, &self.words),
-            Mode::Hex(place) => hex_rows(scene, body, place, self.with_times),
+            Mode::Hex(place) => hex::rows(scene, body, place, self.with_times),
         };
         if rows.is_empty() {
             let text = match scene.view.link.name {
@@ -289,13 +282,8 @@ impl Terminal {
                 Mode::Text((moved < scrollback.end()).then_some(moved))
             }
             Mode::Hex(place) => {
-                let place = place.unwrap_or(HexPlace { received: record.received(), sent: record.sent(), rows: 0 });
-                let wanted = usize::try_from((place.rows as i64 + up).max(0)).unwrap_or(0);
-                // Up to the page that is wanted, and no further: there may be half a million rows.
-                let page = usize::from(body.height).max(1);
-                let there = if up > 0 { hex(record, &place, wanted, page).1 } else { usize::MAX };
-                let rows = wanted.min(there.saturating_sub(page));
-                Mode::Hex((rows > 0).then_some(HexPlace { rows, ..place }))
+                let place = place.unwrap_or_else(|| HexPlace::newest(record));
+                Mode::Hex(place.moved(up, record, usize::from(body.height)))
             }
         };
     }
@@ -426,95 +414,6 @@ fn text_line(scene: Scene, line: &TextLine, columns: usize, with_times: bool) ->
         .collect()
 }
 
-/// A row of the hex view.
-struct HexRow {
-    direction: Direction,
-    /// Offset of the first place in the row, a multiple of [`HEX_BYTES`].
-    start: u64,
-    /// Offset of the first byte in it.
-    first: u64,
-    bytes: Vec<u8>,
-    at: crate::time::Instant,
-}
-
-fn hex_rows(scene: Scene, area: Rect, place: Option<HexPlace>, with_times: bool) -> Vec<Line<'static>> {
-    let room = usize::from(area.height);
-    let place = place.unwrap_or(HexPlace { received: scene.record.received(), sent: scene.record.sent(), rows: 0 });
-    let (rows, _) = hex(scene.record, &place, place.rows, room);
-    rows.iter().rev().map(|row| hex_line(scene.theme, row, with_times.then_some(scene.start_of_day))).collect()
-}
-
-/// Rows of the newest bytes before a place, newest row first: the first `skip` of them are only counted, `most` are
-/// built. Gives these, and how many rows were seen in all.
-fn hex(record: &Record, place: &HexPlace, skip: usize, most: usize) -> (Vec<HexRow>, usize) {
-    let mut rows: Vec<HexRow> = Vec::new();
-    let mut seen = 0;
-    // The row that is being put together, whether it is built or only counted.
-    let mut last: Option<(Direction, u64, u64)> = None;
-    for entry in record.entries().rev() {
-        let limit = match entry.direction {
-            Direction::FromUnit => place.received,
-            Direction::ToUnit => place.sent,
-        };
-        let mut end = (entry.start + entry.bytes.len() as u64).min(limit);
-        while end > entry.start {
-            let start = ((end - 1) / HEX_BYTES * HEX_BYTES).max(entry.start);
-            let bytes = &entry.bytes[(start - entry.start) as usize..(end - entry.start) as usize];
-            let row_start = start / HEX_BYTES * HEX_BYTES;
-            // Bytes of one row may have come in several pieces.
-            let goes_on = last == Some((entry.direction, row_start, end));
-            last = Some((entry.direction, row_start, start));
-            if !goes_on {
-                if rows.len() >= most {
-                    return (rows, seen);
-                }
-                seen += 1;
-                if seen > skip {
-                    let (direction, at) = (entry.direction, entry.at);
-                    rows.push(HexRow { direction, start: row_start, first: start, bytes: bytes.to_vec(), at });
-                }
-            } else if seen > skip
-                && let Some(row) = rows.last_mut()
-            {
-                row.first = start;
-                row.at = entry.at;
-                row.bytes.splice(0..0, bytes.iter().copied());
-            }
-            end = start;
-        }
-    }
-    (rows, seen)
-}
-
-fn hex_line(theme: Theme, row: &HexRow, times: Option<crate::time::Duration>) -> Line<'static> {
-    let skipped = (row.first - row.start) as usize;
-    let mut numbers = String::new();
-    let mut text = " ".repeat(skipped);
-    for place in 0..HEX_BYTES as usize {
-        if place == HEX_BYTES as usize / 2 {
-            numbers.push(' ');
-        }
-        match place.checked_sub(skipped).and_then(|position| row.bytes.get(position)) {
-            Some(byte) => {
-                numbers.push_str(&format!("{byte:02x} "));
-                text.push(visible::column(*byte));
-            }
-            None => numbers.push_str("   "),
-        }
-    }
-    let (mark, style) = match row.direction {
-        Direction::FromUnit => ("  ", Style::new()),
-        Direction::ToUnit => ("» ", theme.sent()),
-    };
-    let time = times.map(|start| format!("{} ", format::time_of_day(start, row.at))).unwrap_or_default();
-    Line::from(vec![
-        Span::styled(time, theme.quiet()),
-        Span::styled(mark, theme.quiet()),
-        Span::styled(format!("{:08x}  ", row.start), theme.quiet()),
-        Span::styled(format!("{numbers} {text}"), style),
-    ])
-}
-
 /// The byte a terminal sends for a character with Ctrl.
 fn control(character: char) -> Option<u8> {
     match character.to_ascii_uppercase() {
@@ -529,8 +428,6 @@ fn control(character: char) -> Option<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::endpoint::Secrecy;
-    use crate::time::Instant;
 
     fn sent(code: KeyCode, modifiers: KeyModifiers) -> Option<Vec<u8>> {
         match Terminal::default().meaning(KeyEvent::new(code, modifiers)) {
@@ -562,43 +459,5 @@ mod tests {
         assert!(matches!(terminal.meaning(letter), Meaning::Keys(_)));
         terminal.meaning(prefix);
         assert!(matches!(terminal.meaning(prefix), Meaning::Keys(bytes) if bytes == [0x1d]));
-    }
-
-    #[test]
-    fn hex_rows_join_pieces_of_one_direction_and_keep_the_order() {
-        let mut record = Record::new();
-        let mut say = |millis, direction, bytes: &[u8]| {
-            record.push(Instant::from_millis(millis), direction, Secrecy::Open, bytes);
-        };
-        say(1, Direction::FromUnit, b"0123456789");
-        say(2, Direction::FromUnit, b"abcdefgh");
-        say(3, Direction::ToUnit, b"m");
-        say(4, Direction::FromUnit, b"ij");
-        let place = HexPlace { received: record.received(), sent: record.sent(), rows: 0 };
-        let shown = |skip, most| -> Vec<(u64, String)> {
-            let (rows, _) = hex(&record, &place, skip, most);
-            rows.iter().map(|row| (row.start, String::from_utf8_lossy(&row.bytes).into())).collect()
-        };
-        let rows = shown(0, 9);
-        let expected: [(u64, String); 4] =
-            [(16, "ij".into()), (0, "m".into()), (16, "gh".into()), (0, "0123456789abcdef".into())];
-        assert_eq!(rows, expected);
-        for skip in 0..6 {
-            assert_eq!(shown(skip, 1), expected.iter().skip(skip).take(1).cloned().collect::<Vec<_>>(), "{skip}");
-        }
-        assert_eq!(hex(&record, &place, 9, 1).1, 4, "all of them are counted");
-        assert_eq!(hex(&record, &HexPlace { received: 10, sent: 0, rows: 0 }, 0, 9).0.len(), 1);
-    }
-
-    #[test]
-    fn a_step_far_up_in_a_full_record_builds_one_row_and_not_half_a_million() {
-        let mut record = Record::new();
-        (0..1500).for_each(|_| {
-            record.push(Instant::ZERO, Direction::FromUnit, Secrecy::Open, &[0x55; 4096]);
-        });
-        let place = HexPlace { received: record.received(), sent: 0, rows: 0 };
-        let (rows, seen) = hex(&record, &place, 300_000, 1);
-        assert_eq!((rows.len(), seen), (1, 300_001));
-        assert_eq!(rows[0].start, record.received() - 16 * 300_001);
     }
 }

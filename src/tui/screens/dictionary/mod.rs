@@ -5,14 +5,16 @@
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
-use ratatui::style::Style;
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
+
+mod detail;
+mod row;
+
+use row::{Row, Widths};
 
 use super::Scene;
 use crate::canopen::ObjectAddress;
-use crate::device::Product;
-use crate::device::dictionary::{Access, Bound, Entry, Limits, Object};
-use crate::dump::{self, Difference, Dump, DumpEntry, Measure};
+use crate::dump::{self, Dump};
 use crate::session::Job;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
@@ -60,6 +62,8 @@ pub const BINDINGS: &[Binding] = &[
 ];
 
 const HEADING: &str = "Object dictionary";
+/// Columns of a heading's rule beside its texts, and of the blank in its title.
+const RULE_COLUMNS: usize = 11;
 /// Rows of the pane that explains the chosen entry, its heading included.
 const DETAIL_ROWS: u16 = 8;
 /// From this width on that pane stands beside the table ...
@@ -67,16 +71,6 @@ const BESIDE_AT: u16 = 150;
 /// ... and takes so many columns at least; the table takes no more than these.
 const DETAIL_COLUMNS: u16 = 64;
 const TABLE_COLUMNS: u16 = 140;
-/// Columns of cursor, mark and address.
-const FIXED_COLUMNS: usize = 4 + 9;
-/// Columns at most of the value and of the factory's: on a narrow screen they leave room for the longest name.
-const MOST_COLUMNS: [(usize, usize); 2] = [(14, 10), (22, 16)];
-/// From this width on there is room for the wider ones.
-const WIDE_AT: usize = 100;
-/// From this width on the meaning of the value has a column.
-const MEANING_AT: usize = 120;
-/// Columns of it.
-const MEANING_COLUMNS: usize = 36;
 
 /// The page.
 #[derive(Debug, Default)]
@@ -101,17 +95,6 @@ enum Only {
 struct Other {
     name: String,
     dump: Dump,
-}
-
-/// One row of the table.
-struct Row<'a> {
-    at: ObjectAddress,
-    /// What the manual says.
-    known: Option<(&'static Object, &'static Entry)>,
-    /// What the unit shows.
-    read: Option<&'a DumpEntry>,
-    /// How the other dump differs.
-    difference: Option<Difference>,
 }
 
 /// The products of a dump and of the unit, where they are not the same.
@@ -203,11 +186,12 @@ impl Dictionary {
                 let mut rows: Vec<_> = entries
                     .map(|(at, entry)| Row { at, known: known(at), read: Some(entry), difference: None })
                     .collect();
-                let missing = manual(product).filter(|row| read.reading.entries.iter().all(|read| read.at != row.at));
+                let missing =
+                    Row::of_manual(product).filter(|row| read.reading.entries.iter().all(|read| read.at != row.at));
                 rows.extend(missing.collect::<Vec<_>>());
                 rows
             }
-            None => manual(product).collect(),
+            None => Row::of_manual(product).collect(),
         };
         if let (Some(other), Some(read)) = (&self.other, &view.dictionary) {
             // What is measured is another value at every reading.
@@ -268,7 +252,7 @@ impl Dictionary {
             format::left("Value", widths.value),
             format::left(&factory, widths.factory)
         );
-        if columns >= MEANING_AT {
+        if widths.meaning {
             heads.push_str("Meaning");
         }
         lines::draw(frame, head, heading.into_iter().chain([Line::styled(heads, theme.quiet())]));
@@ -376,271 +360,4 @@ fn parts(area: Rect) -> (Rect, Rect) {
         }
         false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
     }
-}
-
-/// The manual's entries, as nobody has read them.
-fn manual<'a>(product: Option<&'static Product>) -> impl Iterator<Item = Row<'a>> {
-    product.into_iter().flat_map(|product| product.dictionary.entries()).map(|(at, object, entry)| Row {
-        at,
-        known: Some((object, entry)),
-        read: None,
-        difference: None,
-    })
-}
-
-/// How wide the columns are.
-struct Widths {
-    name: usize,
-    value: usize,
-    factory: usize,
-    /// The meaning of the value has a column.
-    meaning: bool,
-}
-
-impl Widths {
-    /// As wide as what is in them, within limits; the names have the rest.
-    fn of(rows: &[Row], factory: &str, compares: bool, columns: usize) -> Self {
-        let (most_value, most_factory) = MOST_COLUMNS[usize::from(columns >= WIDE_AT || compares)];
-        let widest = |head: &str, cells: &mut dyn Iterator<Item = String>| {
-            cells.map(|cell| format::width(&cell)).max().unwrap_or_default().max(format::width(head))
-        };
-        let value = widest("Value", &mut rows.iter().map(|row| row.cell(most_value))).min(most_value);
-        let factory = widest(factory, &mut rows.iter().map(|row| row.other_cell(most_factory))).min(most_factory);
-        let meaning = columns >= MEANING_AT;
-        let taken =
-            FIXED_COLUMNS + value + factory + 2 + VALUES_APART.len() + if meaning { MEANING_COLUMNS } else { 0 };
-        Widths { name: columns.saturating_sub(taken), value, factory, meaning }
-    }
-}
-
-/// What stands between two values, which may be of many words.
-const VALUES_APART: &str = "  ";
-/// Columns of a heading's rule beside its texts, and of the blank in its title.
-const RULE_COLUMNS: usize = 11;
-
-impl Row<'_> {
-    fn name(&self) -> String {
-        match self.known {
-            Some((object, entry)) => dump::name(object, entry),
-            None => "not in the manual".into(),
-        }
-    }
-
-    /// How its numbers stand for a quantity, where they do.
-    fn measure(&self) -> Option<Measure> {
-        let of_manual = self.known.and_then(|(_, entry)| entry.unit.as_deref());
-        self.read.and_then(|read| read.unit.as_deref()).or(of_manual).map(Measure::of)
-    }
-
-    /// A number as people read it, without its unit.
-    fn number(&self, raw: String) -> String {
-        match (self.measure(), raw.parse()) {
-            (Some(measure), Ok(value)) => measure.number(value, &raw),
-            _ => raw,
-        }
-    }
-
-    /// The value without its unit.
-    fn bare_value(&self) -> String {
-        match self.read {
-            Some(read) if read.value.is_none() => read.meaning.clone().unwrap_or_else(|| visible::text(&read.text)),
-            Some(read) => self.number(read.shown()),
-            None => "-".into(),
-        }
-    }
-
-    fn value(&self) -> String {
-        match (self.read.is_some_and(|read| read.value.is_some()), self.measure()) {
-            (true, Some(measure)) => format!("{} {}", self.bare_value(), measure.unit),
-            _ => self.bare_value(),
-        }
-    }
-
-    /// The value in so many columns: rather the whole number without its unit, which is told below, than half of both.
-    fn cell(&self, columns: usize) -> String {
-        let value = self.value();
-        if format::width(&value) <= columns { value } else { self.bare_value() }
-    }
-
-    /// The factory's value, without its unit.
-    fn default(&self) -> String {
-        let manual = || self.known.and_then(|(_, entry)| Some(dump::shown(entry, entry.default?.value)));
-        match self.read {
-            Some(read) => self.number(read.shown_default()),
-            None => manual().map_or_else(|| "-".into(), |raw| self.number(raw)),
-        }
-    }
-
-    /// What the value is compared with.
-    fn other(&self) -> String {
-        match &self.difference {
-            Some(difference) => difference.shown_left().map_or_else(|| "not there".into(), |raw| self.number(raw)),
-            None => self.default(),
-        }
-    }
-
-    /// The same in so many columns: with its unit where there is room for both.
-    fn other_cell(&self, columns: usize) -> String {
-        let bare = self.other();
-        let with_unit = self.measure().map(|measure| format!("{bare} {}", measure.unit));
-        let is_number = bare.trim_start_matches('-').starts_with(|first: char| first.is_ascii_digit());
-        with_unit.filter(|text| is_number && format::width(text) <= columns).unwrap_or(bare)
-    }
-
-    /// What the value stands for; what stands in place of one needs no other words.
-    fn meaning(&self) -> Option<&str> {
-        self.read.filter(|read| read.value.is_some()).and_then(|read| read.meaning.as_deref())
-    }
-
-    /// What is searched, in lower case.
-    fn text(&self) -> String {
-        let description = self.known.and_then(|(_, entry)| entry.description.as_deref()).unwrap_or_default();
-        // Also as the unit keeps it: that is what other tools show.
-        let raw = self.read.map(DumpEntry::shown).unwrap_or_default();
-        let (value, meaning) = (self.value(), self.meaning().unwrap_or(""));
-        let text = format!("{} {} {value} {raw} {meaning} {description}", self.at, self.name());
-        text.to_lowercase()
-    }
-
-    fn line(&self, scene: Scene, is_chosen: bool, widths: &Widths) -> Line<'static> {
-        let theme = scene.theme;
-        let deviates = self.read.is_some_and(|read| read.deviates);
-        let was_read = scene.view.dictionary.is_some();
-        let mark = match (self.read, &self.difference) {
-            (_, Some(_)) => "≠",
-            (Some(_), None) if deviates => "*",
-            (None, None) if was_read => "?",
-            _ => " ",
-        };
-        let value = self.cell(widths.value);
-        let value_style = if deviates || self.difference.is_some() { theme.warning() } else { theme.strong() };
-        let mut line = Line::from(vec![
-            Span::raw(if is_chosen { "› " } else { "  " }),
-            Span::styled(format!("{mark} "), theme.warning()),
-            Span::raw(format::left(&self.at.to_string(), 9)),
-            Span::raw(format::left(&format::keep_ends(&self.name(), widths.name), widths.name)),
-            Span::raw(" "),
-            Span::styled(format::left(&value, widths.value), value_style),
-            Span::raw(VALUES_APART),
-            Span::styled(format::left(&self.other_cell(widths.factory), widths.factory), theme.quiet()),
-            Span::raw(" "),
-        ]);
-        if widths.meaning {
-            line.push_span(Span::raw(format::left(self.meaning().unwrap_or_default(), MEANING_COLUMNS)));
-        }
-        if is_chosen { line.style(theme.bar()) } else { line }
-    }
-
-    /// Everything about it; without much room the first lines of it.
-    fn detail(&self, scene: Scene, columns: u16, has_room: bool) -> Vec<Line<'static>> {
-        let theme = scene.theme;
-        let room = usize::from(columns).saturating_sub(2 + lines::LABEL_COLUMNS);
-        let section = self.known.map(|(object, _)| format!("section {}", object.section)).unwrap_or_default();
-        let long = self.known.map(|_| format!("manual, {section}")).unwrap_or_default();
-        let address = self.at.to_string();
-        // What is left beside address, remark, and the rule between and around them.
-        let left = |remark: &str| {
-            usize::from(columns).saturating_sub(format::width(&address) + format::width(remark) + RULE_COLUMNS)
-        };
-        let fits = |remark: &str| format::width(&self.name()) <= left(remark);
-        // Beside the table there are rows for it, and no columns.
-        let remark = match has_room {
-            true => "",
-            false if fits(&long) => &long,
-            false => &section,
-        };
-        let title = format!("{address} {}", format::keep_ends(&self.name(), left(remark)));
-        let mut rows = vec![lines::rule(theme, columns, &title, remark)];
-        let mut labelled = |label: &str, text: String, most: usize| {
-            let most = if has_room { usize::MAX } else { most };
-            for (number, line) in format::wrap(&text, room).into_iter().take(most).enumerate() {
-                let label = if number == 0 { label } else { "" };
-                rows.push(lines::labelled(theme, label, Span::styled(line, Style::new())));
-            }
-        };
-        let mut value = self.value();
-        if let Some(read) = self.read.filter(|_| self.measure().is_some_and(|measure| measure.is_scaled())) {
-            value.push_str(&format!(" (raw {})", read.number()));
-        }
-        if let Some(meaning) = self.meaning() {
-            value.push_str(&format!(": {meaning}"));
-        }
-        match self.read {
-            Some(read) if read.deviates => value.push_str("; not as the factory made it"),
-            Some(_) => {}
-            None if scene.view.dictionary.is_some() => value = "not shown by the unit".into(),
-            None if scene.view.can_send() => value = "not read yet: V reads it".into(),
-            None => value = format!("not read. {}", without_unit(scene.view)),
-        }
-        labelled("Value", value, 1);
-        let Some((_, entry)) = self.known else {
-            let text = self.read.map(|read| visible::text(&read.text)).unwrap_or_default();
-            labelled("Printed", text, 3);
-            return rows;
-        };
-        let factory = entry.default.map_or_else(
-            || "none: the unit itself supplies it".to_owned(),
-            |default| {
-                let meaning = entry.meaning(default.value).map(|text| format!(": {text}")).unwrap_or_default();
-                let node = if default.plus_node_id { " + node-ID" } else { "" };
-                let raw = dump::shown(entry, default.value);
-                let value = match self.measure() {
-                    Some(measure) => measure.quantity(default.value.as_f64(), &raw),
-                    None => raw,
-                };
-                format!("{value}{node}{meaning}")
-            },
-        );
-        labelled("Factory", factory, 1);
-        let access = match entry.access {
-            Access::ReadOnly => "read only",
-            Access::ReadWrite => "read and write",
-        };
-        let mappable = if entry.mappable { ", a PDO may carry it" } else { "" };
-        let data_type = format!("{:?}", entry.data_type).to_uppercase();
-        labelled("Type", format!("{data_type}, {access}{mappable}{}", range(&entry.limits, entry)), 1);
-        if !entry.meanings.is_empty() {
-            let meanings: Vec<String> =
-                entry.meanings.iter().map(|meaning| format!("{} {}", meaning.value, meaning.text)).collect();
-            labelled("Values", meanings.join(", "), 2);
-        }
-        if let Some(description) = &entry.description {
-            labelled("What for", description.clone(), 3);
-        }
-        if let Some(read) = self.read.filter(|read| !read.text.is_empty()) {
-            labelled("Printed", visible::text(&read.text), 1);
-        }
-        if has_room {
-            labelled("Described", format!("in the {long}"), 1);
-        }
-        rows
-    }
-}
-
-/// `, 0 to 100 °C`.
-fn range(limits: &Limits, entry: &Entry) -> String {
-    let measure = entry.unit.as_deref().map(Measure::of);
-    let number = |value: f64, raw: String| match &measure {
-        Some(measure) => measure.number(value, &raw),
-        None => raw,
-    };
-    let bound = |bound: &Bound| match bound {
-        Bound::Value(value) => number(value.as_f64(), value.to_string()),
-        Bound::Entry { at, offset: 0 } => format!("{at}"),
-        Bound::Entry { at, offset } => {
-            let sign = if *offset < 0 { '-' } else { '+' };
-            let size = offset.unsigned_abs();
-            format!("{at} {sign} {}", number(size as f64, size.to_string()))
-        }
-    };
-    let unit = measure.as_ref().map(|measure| format!(" {}", measure.unit)).unwrap_or_default();
-    let values: Vec<String> = limits.values.iter().map(|value| number(value.as_f64(), value.to_string())).collect();
-    let span = match (&limits.low, &limits.high) {
-        (Some(low), Some(high)) => Some(format!("{} to {}{unit}", bound(low), bound(high))),
-        (Some(low), None) => Some(format!("from {}{unit}", bound(low))),
-        (None, Some(high)) => Some(format!("up to {}{unit}", bound(high))),
-        (None, None) => None,
-    };
-    let parts: Vec<String> = values.into_iter().chain(span).collect();
-    if parts.is_empty() { String::new() } else { format!(", {}", parts.join(" or ")) }
 }
