@@ -351,9 +351,7 @@ impl App {
         let job = self.view.job.filter(|_| !self.view.awaits_first_row());
         let why_not = match (menu, job, self.view.facts.state) {
             (MenuCmd::Diagnostics, Some(Job::Diagnostics), _) | (_, Some(Job::Identify), _) => None,
-            (_, Some(Job::SendFile), _) => Some("a file is being sent: Esc on the terminal screen stops it"),
-            (_, Some(Job::Diagnostics), _) => Some("the unit prints its diagnostics: S stops them first"),
-            (_, Some(_), _) => Some("a job runs: wait for its end, or cancel it with Esc on its screen"),
+            (_, Some(_), _) => self.view.busy(),
             (MenuCmd::Menu, ..) => None,
             (MenuCmd::Defaults | MenuCmd::Stream | MenuCmd::Diagnostics, None, _) if self.view.viewing => {
                 Some("the view is open and has keys of its own: M closes it")

@@ -288,6 +288,7 @@ impl App {
     fn footer(&self, columns: usize) -> Vec<Binding> {
         let bindings = match self.front {
             ScreenId::Load => self.load.footer(&self.view),
+            ScreenId::Dictionary => self.dictionary.footer(&self.view),
             screen => screen.bindings().to_vec(),
         };
         let meant = bindings.into_iter().filter(|binding| self.means_something(binding.cmd)).collect();
@@ -308,7 +309,7 @@ impl App {
             (ScreenId::Overview | ScreenId::Stream, _) => has_rows,
             (ScreenId::Dictionary, Cmd::Compare) => view.current_dictionary().is_some(),
             (ScreenId::Dictionary, Cmd::Export | Cmd::Only) => view.dictionary.is_some(),
-            (ScreenId::Dictionary, Cmd::Back) => self.dictionary.is_narrowed(),
+            (ScreenId::Dictionary, Cmd::Back) => self.dictionary.is_narrowed() || view.job == Some(Job::ReadDictionary),
             (ScreenId::Dictionary, _) => view.dictionary.is_some() || view.product().is_some(),
             (ScreenId::Diagnostics, _) => view.monitor.diagnostics.at.is_some(),
             (ScreenId::Recordings, Cmd::Down | Cmd::Accept) => !self.recordings.entries().is_empty(),

@@ -125,3 +125,13 @@ fn an_error_is_allowed_by_its_name_in_one_file_only_and_the_plan_says_so() {
     stage.keys("p/other.S").press(KeyCode::Enter);
     assert_eq!(stage.asked(), [Effect::CheckImage { path: "/other.S".into(), loader: None, allow: Vec::new() }]);
 }
+
+#[test]
+fn enter_says_what_stands_against_an_upload() {
+    let mut stage = Stage::with_ports(SMALL).with_image(good_image());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("Not started: no unit is connected. Press 1 to choose a link."), "{}", stage.picture());
+    let mut stage = Stage::connected(SMALL).with_image(bad_image());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("Not started: the file has errors"), "{}", stage.picture());
+}

@@ -272,6 +272,20 @@ impl View {
         self.job == Some(Job::StreamOn) && self.facts.stream.is_some()
     }
 
+    /// Why the unit takes no other job now, and what ends the one it has.
+    pub fn busy(&self) -> Option<&'static str> {
+        match self.job.filter(|_| !self.awaits_first_row())? {
+            Job::SendFile => Some("a file is being sent: Esc on the terminal screen stops it"),
+            Job::Diagnostics => Some("the unit prints its diagnostics: S stops them first"),
+            Job::Identify => Some("the unit is being asked who it is: wait a moment"),
+            Job::ReadDictionary => Some("the object dictionary is being read: Esc on its screen cancels that"),
+            Job::Load => Some("new software is being loaded: Esc on its screen cancels that"),
+            Job::StreamOn | Job::StreamOff | Job::RestoreDefaults | Job::Overhear => {
+                Some("the unit is being told something: wait a moment")
+            }
+        }
+    }
+
     /// Whether something would stay half done if the link were closed now.
     pub fn is_in_the_middle(&self) -> bool {
         self.has_job_to_end() || self.viewing

@@ -141,3 +141,19 @@ fn a_power_cycle_and_a_loader_make_history_of_what_was_read() {
     desk.run(Duration::from_secs(3)).key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("5");
     assert!(desk.picture().contains("from before the restart"), "{}", desk.picture());
 }
+
+#[test]
+fn reading_the_dictionary_is_cancelled_by_esc_and_the_unit_measures_again() {
+    let mut desk = Desk::new();
+    desk.keys("t500").press(KeyCode::Enter);
+    desk.wait_for("every 500 ms");
+    desk.keys("v").press(KeyCode::Enter).run(Duration::from_secs(1));
+    assert!(desk.picture().contains("reading: ") && desk.picture().contains("Esc cancel"), "{}", desk.picture());
+    desk.keys("d");
+    assert!(desk.picture().contains("Esc on its screen cancels that"), "{}", desk.picture());
+    desk.press(KeyCode::Esc);
+    desk.wait_for("Cancelled, reading the object dictionary.");
+    assert!(desk.picture().contains("the manual's"), "what was read of it is not all of it: {}", desk.picture());
+    desk.run(Duration::from_secs(2)).keys("2");
+    assert!(!desk.picture().contains("values are"), "{}", desk.picture());
+}

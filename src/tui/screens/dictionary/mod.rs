@@ -15,7 +15,7 @@ use row::{Row, Widths};
 use super::Scene;
 use crate::canopen::ObjectAddress;
 use crate::dump::{self, Dump};
-use crate::session::Job;
+use crate::session::{Command, Job};
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::popup::{Purpose, Question, Wanted};
@@ -58,8 +58,17 @@ pub const BINDINGS: &[Binding] = &[
         short: "export",
         long: "write what was read to a file: .json, .csv, .dcf or .txt",
     },
-    Binding { keys: &[Press::Plain(KeyCode::Esc)], cmd: Cmd::Back, short: "everything", long: "show everything again" },
+    Binding {
+        keys: ESC,
+        cmd: Cmd::Back,
+        short: "everything",
+        long: "show everything again; while it is being read: cancel",
+    },
 ];
+
+const ESC: &[Press] = &[Press::Plain(KeyCode::Esc)];
+/// What the footer shows while the unit is being read: until then nothing else is wanted of it.
+const READING_KEYS: &[Binding] = &[Binding { keys: ESC, cmd: Cmd::Back, short: "cancel", long: "" }];
 
 const HEADING: &str = "Object dictionary";
 /// Columns of a heading's rule beside its texts, and of the blank in its title.
@@ -147,6 +156,7 @@ impl Dictionary {
                 };
                 self.cursor = 0;
             }
+            Cmd::Back if view.job == Some(Job::ReadDictionary) => return Some(Action::Command(Command::Cancel)),
             Cmd::Back => {
                 (self.only, self.other, self.cursor) = (Only::Everything, None, 0);
                 self.words.clear();
@@ -171,6 +181,14 @@ impl Dictionary {
     /// Whether something is left out, or compared: Esc ends that.
     pub fn is_narrowed(&self) -> bool {
         self.only != Only::Everything || self.other.is_some() || !self.words.is_empty()
+    }
+
+    /// The keys that mean something now, for the footer.
+    pub fn footer(&self, view: &View) -> Vec<Binding> {
+        match view.job {
+            Some(Job::ReadDictionary) => READING_KEYS.to_vec(),
+            _ => BINDINGS.to_vec(),
+        }
     }
 
     /// Everything there is to show: what was read, what the manual has besides, and what only the other dump has.

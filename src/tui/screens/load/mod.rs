@@ -300,8 +300,11 @@ impl Load {
                     Cmd::Allow if !facts.errors.is_empty() => {
                         return Some(Action::Ask(Question::allow(facts.errors.clone())));
                     }
-                    Cmd::Accept if objections(facts, view).is_empty() => {
-                        return Some(Question::start_load(view, facts));
+                    Cmd::Accept => {
+                        return Some(match objections(facts, view).first() {
+                            Some(objection) => Action::Tell(format!("Not started: {objection}")),
+                            None => Question::start_load(view, facts),
+                        });
                     }
                     _ => {}
                 }

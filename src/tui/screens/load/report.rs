@@ -46,8 +46,8 @@ pub(super) fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
         let (image, unit) = (visible::text(image), visible::text(&noted.product));
         against.push(format!("the file is for an {image}, our notes say {unit}."));
     }
-    if view.job.is_some() {
-        against.push("something else is being done with the unit. Wait for it to end.".to_owned());
+    if let Some(busy) = view.busy() {
+        against.push(format!("{busy}."));
     }
     against
 }
