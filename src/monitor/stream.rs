@@ -140,6 +140,11 @@ impl Stream {
         self.set.or_else(|| self.median())
     }
 
+    /// The time between rows that was set, where that is known.
+    pub fn set_period_known(&self) -> Option<Duration> {
+        self.set
+    }
+
     /// A repetition time was set; `None` if nobody knows any more which.
     pub fn set_period(&mut self, period: Option<Duration>) {
         if self.set != period {
@@ -197,9 +202,9 @@ impl Stream {
         Some(since + (self.slowest().unwrap_or_default() * LATE_PERIODS).max(LATE_AT_LEAST))
     }
 
-    /// Marks a moment, behind the marks so far.
+    /// Marks a moment, which may be one of before.
     pub fn mark(&mut self, at: Instant) -> Mark {
-        let number = self.marks.back().map_or(1, |last| last.number + 1);
+        let number = self.marks.iter().map(|mark| mark.number).max().unwrap_or(0) + 1;
         let mark = Mark { number, at };
         self.set_mark(mark);
         mark
@@ -207,7 +212,8 @@ impl Stream {
 
     /// Takes over a mark that has its number already: one in a recording.
     pub fn set_mark(&mut self, mark: Mark) {
-        self.marks.push_back(mark);
+        let place = self.marks.partition_point(|known| known.at <= mark.at);
+        self.marks.insert(place, mark);
         if self.marks.len() > KEPT_MARKS {
             self.marks.pop_front();
         }

@@ -8,6 +8,7 @@ use super::screens::ScreenId;
 use crate::image::DefectId;
 use crate::secret::Secret;
 use crate::session::Command;
+use crate::time::Instant;
 
 /// A wish. `App` performs it, or says why not.
 #[derive(Debug)]
@@ -50,8 +51,8 @@ pub enum Action {
     DismissReport,
     /// Start minimum and maximum anew.
     RestartExtremes,
-    /// Mark this moment in chart and recording.
-    Mark,
+    /// Mark this moment, or an earlier one, in chart and recording.
+    Mark(Option<Instant>),
     /// Show only what has these words, or go to the newest line that has.
     Find(String),
     /// Write the stream to a new file from now on, the rows kept first.

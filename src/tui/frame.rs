@@ -21,7 +21,7 @@ const ABOVE: u16 = 2;
 /// Rows below it, the latest word in one line.
 const BELOW: u16 = 3;
 /// Lines that the latest word may take.
-const MOST_NOTICE_ROWS: usize = 2;
+const MOST_NOTICE_ROWS: usize = 3;
 /// What stands before the recording's name.
 const RECORDING: &str = "rec ";
 /// What stands before the unit's menu.

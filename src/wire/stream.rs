@@ -209,9 +209,9 @@ impl Row {
         line
     }
 
-    /// A mark among such rows: `2026-01-31T12:00:00.123Z,mark 1,,,,,`, as many fields as rows of so many channels have.
-    pub fn csv_mark(time: &str, number: u64, channels: usize) -> String {
-        format!("{time},mark {number}{}\n", ",".repeat(channels))
+    /// A word among such rows: `2026-01-31T12:00:00.123Z,mark 1,,,,,`, as many fields as rows of so many channels have.
+    pub fn csv_note(time: &str, text: &str, channels: usize) -> String {
+        format!("{time},{text}{}\n", ",".repeat(channels))
     }
 }
 

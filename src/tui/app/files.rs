@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use super::App;
 use crate::dump::{self, Dump};
 use crate::session::{Command, Job};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::tui::input::{Effect, FIRST_BYTES, Failure, FileEntry, ImageFacts};
 use crate::tui::picker::{begins_like_an_image, is_image_name};
 use crate::tui::popup::{Popup, Purpose, Question};
 use crate::tui::screens::dictionary::other_product;
-use crate::tui::view::{Export, MARK, Sending, Tone, doing};
+use crate::tui::view::{Export, Sending, Tone, doing, marked};
 use crate::tui::visible;
 use crate::tui::widgets::format;
 use crate::wire::stream::Row;
@@ -111,16 +111,24 @@ impl App {
         }
     }
 
-    pub(super) fn mark(&mut self, effects: &mut Vec<Effect>) {
-        let mark = self.view.monitor.stream.mark(self.now);
-        let text = format!("{MARK}{}", mark.number);
-        self.scrollback.note(self.now, text.clone());
+    /// Marks a moment: now, or the one that is looked at.
+    pub(super) fn mark(&mut self, at: Option<Instant>, effects: &mut Vec<Effect>) {
+        let at = at.unwrap_or(self.now).min(self.now);
+        let mark = self.view.monitor.stream.mark(at);
+        let text = marked(mark.number, self.now.since(at));
         let places = if self.view.export.is_some() { "chart, recording and file" } else { "chart and recording" };
-        self.view.tell(Tone::Quiet, format!("{text} is set, in {places}."));
+        let time = format::time_of_day(self.start_of_day, at);
+        self.view.tell(Tone::Quiet, format!("Mark {} is set at {time}, in {places}.", mark.number));
+        self.scrollback.note(self.now, text.clone());
         effects.push(Effect::Mark(text));
-        let time = format::utc(self.view.link.start_millis, mark.at);
+        self.export_note(at, &marked(mark.number, Duration::ZERO), effects);
+    }
+
+    /// A word among the rows that go to a file.
+    pub(super) fn export_note(&mut self, at: Instant, text: &str, effects: &mut Vec<Effect>) {
+        let time = format::utc(self.view.link.start_millis, at);
         if let Some(export) = &self.view.export {
-            let bytes = Row::csv_mark(&time, mark.number, export.channels.len()).into_bytes();
+            let bytes = Row::csv_note(&time, text, export.channels.len()).into_bytes();
             effects.push(Effect::AppendFile { path: export.path.clone(), bytes });
         }
     }
@@ -136,7 +144,8 @@ impl App {
         let mut marks = stream.marks.iter().peekable();
         let mut marks_before = |at: Instant, text: &mut String| {
             while let Some(mark) = marks.next_if(|mark| mark.at < at) {
-                text.push_str(&Row::csv_mark(&format::utc(start, mark.at), mark.number, channels.len()));
+                let word = marked(mark.number, Duration::ZERO);
+                text.push_str(&Row::csv_note(&format::utc(start, mark.at), &word, channels.len()));
             }
         };
         for (at, row) in stream.kept_rows() {

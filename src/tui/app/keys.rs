@@ -190,7 +190,8 @@ impl App {
                 _ => return,
             }
         }
-        if self.front == ScreenId::Terminal {
+        // Nothing of a recording takes keys: there they are the console's.
+        if self.front == ScreenId::Terminal && !self.view.is_recording() {
             if self.view.job == Some(Job::SendFile) && key.code == KeyCode::Esc && !self.terminal.is_after_prefix() {
                 return self.perform(Action::Command(Command::Cancel), effects);
             }
@@ -379,7 +380,7 @@ impl App {
             MenuCmd::Stream if self.view.facts.stream.is_some() => {
                 self.perform(Action::Command(Command::StreamOff), effects);
             }
-            MenuCmd::Stream => self.ask(Question::stream()),
+            MenuCmd::Stream => self.ask(Question::stream(&self.view)),
             MenuCmd::Diagnostics if self.view.job == Some(Job::Diagnostics) => {
                 self.perform(Action::Command(Command::Cancel), effects);
             }

@@ -3,6 +3,7 @@
 use ratatui::crossterm::event::KeyCode;
 
 use super::App;
+use crate::monitor::Scrollback;
 use crate::session::{Command, Event, Session, UnitState};
 use crate::time::{Duration, Instant};
 use crate::tui::input::{Effect, Failure, LinkInfo};
@@ -140,6 +141,9 @@ impl App {
         }
         self.popup = None;
         let read_only = info.read_only;
+        if read_only || self.view.link.state == (LinkState::Open { read_only: true }) {
+            self.forget_lines();
+        }
         if !read_only {
             self.connect.opened(&info.link);
         }
@@ -150,6 +154,12 @@ impl App {
         if !read_only {
             self.command(Command::Identify);
         }
+    }
+
+    /// The terminal begins anew: what it shows has happened at other times of day, or has not happened yet.
+    fn forget_lines(&mut self) {
+        self.scrollback = Scrollback::default();
+        self.terminal.follow();
     }
 
     /// A session on the link that has just been opened.
@@ -182,6 +192,7 @@ impl App {
         self.dirty = true;
         if matches!(self.view.link.state, LinkState::Open { read_only: true }) {
             let playing = self.view.playing;
+            self.forget_lines();
             self.scrollback.begin(now, "from the beginning".into());
             self.begin_session(info);
             self.view.playing = playing;
@@ -199,15 +210,16 @@ impl App {
         }
     }
 
-    pub(super) fn link_gone(&mut self, now: Instant, failure: Failure) {
+    pub(super) fn link_gone(&mut self, now: Instant, failure: Failure, effects: &mut Vec<Effect>) {
         self.dirty = true;
         if matches!(self.view.link.state, LinkState::Open { .. }) {
             self.scrollback.note(now, "link lost".into());
+            self.export_note(now, "link lost", effects);
             self.view.link.state = LinkState::Lost(failure);
             if let Some(session) = &mut self.session {
                 session.link_lost(now);
             }
-            if self.opening.is_none() {
+            if self.opening.is_none() && self.popup.as_ref().is_some_and(Popup::ends_with_link) {
                 self.popup = None;
             }
         }
@@ -215,10 +227,11 @@ impl App {
 
     /// The cable is plugged in again. What stood on the screen goes on; the unit is asked who it is, since it may have
     /// started anew.
-    pub(super) fn link_back(&mut self, now: Instant, name: &str) {
+    pub(super) fn link_back(&mut self, now: Instant, name: &str, effects: &mut Vec<Effect>) {
         self.dirty = true;
         if matches!(self.view.link.state, LinkState::Lost(_)) {
             self.scrollback.note(now, format!("link back as {}", visible::text(name)));
+            self.export_note(now, "link back", effects);
             self.view.link.state = LinkState::Open { read_only: false };
             self.view.link_back();
             if let Some(session) = &mut self.session {
@@ -244,6 +257,11 @@ impl App {
             Who::Other { now, before } => {
                 let text = format!("Another unit is on the cable now: {now}; before it was {before}.");
                 self.begin_unit(visible::text(&text), effects);
+            }
+            Who::Unknown if self.view.facts.state == UnitState::Loader && self.view.link.noted.is_some() => {
+                // Where the upload has left it: what it has shown before is its own.
+                let text = "The link is back. The unit waits in its loader for a complete file: L loads it.";
+                self.view.tell(Tone::Quiet, text);
             }
             Who::Unknown if self.view.facts.state == UnitState::Loader => {
                 let text =
@@ -282,6 +300,10 @@ impl App {
             self.end_export(Some("another unit may be on the cable"));
         }
         self.view.begin_unit();
+        if matches!(&self.popup, Some(Popup::Asking(question)) if question.is_about_unit()) {
+            // Who has answered it for one unit has not answered it for another.
+            self.popup = None;
+        }
         self.dictionary.begin_link();
         self.stream.begin_link();
         self.bench.begin_link();
@@ -306,7 +328,11 @@ impl App {
         }
         match failure {
             None => self.view.tell(Tone::Quiet, "This is the end of the recording. 3 shows all of it."),
-            Some(failure) => self.view.tell(Tone::Bad, failure.text),
+            Some(failure) => {
+                self.scrollback.note(now, visible::text(&failure.text));
+                self.view.link.defect = Some(failure.text.clone());
+                self.view.tell(Tone::Bad, failure.text);
+            }
         }
     }
 

@@ -161,8 +161,8 @@ impl App {
             }
             Input::LinkOpened(info) => self.link_opened(now, info, &mut effects),
             Input::LinkFailed(failure) => self.link_failed(failure),
-            Input::LinkGone(failure) => self.link_gone(now, failure),
-            Input::LinkBack(name) => self.link_back(now, &name),
+            Input::LinkGone(failure) => self.link_gone(now, failure, &mut effects),
+            Input::LinkBack(name) => self.link_back(now, &name, &mut effects),
             Input::Sent(bytes) => {
                 if let Some(session) = &mut self.session {
                     session.handle_sent(now, &bytes);
@@ -204,6 +204,11 @@ impl App {
 
     /// Whether keys go to the unit as they are, so that none may mean something outside.
     pub fn passes_keys(&self) -> bool {
+        self.is_terminal() && !self.view.is_recording()
+    }
+
+    /// Whether the terminal screen is in front, and nothing before it.
+    fn is_terminal(&self) -> bool {
         self.front == ScreenId::Terminal && self.popup.is_none() && self.help.is_none()
     }
 
@@ -275,7 +280,9 @@ impl App {
         lines::draw(frame, row(area.height - 2), [frame::menu(theme)]);
         let keys = match self.front {
             _ if self.help.is_some() => frame::help_keys(theme),
-            ScreenId::Terminal => frame::terminal_keys(theme, self.front, self.terminal.is_after_prefix(), columns),
+            ScreenId::Terminal if !self.view.is_recording() => {
+                frame::terminal_keys(theme, self.front, self.terminal.is_after_prefix(), columns)
+            }
             _ => frame::keys(theme, &self.footer(columns)),
         };
         lines::draw(frame, row(area.height - 1), [keys]);
@@ -315,6 +322,7 @@ impl App {
             (ScreenId::Recordings, Cmd::Down | Cmd::Accept) => !self.recordings.entries().is_empty(),
             (ScreenId::Recordings, cmd) if cmd != Cmd::Refresh => view.playing.is_some(),
             (ScreenId::Bench, _) => bench::emulated(view).is_some(),
+            (ScreenId::Terminal, Cmd::SendFile | Cmd::Break) => view.can_send(),
             (ScreenId::Connect | ScreenId::Terminal | ScreenId::Load | ScreenId::Recordings, _) => true,
         }
     }
@@ -356,7 +364,7 @@ impl App {
     /// Whether clicks and the wheel mean something here. On the terminal screen they are the terminal program's own, to
     /// select and copy what the unit prints.
     pub fn wants_mouse(&self) -> bool {
-        !self.passes_keys()
+        !self.is_terminal()
     }
 
     fn perform(&mut self, action: Action, effects: &mut Vec<Effect>) {
@@ -418,7 +426,7 @@ impl App {
                 }
             }
             Action::ViewDictionary => {
-                if self.command(Command::Keys(b"v".to_vec())) {
+                if self.can_send() && self.command(Command::Keys(b"v".to_vec())) {
                     self.front = ScreenId::Terminal;
                     self.terminal.follow();
                     self.view
@@ -426,6 +434,9 @@ impl App {
                 }
             }
             Action::StartLoad { password, product } => {
+                if !self.can_send() {
+                    return;
+                }
                 let Some(facts) = self.load.image() else { return };
                 let Some(image) = facts.checked.clone() else { return };
                 let file = facts.path.display().to_string();
@@ -446,7 +457,7 @@ impl App {
             }
             Action::DismissReport => self.view.load.report = None,
             Action::RestartExtremes => self.view.restart_extremes(),
-            Action::Mark => self.mark(effects),
+            Action::Mark(at) => self.mark(at, effects),
             Action::Find(words) => match self.front {
                 ScreenId::Terminal => {
                     let area = self.screen_area();
@@ -556,6 +567,8 @@ impl App {
     }
 
     fn ask(&mut self, question: Question) {
+        // It was about something else.
+        self.view.notice = None;
         self.popup = Some(Popup::Asking(question));
     }
 

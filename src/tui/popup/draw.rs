@@ -55,6 +55,7 @@ type Hint = (Press, &'static str);
 
 const ENTER: Press = Press::Plain(KeyCode::Enter);
 const ESC: Press = Press::Plain(KeyCode::Esc);
+const BACKSPACE: Press = Press::Plain(KeyCode::Backspace);
 const CLEAR: Press = Press::Ctrl('u');
 
 const fn letter(letter: char) -> Press {
@@ -166,7 +167,8 @@ fn choose(wanted: Wanted, picker: &Picker, text: &str, theme: Theme, (columns, r
     shown.resize(room, Line::default());
     rows.extend(shown);
     rows.extend([Line::default(), typed(theme, "or a path ", text, columns)]);
-    (title.to_owned(), rows, vec![(ENTER, key), (CLEAR, "clear"), (ESC, "back")])
+    let clear = if text.is_empty() { (BACKSPACE, "folder above") } else { (CLEAR, "clear") };
+    (title.to_owned(), rows, vec![(ENTER, key), clear, (ESC, "back")])
 }
 
 fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, usize)) -> Content {
@@ -259,7 +261,7 @@ fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, 
                     &["The unit stores this: the stream comes back after every power cycle until T switches it off."],
                     columns,
                 ));
-                if let Some(text) = too_fast(view, *source, millis.text()) {
+                for text in [too_fast(view, *source, millis.text()), loses_rows(view, *source)].into_iter().flatten() {
                     rows.push(Line::default());
                     rows.extend(format::wrap(&text, columns).into_iter().map(|row| Line::styled(row, theme.warning())));
                 }
@@ -367,7 +369,7 @@ fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, 
                     columns,
                 )
             },
-            vec![(letter('y'), "send"), (letter('n'), "do not send")],
+            vec![(letter('y'), "send"), (ESC, "do not send")],
         ),
         Question::Choose { wanted, picker, typed } => {
             return choose(*wanted, picker, typed.text(), theme, (columns, room));
@@ -397,9 +399,9 @@ fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, 
             },
             match is_image {
                 true => {
-                    vec![(letter('l'), "load screen"), (letter('y'), "send all the same"), (letter('n'), "do not send")]
+                    vec![(letter('l'), "load screen"), (letter('y'), "send all the same"), (ESC, "do not send")]
                 }
-                false => vec![(letter('y'), "send"), (letter('n'), "do not send")],
+                false => vec![(letter('y'), "send"), (ESC, "do not send")],
             },
         ),
         Question::Disconnect { then } => (
@@ -434,6 +436,13 @@ fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, 
         rows.push(Line::default());
     }
     (title.to_owned(), rows, hints)
+}
+
+/// What becomes of the rows on the screen, if they are of the other source.
+fn loses_rows(view: &View, source: Source) -> Option<String> {
+    let stream = &view.monitor.stream;
+    let rows = stream.source.filter(|shown| *shown != source).map(|_| format::counted(stream.rows, "row"))?;
+    Some(format!("The screens begin anew with it: {rows} of the other kind stay in the recording only."))
 }
 
 /// Says so if the line cannot carry a row so often.

@@ -207,6 +207,8 @@ pub const ORDERS: &[(&[&str], &str)] = &[
 
 /// Rows that a page key moves in a list of files.
 const PAGE: usize = 8;
+/// Repetition time that is suggested where no other is known.
+const USUAL_PERIOD_MS: u64 = 1000;
 /// Shortest repetition time of the stream (errata E-105).
 const SHORTEST_PERIOD_MS: u64 = 1;
 /// Longest repetition time of the stream (errata E-105).
@@ -226,6 +228,11 @@ impl Popup {
                 _ => Answer::Stay,
             },
         }
+    }
+
+    /// Whether there is nothing to wait for or to answer any more once the link is lost.
+    pub fn ends_with_link(&self) -> bool {
+        matches!(self, Popup::Waiting { .. } | Popup::Asking(Question::CancelLoad | Question::Quit))
     }
 
     /// Pasted text goes into a field as if it had been typed, up to its first line end.
@@ -299,11 +306,13 @@ impl Question {
         Question::Order { typed: TextField::default(), complaint: None }
     }
 
-    /// Asks what the stream shall send.
-    pub fn stream() -> Question {
+    /// Asks what the stream shall send; what it has sent last is suggested.
+    pub fn stream(view: &View) -> Question {
+        let stream = &view.monitor.stream;
+        let millis = stream.set_period_known().map_or(USUAL_PERIOD_MS, |period| period.as_millis() as u64);
         Question::Stream {
-            source: Source::FieldValue,
-            millis: TextField::new("1000"),
+            source: stream.source.unwrap_or(Source::FieldValue),
+            millis: TextField::new(millis.to_string()),
             is_suggested: true,
             complaint: None,
         }
@@ -329,6 +338,29 @@ impl Question {
         match in_loader {
             true => Action::StartLoad { password: None, product },
             false => Action::Ask(Question::Password { field: PasswordField::new(), product, complaint: None }),
+        }
+    }
+
+    /// Whether the answer is for the unit that it was asked about.
+    pub fn is_about_unit(&self) -> bool {
+        match self {
+            Question::SendFile { .. }
+            | Question::Stream { .. }
+            | Question::View
+            | Question::Defaults { .. }
+            | Question::Label { .. }
+            | Question::Password { .. }
+            | Question::CancelLoad
+            | Question::Paste(_) => true,
+            Question::Link(_)
+            | Question::File { .. }
+            | Question::Choose { .. }
+            | Question::Find(_)
+            | Question::Temperature { .. }
+            | Question::Order { .. }
+            | Question::Allow { .. }
+            | Question::Disconnect { .. }
+            | Question::Quit => false,
         }
     }
 
@@ -533,6 +565,8 @@ impl Question {
             Question::SendFile { is_image: true, .. } if character.eq_ignore_ascii_case(&'l') => {
                 return Answer::Act(Action::Go(ScreenId::Load));
             }
+            // Whoever types on without looking must not close them: the rest would be keys to the unit.
+            Question::Paste(_) | Question::SendFile { .. } if !character.eq_ignore_ascii_case(&'y') => {}
             Question::View
             | Question::CancelLoad
             | Question::Paste(_)

@@ -151,7 +151,9 @@ impl Bench {
         let last = usize::from(product.measurement.channels).saturating_sub(1);
         let number = self.input + 1;
         let warmer = |by: f64| {
-            let present = self.inputs.get(self.input).and_then(|input| input.temperature);
+            let set = self.inputs.get(self.input).and_then(|input| input.temperature);
+            // Keys may be faster than the unit.
+            let present = self.ordered_temperature(number).or(set);
             let present = present.or_else(|| streamed(view, product, self.input)).unwrap_or(ROOM_TEMPERATURE);
             Some(Action::Order(format!("set {number} temperature {:.1}", present + by)))
         };
@@ -169,6 +171,15 @@ impl Bench {
             _ => {}
         }
         None
+    }
+
+    /// What the newest order that has not been answered yet sets an input to.
+    fn ordered_temperature(&self, number: usize) -> Option<f64> {
+        let open = self.orders.iter().rev().take_while(|order| order.answer.is_none());
+        let mut of_input = open.filter_map(|order| {
+            order.line.strip_prefix(&format!("set {number} temperature "))?.trim().parse::<f64>().ok()
+        });
+        of_input.next()
     }
 
     /// What an order has changed about an input, to show it beside the input.

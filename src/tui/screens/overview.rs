@@ -259,7 +259,8 @@ fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     let title = scene.view.product().map(|product| product.title.clone()).unwrap_or_default();
     let stream = match (facts.stream, scene.view.monitor.stream.period()) {
         (None, _) if facts.state == UnitState::Loader => "none, in the loader".to_owned(),
-        (None, _) => "off".to_owned(),
+        (None, _) if scene.view.stream_is_off => "off".to_owned(),
+        (None, _) => "no row so far".to_owned(),
         (Some(source), period) => {
             let source = match source {
                 Source::FieldValue => "field value",
@@ -419,6 +420,9 @@ pub fn without_values(scene: Scene) -> Vec<&'static str> {
             "Something talks, but nothing that is known. Press 3 to see what it says.",
             "Signs like ‹9b› mean another baud rate: the units have 115200, 8 data bits, no parity.",
         ],
+        (UnitState::Application, None) if !scene.view.stream_is_off => {
+            vec!["The unit has sent no values so far.", "Press T to switch its stream on."]
+        }
         (UnitState::Application, None) => {
             vec!["The stream is off, so the unit sends no values.", "Press T to switch it on."]
         }

@@ -257,7 +257,9 @@ fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
     let theme = scene.theme;
     let name = scene.view.link.name.as_deref().map(visible::text).unwrap_or_default();
     let ended = playing.length.is_some_and(|length| playing.position >= length);
+    let defect = scene.view.link.defect.as_deref();
     let pace = match playing.pace {
+        _ if ended && defect.is_some() => "cannot be read on".to_owned(),
         _ if ended => "at its end".to_owned(),
         Pace::Paused => "paused".into(),
         Pace::Times(1) => "as fast as it was".into(),
@@ -281,7 +283,17 @@ fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
             Span::styled("░".repeat(room.saturating_sub(filled)), theme.quiet()),
             Span::raw(format!("  {pace}")),
         ]),
-        Line::styled("  All screens show the unit as it was then. Arrows move 10 s, Home to its start.", theme.quiet()),
+        match defect.filter(|_| ended) {
+            // Its place stands at the end.
+            Some(defect) => Line::styled(
+                format!("  {}", format::keep_end(&visible::text(defect), usize::from(columns).saturating_sub(4))),
+                theme.bad(),
+            ),
+            None => Line::styled(
+                "  All screens show the unit as it was then. Arrows move 10 s, Home to its start.",
+                theme.quiet(),
+            ),
+        },
         Line::default(),
     ]
 }

@@ -67,7 +67,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('k'))],
         cmd: Cmd::Mark,
         short: "mark",
-        long: "mark this moment in chart, recording and CSV file",
+        long: "mark this moment, or the one under the cursor, in chart, recording and CSV file",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
@@ -140,7 +140,14 @@ impl Stream {
             Cmd::Pause => self.held = values.newest.map(|at| Held { end: at, cursor: at }),
             Cmd::Left | Cmd::Right => self.move_cursor(values, cmd == Cmd::Left),
             Cmd::Last => self.held = None,
-            Cmd::Accept => self.alone = !self.alone,
+            Cmd::Accept => {
+                self.alone = !self.alone;
+                let text = match self.alone {
+                    true => "One curve has all the room.",
+                    false => "As many curves as have room.",
+                };
+                return Some(Action::Tell(text.to_owned()));
+            }
             Cmd::Restart => return Some(Action::RestartExtremes),
             // Without rows a moment is marked in the recording all the same.
             Cmd::Mark if view.link.name.is_none() => {
@@ -150,7 +157,7 @@ impl Stream {
                 let how = if view.can_send() { " T switches the stream on." } else { "" };
                 return Some(Action::Tell(format!("There are no rows to write to a file yet.{how}")));
             }
-            Cmd::Mark => return Some(Action::Mark),
+            Cmd::Mark => return Some(Action::Mark(self.held.map(|held| held.cursor))),
             Cmd::Export if view.export.is_some() => return Some(Action::EndExport),
             Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportStream, view))),
             _ => {}

@@ -42,6 +42,8 @@ pub struct View {
     pub sending: Option<Sending>,
     /// How a recording is played, where the link is one.
     pub playing: Option<Playing>,
+    /// The stream was seen to be switched off. Without that, silence may be a long repetition time.
+    pub stream_is_off: bool,
     /// The repetition time that the stream was asked for and has not confirmed yet.
     pub wanted_period: Option<Duration>,
     /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
@@ -65,6 +67,8 @@ pub struct Link {
     pub recording: Option<String>,
     /// An upload on it that has not ended well.
     pub noted: Option<Noted>,
+    /// Why a recording that is played has ended before its end.
+    pub defect: Option<String>,
     /// Why nothing is recorded any more, where that was not wanted.
     pub unrecorded: Option<String>,
     /// The start of time, in milliseconds since 1970, UTC.
@@ -129,8 +133,24 @@ pub struct DictionaryRead {
 
 /// Serial number of the identity object (CiA 301; both manuals, section 3.3).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
-/// How a recording says that a moment was marked; the mark's number follows.
-pub const MARK: &str = "mark ";
+/// How a recording says that a moment was marked: `mark 1`, or of a moment of before `mark 1, 12.5 s before`.
+pub fn marked(number: u64, before: Duration) -> String {
+    match before.is_zero() {
+        true => format!("{MARK}{number}"),
+        false => format!("{MARK}{number}, {} s before", before.as_secs_f64()),
+    }
+}
+
+/// The number of such a mark, and how long before it was set its moment lies.
+fn read_mark(text: &str) -> Option<(u64, Duration)> {
+    let rest = text.strip_prefix(MARK)?;
+    let (number, before) = rest.split_once(", ").map_or((rest, None), |(number, before)| (number, Some(before)));
+    let before = before.map(|before| before.strip_suffix(" s before")?.parse().ok());
+    let before = before.map_or(Some(Duration::ZERO), |seconds| Duration::try_from_secs_f64(seconds?).ok())?;
+    Some((number.parse().ok()?, before))
+}
+
+const MARK: &str = "mark ";
 
 /// A file that rows are written to as they come.
 #[derive(Debug)]
@@ -228,7 +248,8 @@ impl View {
 
     /// A remark in a recording: where it is a mark, it is one again.
     pub fn remarked(&mut self, at: Instant, text: &str) {
-        if let Some(number) = text.strip_prefix(MARK).and_then(|number| number.parse().ok()) {
+        if let Some((number, before)) = read_mark(text) {
+            let at = Instant::ZERO + at.since_start().saturating_sub(before);
             self.monitor.stream.set_mark(Mark { number, at });
         }
     }
@@ -252,13 +273,18 @@ impl View {
     pub fn begin_unit(&mut self) {
         self.monitor = Monitor::default();
         (self.dictionary, self.entries_read, self.serial) = (None, 0, None);
-        (self.wanted_period, self.viewing) = (None, false);
+        (self.wanted_period, self.viewing, self.stream_is_off) = (None, false, false);
         self.load.product_unknown = false;
     }
 
     /// Whether keys and commands can reach a unit.
     pub fn can_send(&self) -> bool {
         self.link.state == LinkState::Open { read_only: false }
+    }
+
+    /// Whether the link is a recording.
+    pub fn is_recording(&self) -> bool {
+        self.link.state == LinkState::Open { read_only: true }
     }
 
     /// Whether a job runs that has to be ended before the unit is left alone. Being asked who it is, or listened to,
@@ -319,11 +345,6 @@ impl View {
             self.nmt_heard = said(facts).map(|_| now);
             self.ages_at = self.nmt_heard.map(|heard| format::ages_at(heard, now));
         }
-        match (self.facts.stream, facts.stream) {
-            (_, None) => self.monitor.stream.late = false,
-            (None, Some(_)) => self.monitor.stream.switched_on(now),
-            (Some(_), Some(_)) => {}
-        }
         if facts.state == UnitState::Application && self.facts.state != UnitState::Application {
             // Whatever sub-menu was open, a restart has closed it.
             self.viewing = false;
@@ -339,6 +360,19 @@ impl View {
         let was_loader = self.facts.state == UnitState::Loader && facts.state != UnitState::Loader;
         if has_started || was_loader {
             self.monitor.stream.interrupt();
+        }
+        match (self.facts.stream, facts.stream) {
+            // Who is away, or starts anew, has not been switched off by that.
+            (Some(_), None) => {
+                let is_away = self.returning.is_some() || has_started || facts.state == UnitState::Loader;
+                (self.stream_is_off, self.monitor.stream.late) = (!is_away, false);
+            }
+            (None, None) => {}
+            (None, Some(_)) => {
+                self.stream_is_off = false;
+                self.monitor.stream.switched_on(now);
+            }
+            (Some(_), Some(_)) => {}
         }
         // What was written and not stored is gone, and the defaults or other software bring other values.
         if has_started || was_loader || facts.state == UnitState::Loader {
@@ -374,6 +408,8 @@ impl View {
                 self.dictionary_read(now, reading);
             }
             Outcome::Identified => self.identified(),
+            // The end of a recording is told by whoever has read it, with its reason.
+            Outcome::Done(Job::Overhear) => {}
             Outcome::StreamRuns { was_on: true } => {
                 self.monitor.stream.set_period(self.wanted_period.take());
                 self.tell(Tone::Good, "The stream was on already and now sends what you asked for.");
@@ -386,6 +422,7 @@ impl View {
                 if matches!(job, Job::StreamOff | Job::RestoreDefaults) {
                     self.monitor.stream.set_period(None);
                 }
+                self.stream_is_off |= *job == Job::StreamOff;
                 self.tell(Tone::Good, done(*job));
             }
             Outcome::NoAnswer { job, awaited, .. } => {
@@ -396,6 +433,9 @@ impl View {
             }
             Outcome::Cancelled(Job::StreamOn) if self.facts.stream.is_some() => {
                 self.tell(Tone::Quiet, "The stream is switched on; its first row has not come yet.");
+            }
+            Outcome::Cancelled(job) if matches!(self.link.state, LinkState::Lost(_)) => {
+                self.tell(Tone::Bad, format!("The link was lost, {}.", doing(*job)));
             }
             Outcome::Cancelled(Job::Diagnostics) => self.tell(Tone::Quiet, done(Job::Diagnostics)),
             Outcome::Cancelled(job) => self.tell(Tone::Quiet, format!("Cancelled, {}.", doing(*job))),
@@ -540,6 +580,17 @@ mod tests {
         assert_eq!(view.poll_timeout(), None, "it cannot get later than late");
         row(&mut view, 61_000, with_first(Reading::Value(20.0)));
         assert!(!view.monitor.stream.late);
+    }
+
+    #[test]
+    fn a_mark_is_read_as_it_was_written() {
+        for millis in [0, 1, 12_345, 86_400_000] {
+            let before = Duration::from_millis(millis);
+            assert_eq!(read_mark(&marked(7, before)), Some((7, before)));
+        }
+        for other in ["mark", "mark x", "mark 1, 5 s", "mark 1, -5 s before", "marked 1", "break sent"] {
+            assert_eq!(read_mark(other), None, "{other}");
+        }
     }
 
     #[test]

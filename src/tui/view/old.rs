@@ -14,6 +14,8 @@ pub enum Old {
     Viewing,
     /// It measures, and does not say what.
     StreamOff,
+    /// It has said nothing since it is there again: its stream may be off, or slow.
+    NotHeard,
     /// It should have said something by now.
     NoRow,
     /// It will say something, but has not yet.
@@ -28,6 +30,7 @@ impl Old {
             Old::DictionaryIsRead => "The dictionary is being read.",
             Old::Viewing => "The view is open.",
             Old::StreamOff => "The stream is off.",
+            Old::NotHeard => "No row yet.",
             Old::NoRow => "No new row: old values.",
             Old::NoRowYet => "No row yet.",
         }
@@ -40,6 +43,7 @@ impl Old {
             Old::DictionaryIsRead => "These values are old: the unit measures nothing while its dictionary is read.",
             Old::Viewing => "These values are old: the view is open and halts the unit. M closes it.",
             Old::StreamOff => "The stream is off: these are its last values. T switches it on.",
+            Old::NotHeard => "No row since the unit is there again: these are its last values. T switches it on.",
             Old::NoRow => "No new row: these values are old. M asks whether the unit still answers.",
             Old::NoRowYet => "The stream is on: no row has come yet, these values are from before.",
         }
@@ -55,7 +59,8 @@ impl View {
             UnitState::Loader => Some(Old::InLoader),
             _ if self.job == Some(Job::ReadDictionary) => Some(Old::DictionaryIsRead),
             _ if self.viewing => Some(Old::Viewing),
-            _ if self.facts.stream.is_none() => Some(Old::StreamOff),
+            _ if self.facts.stream.is_none() && self.stream_is_off => Some(Old::StreamOff),
+            _ if self.facts.stream.is_none() => Some(Old::NotHeard),
             _ if stream.late => Some(Old::NoRow),
             _ if stream.awaits_first_row() => Some(Old::NoRowYet),
             UnitState::Silent | UnitState::Unknown | UnitState::Application => None,

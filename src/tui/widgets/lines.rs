@@ -27,6 +27,9 @@ pub fn rule(theme: Theme, columns: u16, heading: &str, remark: &str) -> Line<'st
     ])
 }
 
+/// Columns of a heading's rule beside its two texts.
+pub const BESIDE_HEADING: usize = 10;
+
 /// A label and what it is: `  Version   1.1.0`.
 pub fn labelled(theme: Theme, label: &str, value: impl Into<Span<'static>>) -> Line<'static> {
     Line::from(vec![Span::styled(format!("  {}", format::left(label, LABEL_COLUMNS)), theme.quiet()), value.into()])

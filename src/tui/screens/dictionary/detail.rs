@@ -4,7 +4,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::row::Row;
-use super::{RULE_COLUMNS, Scene, without_unit};
+use super::{Scene, without_unit};
 use crate::device::dictionary::{Access, Bound, Entry, Limits};
 use crate::dump::{self, Measure};
 use crate::tui::visible;
@@ -20,7 +20,8 @@ impl Row<'_> {
         let address = self.at.to_string();
         // What is left beside address, remark, and the rule between and around them.
         let left = |remark: &str| {
-            usize::from(columns).saturating_sub(format::width(&address) + format::width(remark) + RULE_COLUMNS)
+            let taken = format::width(&address) + 1 + format::width(remark) + lines::BESIDE_HEADING;
+            usize::from(columns).saturating_sub(taken)
         };
         let fits = |remark: &str| format::width(&self.name()) <= left(remark);
         // Beside the table there are rows for it, and no columns.

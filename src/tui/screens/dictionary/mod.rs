@@ -71,8 +71,6 @@ const ESC: &[Press] = &[Press::Plain(KeyCode::Esc)];
 const READING_KEYS: &[Binding] = &[Binding { keys: ESC, cmd: Cmd::Back, short: "cancel", long: "" }];
 
 const HEADING: &str = "Object dictionary";
-/// Columns of a heading's rule beside its texts, and of the blank in its title.
-const RULE_COLUMNS: usize = 11;
 /// Rows of the pane that explains the chosen entry, its heading included.
 const DETAIL_ROWS: u16 = 8;
 /// From this width on that pane stands beside the table ...
@@ -352,7 +350,7 @@ impl Dictionary {
             let parts = [&dump, &counted, compared, time, &only, &words];
             parts.into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join(", ")
         };
-        let room = usize::from(columns).saturating_sub(format::width(HEADING) + RULE_COLUMNS);
+        let room = usize::from(columns).saturating_sub(format::width(HEADING) + lines::BESIDE_HEADING);
         let longer = [text(&compared, &time), text(&compared, &None)];
         longer.into_iter().find(|text| format::width(text) <= room).unwrap_or_else(|| text(&least, &None))
     }

@@ -14,7 +14,7 @@ use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use report::{findings, findings_room, objections, report};
+use report::{findings, findings_room, misfits, objections, report};
 use verdict::verdict;
 
 use super::Scene;
@@ -272,7 +272,7 @@ impl Load {
                 None
             }
             Stage::Report { facts, scrolled } => {
-                let (all, room) = (findings(facts, area.width).len(), findings_room(facts, view, area));
+                let (all, room) = (findings(facts, area.width).len(), findings_room(facts, view, self.loader, area));
                 let last = all.saturating_sub(room);
                 match cmd {
                     Cmd::Up => *scrolled = scrolled.saturating_sub(1),
@@ -297,11 +297,12 @@ impl Load {
                         self.next_loader();
                         return Some(self.check(path));
                     }
-                    Cmd::Allow if !facts.errors.is_empty() => {
-                        return Some(Action::Ask(Question::allow(facts.errors.clone())));
+                    Cmd::Allow => {
+                        let errors = overridable(facts, view, self.loader);
+                        return (!errors.is_empty()).then(|| Action::Ask(Question::allow(errors)));
                     }
                     Cmd::Accept => {
-                        return Some(match objections(facts, view).first() {
+                        return Some(match objections(facts, view, self.loader).first() {
                             Some(objection) => Action::Tell(format!("Not started: {objection}")),
                             None => Question::start_load(view, facts),
                         });
@@ -326,11 +327,11 @@ impl Load {
             Stage::Checking(_) => return CHECKING_KEYS.to_vec(),
             Stage::Report { facts, .. } => facts,
         };
-        let can_start = objections(facts, view).is_empty();
+        let can_start = objections(facts, view, self.loader).is_empty();
         let has_place = |binding: &Binding| match binding.cmd {
             Cmd::Accept => can_start,
             Cmd::Pack => facts.ok,
-            Cmd::Allow => !facts.errors.is_empty(),
+            Cmd::Allow => !overridable(facts, view, self.loader).is_empty(),
             Cmd::Down => !facts.defects.is_empty(),
             _ => true,
         };
@@ -364,6 +365,12 @@ impl Load {
         };
         lines::draw(frame, area, rows);
     }
+}
+
+/// What stands against the file, or against sending it to this unit, by the names that O takes.
+fn overridable(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>) -> Vec<DefectId> {
+    let misfits = misfits(facts, view, loader).into_iter().map(|misfit| misfit.id);
+    facts.errors.iter().copied().chain(misfits).collect()
 }
 
 fn file_name(path: &Path) -> String {

@@ -7,6 +7,7 @@ use ratatui::text::{Line, Span};
 
 use super::file_name;
 use crate::device::{LoaderKind, Product};
+use crate::image::{DefectId, Misfit};
 use crate::session::UnitState;
 use crate::time::Duration;
 use crate::tui::input::ImageFacts;
@@ -23,8 +24,18 @@ const REPORT_ROWS: usize = 5;
 /// Steps of the plan.
 const PLAN_STEPS: usize = 4;
 
+/// What speaks against sending this image to the unit that is there, besides that it may be another product.
+pub(super) fn misfits(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>) -> Vec<Misfit> {
+    let noted = || view.noted().and_then(|noted| Product::named(&noted.product));
+    let Some((image, product)) = facts.checked.as_ref().zip(view.product().or_else(noted)) else { return Vec::new() };
+    let target = product.target_with(loader.unwrap_or(product.loader.kind));
+    let runs = view.facts.version.as_ref().map(|known| known.value);
+    let stands = |misfit: &Misfit| misfit.id != DefectId::WrongProduct && !facts.allowed.contains(&misfit.id);
+    image.misfits(&target, runs).into_iter().filter(stands).collect()
+}
+
 /// What stands against sending this image now, one sentence each.
-pub(super) fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
+pub(super) fn objections(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>) -> Vec<String> {
     let mut against = Vec::new();
     if facts.is_nameless() {
         against.push("the file does not say what it is. O sends it all the same.".to_owned());
@@ -46,6 +57,8 @@ pub(super) fn objections(facts: &ImageFacts, view: &View) -> Vec<String> {
         let (image, unit) = (visible::text(image), visible::text(&noted.product));
         against.push(format!("the file is for an {image}, our notes say {unit}."));
     }
+    let misfits = misfits(facts, view, loader).into_iter();
+    against.extend(misfits.map(|misfit| format!("{}. O sends it all the same.", misfit.message)));
     if let Some(busy) = view.busy() {
         against.push(format!("{busy}."));
     }
@@ -70,10 +83,10 @@ pub(super) fn report(
         lines::labelled(theme, "Check", check_word(theme, facts)),
         loader_line(theme, facts, loader),
     ];
-    let plan = plan(scene, facts, packed, area.width);
+    let plan = plan(scene, facts, (packed, loader), area.width);
     if !facts.defects.is_empty() {
         let all = findings(facts, area.width);
-        let room = findings_room(facts, scene.view, area);
+        let room = findings_room(facts, scene.view, loader, area);
         let first = scrolled.min(all.len() - room);
         let below = all.len() - first - room;
         let range = if below > 0 { format!("↓ {} more lines", format::grouped(below)) } else { String::new() };
@@ -122,16 +135,16 @@ pub(super) fn findings(facts: &ImageFacts, columns: u16) -> Vec<String> {
 }
 
 /// How many lines of the findings have room beside the plan.
-pub(super) fn findings_room(facts: &ImageFacts, view: &View, area: Rect) -> usize {
-    let others = REPORT_ROWS + 1 + plan_rows(facts, view);
+pub(super) fn findings_room(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>, area: Rect) -> usize {
+    let others = REPORT_ROWS + 1 + plan_rows(facts, view, loader);
     let room = usize::from(area.height).saturating_sub(others);
     room.max(LEAST_DEFECT_ROWS).min(findings(facts, area.width).len())
 }
 
 /// Lines of the plan: what is going to happen, and what stands against it or how it is begun.
-fn plan_rows(facts: &ImageFacts, view: &View) -> usize {
+fn plan_rows(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>) -> usize {
     let steps = if facts.ok { PLAN_STEPS + 2 } else { 0 };
-    1 + steps + objections(facts, view).len().max(1)
+    1 + steps + objections(facts, view, loader).len().max(1)
 }
 
 fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
@@ -153,7 +166,12 @@ fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
     }
 }
 
-fn plan(scene: Scene, facts: &ImageFacts, packed: bool, columns: u16) -> Vec<Line<'static>> {
+fn plan(
+    scene: Scene,
+    facts: &ImageFacts,
+    (packed, loader): (bool, Option<LoaderKind>),
+    columns: u16,
+) -> Vec<Line<'static>> {
     let (theme, view) = (scene.theme, scene.view);
     let mut rows = vec![lines::rule(theme, columns, "Plan", "")];
     let product =
@@ -188,7 +206,7 @@ fn plan(scene: Scene, facts: &ImageFacts, packed: bool, columns: u16) -> Vec<Lin
             format!("{} ({})", expected_version(facts), change(view, facts)),
         ));
     }
-    let against = objections(facts, view);
+    let against = objections(facts, view, loader);
     if against.is_empty() {
         rows.push(Line::from(vec![
             Span::styled("  Enter", theme.key()),

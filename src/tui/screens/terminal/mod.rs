@@ -254,7 +254,10 @@ impl Terminal {
             (false, true) => format!("'{}' is nowhere, ", visible::text(&self.words)),
             (false, false) => format!("'{}', ", visible::text(&self.words)),
         };
-        let remark = format!("{found}{received} bytes received, {sent} sent, {place}");
+        let longest = format!("{found}{received} bytes received, {sent} sent, {place}");
+        let room = usize::from(area.width).saturating_sub(format::width(name) + lines::BESIDE_HEADING);
+        // Where it has been stopped is wanted before what has gone by.
+        let remark = if format::width(&longest) <= room { longest } else { format!("{found}{place}") };
         lines::draw(frame, heading, [lines::rule(scene.theme, area.width, name, &remark)]);
         let rows = match self.mode {
             Mode::Text(place) => text_rows(scene, body, place, self.with_times, &self.words),
