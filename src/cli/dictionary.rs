@@ -126,7 +126,7 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
         }
         Ended::Finished { outcome, interrupted: false } => {
             return talk
-                .expect_done(outcome)
+                .expect_done(&outcome)
                 .and_then(|()| Err(CliError::message(Kind::Failed, "the reading ended without a result")));
         }
         Ended::Lost { error, .. } => {
@@ -161,7 +161,7 @@ fn configuration(reading: &DictionaryReading, product: Option<&Product>, facts: 
 fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), CliError> {
     let mut found = dump::differences(&source(left)?, &source(right)?);
     found.retain(|difference| all || difference.setting);
-    if output.json {
+    let written = if output.json {
         let differences = found.iter().map(|difference| DifferenceObject {
             index: &difference.index,
             subindex: difference.subindex,
@@ -171,15 +171,17 @@ fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), C
             setting: difference.setting,
         });
         let differences: Vec<_> = differences.collect();
-        output.object(&DiffObject { schema: "axcon.dictionary-diff/1", equal: differences.is_empty(), differences })?;
+        output.object(&DiffObject { schema: "axcon.dictionary-diff/1", equal: differences.is_empty(), differences })
     } else {
+        let mut lines = String::new();
         for Difference { index, subindex, name, left, right, setting: _ } in &found {
             let side = |value: &Option<String>| value.clone().unwrap_or_else(|| "not there".into());
-            let line = format!("{index}:{subindex:02X}  {name:<58} {:>14}  {:>14}\n", side(left), side(right));
-            output.data(line.as_bytes())?;
+            let (left, right) = (side(left), side(right));
+            lines.push_str(&format!("{index}:{subindex:02X}  {name:<58} {left:>14}  {right:>14}\n"));
         }
-    }
-    if found.is_empty() { Ok(()) } else { Err(CliError::reported(Kind::Failed)) }
+        output.data(lines.as_bytes())
+    };
+    CliError::found((!found.is_empty()).then_some(Kind::Failed), written)
 }
 
 fn source(named: &str) -> Result<Dump, CliError> {

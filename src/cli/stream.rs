@@ -12,7 +12,7 @@ use super::error::{CliError, Kind};
 use super::link;
 use super::output::{Closed, Output};
 use super::talk::{Calendar, Ended, Talk};
-use super::{Global, ask, files};
+use super::{Global, files};
 use crate::device::Product;
 use crate::host::save::SaveError;
 use crate::session::{Command, Event, Outcome};
@@ -94,7 +94,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if args.off {
         let outcome = talk.ask(Command::StreamOff)?;
         talk.close(output);
-        talk.expect_done(outcome)?;
+        talk.expect_done(&outcome)?;
         if output.json {
             return output.object(&OffObject { schema: "axcon.stream-off/1", stream: "off" });
         }
@@ -180,8 +180,8 @@ impl Stream {
             Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => {
                 self.was_on |= was_on && is_first;
             }
-            Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(outcome),
-            Ended::Finished { interrupted: true, .. } => return Err(ask::interrupted()),
+            Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(&outcome),
+            Ended::Finished { interrupted: true, .. } => return Err(CliError::interrupted()),
             Ended::Lost { error, .. } => return Err(error),
         }
         match proof {
@@ -282,7 +282,7 @@ pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
         Ok(ControlFlow::Continue(()))
     })?;
     if !undisturbed {
-        return Err(ask::interrupted());
+        return Err(CliError::interrupted());
     }
     Ok(first.zip(last).map(|((begun, _), (ended, source))| {
         let period = (rows > 1).then(|| ended.since(begun) / (rows - 1));
@@ -306,11 +306,11 @@ pub fn leave_as_found(
     match (was_on, found) {
         (false, _) => {
             let outcome = talk.ask(Command::StreamOff)?;
-            talk.expect_done(outcome)
+            talk.expect_done(&outcome)
         }
         (true, Some(Found { source, period: Some(period) })) => {
             let outcome = talk.ask(Command::StreamOn { source, period })?;
-            talk.expect_done(outcome)
+            talk.expect_done(&outcome)
         }
         (true, _) => {
             output.remark("axcon: the stream was on before, at a rate too slow to be seen; it is left at the new one");

@@ -105,12 +105,12 @@ fn check(args: &CheckArgs, output: &mut Output) -> Result<(), CliError> {
     let expected = args.product.map(|product| product.name.as_str());
     let report = read_for(&args.file, &targets_with(args.loader), expected, &args.allow)?;
     let name = shown(&args.file);
-    if output.json {
-        output.object(&ImageObject::new(&report, &name))?;
+    let written = if output.json {
+        output.object(&ImageObject::new(&report, &name))
     } else {
-        output.data(report_text(&report, &name).as_bytes())?;
-    }
-    if report.is_ok() { Ok(()) } else { Err(CliError::reported(Kind::ImageRefused)) }
+        output.data(report_text(&report, &name).as_bytes())
+    };
+    CliError::found((!report.is_ok()).then_some(Kind::ImageRefused), written)
 }
 
 fn info(args: &InfoArgs, output: &mut Output) -> Result<(), CliError> {

@@ -278,7 +278,7 @@ fn planned(
 
 /// The image has errors: report, nothing else.
 fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliError> {
-    if output.json {
+    let written = if output.json {
         let identity = report.facts.identity.as_ref();
         output.object(&LoadObject {
             schema: "axcon.load/1",
@@ -299,12 +299,13 @@ fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliErr
             remark: None,
             next: "use an image without errors",
             defects: image_cli::defect_objects(report),
-        })?;
+        })
     } else {
-        output.data(image_cli::report_text(report, name).as_bytes())?;
+        let written = output.data(image_cli::report_text(report, name).as_bytes());
         output.remark("axcon: the image is refused; nothing has been sent");
-    }
-    Err(CliError::reported(Kind::ImageRefused))
+        written
+    };
+    CliError::found(Some(Kind::ImageRefused), written)
 }
 
 /// Says what is going to happen.
@@ -386,7 +387,6 @@ fn conclude(
     let kind = exit_kind(report, lost.is_some());
     let next = report.advice();
     if output.json {
-        // What became of the unit decides, whoever still reads.
         let written = output.object(&LoadObject {
             schema: "axcon.load/1",
             port: Some(port),
@@ -407,7 +407,7 @@ fn conclude(
             next,
             defects: image_cli::defect_objects(image),
         });
-        return kind.map_or(written, |kind| Err(CliError::reported(kind)));
+        return CliError::found(kind, written);
     }
     let Some(kind) = kind else {
         let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));

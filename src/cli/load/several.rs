@@ -105,28 +105,26 @@ pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut 
             .map(|upload| upload.join().unwrap_or((1, Vec::new(), b"axcon: panicked\n".to_vec())))
             .collect()
     });
+    let mut written = Ok(());
     for (port, (_, out, err)) in ports.iter().zip(&ended) {
         for line in String::from_utf8_lossy(err).lines() {
             output.remark(&if json { line.to_owned() } else { format!("{port}: {line}") });
         }
         for line in String::from_utf8_lossy(out).lines() {
-            output.data(format!("{port}: {line}\n").as_bytes())?;
+            written = written.and(output.data(format!("{port}: {line}\n").as_bytes()));
         }
     }
     let codes: Vec<u8> = ended.iter().map(|&(code, _, _)| code).collect();
     let exit_code = shared_code(&codes);
     if json {
         let units = ports.iter().zip(&codes).map(|(port, &exit_code)| Unit { port, exit_code }).collect();
-        output.object(&Summary { schema: "axcon.loads/1", exit_code, units })?;
+        written = output.object(&Summary { schema: "axcon.loads/1", exit_code, units });
     } else {
         let done = codes.iter().filter(|&&code| code == 0).count();
         output.remark(&format!("{done} of {} units run what was sent", codes.len()));
     }
-    match Kind::ALL.into_iter().find(|kind| kind.exit_code() == exit_code) {
-        _ if exit_code == 0 => Ok(()),
-        Some(kind) => Err(CliError::reported(kind)),
-        None => Err(CliError::reported(Kind::Failed)),
-    }
+    let kind = Kind::ALL.into_iter().find(|kind| kind.exit_code() == exit_code).unwrap_or(Kind::Failed);
+    CliError::found((exit_code != 0).then_some(kind), written)
 }
 
 /// 0 if all are, the code that all failures share, else 1.
