@@ -193,13 +193,9 @@ fn source(named: &str) -> Result<Dump, CliError> {
         return Ok(Dump::factory(product));
     }
     let file = Path::new(named);
-    let failed =
-        |error: anyhow::Error| CliError::new(Kind::Usage, error.context(format!("cannot read the dump '{named}'")));
-    let length = std::fs::metadata(file).map_err(|error| failed(error.into()))?.len();
-    if length > LARGEST_DUMP {
-        return Err(failed(anyhow::anyhow!("it has {length} bytes, a dump has at most {LARGEST_DUMP}")));
-    }
-    let text = std::fs::read_to_string(file).map_err(|error| failed(error.into()))?;
+    let text = files::read_text(file, LARGEST_DUMP).map_err(|error| {
+        CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the dump '{named}'")))
+    })?;
     Dump::parse(named, &text).map_err(|error| {
         let no_dump = matches!(error, DumpError::Syntax { .. });
         let error = CliError::new(Kind::Usage, error);

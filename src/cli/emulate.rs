@@ -84,6 +84,7 @@ mod hosting {
     use serde::Serialize;
 
     use super::{Args, CliError, Global, Kind, Output};
+    use crate::cli::files;
     use crate::device::Complaint;
     use crate::device::Product;
     use crate::emulator::Unit;
@@ -227,19 +228,8 @@ mod hosting {
     /// A scenario's file: its name and its text.
     fn read_scenario(file: &Path) -> Result<(String, String), CliError> {
         let name = file.display().to_string();
-        let failed = |error| {
+        let text = files::read_text(file, LARGEST_FILE).map_err(|error| {
             CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the scenario '{name}'")))
-        };
-        let mut text = Vec::new();
-        std::fs::File::open(file)
-            .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut text))
-            .map_err(failed)?;
-        if text.len() as u64 > LARGEST_FILE {
-            let message = format!("the scenario '{name}' is larger than {} MiB", LARGEST_FILE >> 20);
-            return Err(CliError::message(Kind::Usage, message));
-        }
-        let text = String::from_utf8(text).map_err(|error| {
-            CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("'{name}' is no text")))
         })?;
         Ok((name, text))
     }
