@@ -10,7 +10,7 @@ use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::output::Output;
 use super::talk::{Ended, Talk};
-use super::{files, link};
+use super::{files, link, names};
 use crate::device::Product;
 use crate::dump::{self, Difference, Dump, DumpError};
 use crate::session::{Command, DictionaryReading, Facts, Outcome};
@@ -186,11 +186,8 @@ fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), C
 
 fn source(named: &str) -> Result<Dump, CliError> {
     if let Some(name) = named.strip_prefix(FACTORY) {
-        let product = Product::named(name).ok_or_else(|| {
-            let known: Vec<String> = Product::all().iter().map(|product| product.name.to_lowercase()).collect();
-            CliError::message(Kind::Usage, format!("'{name}' is no product; there is {}", known.join(", ")))
-        })?;
-        return Ok(Dump::factory(product));
+        let refused = |complaint| CliError::message(Kind::Usage, format!("'{named}': {complaint}"));
+        return names::product(name).map(Dump::factory).map_err(refused);
     }
     let file = Path::new(named);
     let text = files::read_text(file, LARGEST_DUMP).map_err(|error| {

@@ -12,7 +12,7 @@ use super::image::{self as image_cli, DefectObject};
 use super::journal::Desk;
 use super::output::Output;
 use super::talk::{Ended, Talk, no_answer_hints};
-use super::{Global, ask, link, password};
+use super::{Global, ask, link, names, password};
 use crate::device::{self, LoaderKind, Product};
 use crate::host::journal::Note;
 use crate::image::{CheckedImage, DefectId, Report};
@@ -33,14 +33,14 @@ pub struct Args {
     #[arg(long)]
     dry_run: bool,
     /// The unit's product, where the unit itself cannot say it (it waits in its loader).
-    #[arg(long, value_name = "NAME", value_parser = image_cli::product)]
+    #[arg(long, value_name = "NAME", value_parser = names::product)]
     product: Option<&'static Product>,
     /// Send long records instead of the file's own: the same words in fewer characters, a sixth less time.
     #[arg(long)]
     pack: bool,
     /// The loader the unit has, where it is known to be another than its product's (g1, g2, g3, g3-1.3); what it really
     /// does shows behind the first record in any case.
-    #[arg(long, value_name = "PROFILE", value_parser = super::emulate::loader)]
+    #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
     loader: Option<LoaderKind>,
     /// Read the password from FILE; otherwise AXCON_PASSWORD is taken, or it is asked for.
     #[arg(long, value_name = "FILE")]
