@@ -91,14 +91,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
             let meter = Meter::new(global.port().unwrap_or_default(), output.json);
             upload(&prepared, global, meter, output)
         }
-        several if prepared.args.dry_run => {
-            for port in several {
-                let global = Global { ports: vec![port.clone()], ..global.clone() };
-                let meter = Meter::new(port, output.json);
-                upload(&prepared, &global, meter, output)?;
-            }
-            Ok(())
-        }
+        several if prepared.args.dry_run => several::plan(several, &prepared, global, output),
         several => {
             if !global.yes && !ask::is_yes(&format!("Upload to {} units? Type yes: ", several.len()), None, output)? {
                 return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));

@@ -10,7 +10,7 @@ use super::meter::{Board, Meter};
 use super::{Prepared, upload};
 use crate::cli::Global;
 use crate::cli::error::{CliError, Kind};
-use crate::cli::output::{self, Output, Remarks};
+use crate::cli::output::{self, Closed, Output, Remarks};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -115,13 +115,41 @@ pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut 
         }
     }
     let codes: Vec<u8> = ended.iter().map(|&(code, _, _)| code).collect();
-    let exit_code = shared_code(&codes);
-    if json {
-        let units = ports.iter().zip(&codes).map(|(port, &exit_code)| Unit { port, exit_code }).collect();
+    sum_up(ports, &codes, "run what was sent", written, output)
+}
+
+/// Finds out of each of them, one after the other, what an upload would do; one that cannot take it keeps nobody from
+/// looking at the next.
+///
+/// # Errors
+/// As [`run`], and if the user interrupts.
+pub fn plan(ports: &[String], prepared: &Prepared, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let mut codes = Vec::new();
+    for port in ports {
+        let global = Global { ports: vec![port.clone()], ..global.clone() };
+        match upload(prepared, &global, Meter::new(port, output.json), output) {
+            Err(error) if error.kind == Kind::Interrupted || error.error.is::<Closed>() => return Err(error),
+            planned => codes.push(output::conclude(output, planned)),
+        }
+    }
+    sum_up(ports, &codes, "can take it", Ok(()), output)
+}
+
+/// The last line, and the end of all.
+fn sum_up(
+    ports: &[String],
+    codes: &[u8],
+    deed: &str,
+    mut written: Result<(), CliError>,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    let exit_code = shared_code(codes);
+    if output.json {
+        let units = ports.iter().zip(codes).map(|(port, &exit_code)| Unit { port, exit_code }).collect();
         written = output.object(&Summary { schema: "axcon.loads/1", exit_code, units });
     } else {
         let done = codes.iter().filter(|&&code| code == 0).count();
-        output.remark(&format!("{done} of {} units run what was sent", codes.len()));
+        output.remark(&format!("{done} of {} units {deed}", codes.len()));
     }
     let kind = Kind::ALL.into_iter().find(|kind| kind.exit_code() == exit_code).unwrap_or(Kind::Failed);
     CliError::found((exit_code != 0).then_some(kind), written)
