@@ -125,8 +125,8 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let written = begun.and_then(|()| stream.keep_writing(Duration::from_secs(args.reconnect), output));
     let Stream { mut talk, mut sink, setting, was_on, .. } = stream;
     // However it ended, and also if the first row never came: what has been changed is changed back.
-    let is_lost = written.as_ref().is_err_and(|error| error.kind == Kind::PortGone);
-    let left = if setting.is_some() && !args.keep && !is_lost {
+    let is_gone = written.as_ref().is_err_and(|error| error.kind == Kind::PortGone || error.error.is::<AnotherUnit>());
+    let left = if setting.is_some() && !args.keep && !is_gone {
         leave_as_found(&mut talk, was_on, found, output)
     } else {
         Ok(())
@@ -225,7 +225,7 @@ impl Stream {
             if let (Some(before), Some(now)) = (before, now)
                 && before != now
             {
-                return Err(another_unit(&format!("the unit is an {now} now and was an {before}")));
+                return Err(another_unit(format!("the unit is an {now} now and was an {before}")));
             }
             self.switch_on(source, period, output)?;
         }
@@ -381,7 +381,7 @@ impl Sink {
         let channels = channels_of(row);
         if let Some(before) = self.channels.filter(|&before| before != row.readings.len()) {
             let now = row.readings.len();
-            return Err(another_unit(&format!("the unit's rows have {now} values now and had {before}")));
+            return Err(another_unit(format!("the unit's rows have {now} values now and had {before}")));
         }
         let time = self.calendar.text(at);
         let mut text = Vec::new();
@@ -462,9 +462,14 @@ impl OutFile {
     }
 }
 
-fn another_unit(what: &str) -> CliError {
-    CliError::message(Kind::Failed, what.to_owned())
-        .hint("another unit answers: its values are not written behind those of the first one")
+/// Another unit answers than the one that was asked.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct AnotherUnit(String);
+
+fn another_unit(what: String) -> CliError {
+    CliError::new(Kind::Failed, AnotherUnit(what))
+        .hint("another unit answers: its values are not written behind those of the first one, and it is left as it is")
 }
 
 /// Names of a row's fields, from the layout that has as many.
