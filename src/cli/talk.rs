@@ -99,7 +99,6 @@ impl Talk {
     pub fn open(global: &Global, output: &mut Output) -> Result<Self, CliError> {
         let spec: LinkSpec = link::spec(global)?;
         let (sender, inputs) = host::channel();
-        let signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
         let mut comeback = None;
         let (line, session) = if let LinkSpec::Replay(path) = &spec {
             let recording = Recording::open(path).map_err(link::recording_error)?;
@@ -114,6 +113,8 @@ impl Talk {
             let line = Line::Live(Box::new(Pump::new(connection, inputs, clock, recorder)));
             (line, Session::new(global.baud))
         };
+        // Not before: until then there is nothing to leave in order, and a server that does not answer may take seconds.
+        let signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
         let (port, remarks) = (spec.to_string(), output.err.clone());
         Ok(Talk { line, session, port, spec, comeback, inputs: sender, remarks, _signals: signals })
     }

@@ -104,9 +104,10 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let (sender, inputs) = host::channel();
     let log = args.log.map(open_log).transpose()?;
     let sending = args.send.as_deref().map(|path| Sending::open(path, args.newline_out)).transpose()?;
-    let _signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
     let plan = link::recording(global)?;
     let connection = link::open(&spec, global, clock, sender.clone())?;
+    // Not before: until then there is nothing to leave in order, and a server that does not answer may take seconds.
+    let _signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
     let recorder = link::start_recording(&plan, &connection, clock, output)?;
     let interactive = io::stdin().is_terminal();
     let comeback = Comeback::of(&spec, link::options(global)).filter(|_| interactive);
@@ -231,7 +232,12 @@ impl Conversation {
                     self.ended = true;
                     self.last = self.clock.now();
                 }
-                Ok(Input::Gone { error, .. }) => self.lost(link::link_error(error), output)?,
+                // Of a link that is given up already there is nothing more to say.
+                Ok(Input::Gone { link, error }) => {
+                    if self.connection.as_ref().is_some_and(|connection| connection.id() == link) {
+                        self.lost(link::link_error(error), output)?;
+                    }
+                }
                 Ok(Input::Signal(_)) => return Err(CliError::reported(Kind::Interrupted)),
                 Ok(Input::Wake) | Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
