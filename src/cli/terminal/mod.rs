@@ -157,6 +157,14 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     end
 }
 
+/// A hold that lasts so long has no end: its XON was lost. Loaders hold their sender for seconds while they erase.
+const STUCK: Duration = Duration::from_secs(30);
+
+/// When a command that nobody sits at gives up what it cannot send. Who sits at it sees that and leaves.
+fn stuck_at(held_since: Option<Instant>, waits: bool, interactive: bool) -> Option<Instant> {
+    held_since.filter(|_| waits && !interactive).map(|since| since + STUCK)
+}
+
 struct Conversation {
     /// `None` while the cable is away.
     connection: Option<Connection>,
@@ -191,10 +199,17 @@ impl Conversation {
         loop {
             let now = self.clock.now();
             self.send(now, output)?;
-            let idle = self.ended && self.sending.is_none() && self.session.waiting() == 0;
-            let silent_at = idle.then(|| self.last + SILENCE);
+            let waits = self.sending.is_some() || self.session.waiting() > 0;
+            let silent_at = (self.ended && !waits).then(|| self.last + SILENCE);
             if silent_at.is_some_and(|at| at <= now) {
                 return self.finish_shown(output);
+            }
+            let stuck_at = stuck_at(self.session.held_since(), waits, self.interactive);
+            if stuck_at.is_some_and(|at| at <= now) {
+                self.finish_shown(output)?;
+                let message = format!("the unit has held us by XOFF for {} s, and something waits", STUCK.as_secs());
+                return Err(CliError::message(Kind::NoAnswer, message)
+                    .hint("its XON was lost, or it hangs: 'axcon identify' says whether it answers; then send again"));
             }
             let whole_at = self.shown.keeps_back().then(|| self.last + HALF_CHARACTER);
             if whole_at.is_some_and(|at| at <= now) {
@@ -211,7 +226,7 @@ impl Conversation {
             }
             let whole_at = whole_at.filter(|_| self.shown.keeps_back());
             let told_at = told_at.filter(|_| !self.hold_told);
-            let due = [silent_at, whole_at, self.retry, told_at, self.session.poll_timeout()];
+            let due = [silent_at, stuck_at, whole_at, self.retry, told_at, self.session.poll_timeout()];
             let input = match due.into_iter().flatten().min() {
                 None => inputs.recv().map_err(|_| RecvTimeoutError::Disconnected),
                 Some(at) => inputs.recv_timeout(self.clock.until(at)),
@@ -522,4 +537,18 @@ fn open_log(path: PathBuf) -> Result<(PathBuf, File), CliError> {
 
 fn log_error(path: &Path, error: io::Error) -> CliError {
     CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot write the log '{}'", path.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_nobody_sits_at_gives_up_and_only_if_something_waits() {
+        let since = Some(Instant::from_millis(500));
+        assert_eq!(stuck_at(since, true, false), Some(Instant::from_millis(500) + STUCK));
+        for (since, waits, interactive) in [(since, false, false), (since, true, true), (None, true, false)] {
+            assert_eq!(stuck_at(since, waits, interactive), None);
+        }
+    }
 }
