@@ -27,7 +27,8 @@ enum Deed {
     /// Read the whole object dictionary.
     ///
     /// It is read through the unit's V, which works in pre-operational state only; meanwhile the unit may halt scanning
-    /// and CAN. The view is left in any case.
+    /// and CAN. The view is left in any case. Exit code 4 if the unit stops answering before the end: what it has shown is
+    /// written all the same.
     Dump {
         /// How it is written. Otherwise FILE's ending says so (.json, .csv, .dcf), or --json.
         #[arg(long, value_enum)]
@@ -135,9 +136,6 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
     };
     let product = facts.product.as_ref().and_then(|known| Product::named(&known.value));
     let dump = Dump::of(&reading, product, &facts);
-    if !dump.complete {
-        output.remark("axcon: the unit stopped answering before the end of its object dictionary");
-    }
     let text = match format {
         Format::Json => dump.json(),
         Format::Table => dump.table(),
@@ -145,9 +143,18 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
         Format::Dcf => configuration(&reading, product, &facts)?,
     };
     match out {
-        None => output.data(text.as_bytes()),
-        Some(file) => files::save(file, text.as_bytes(), global.yes),
+        None => output.data(text.as_bytes())?,
+        Some(file) => files::save(file, text.as_bytes(), global.yes)?,
     }
+    if dump.complete {
+        return Ok(());
+    }
+    let message = match talk.is_recorded() {
+        true => "the recording does not show the end of the object dictionary",
+        false => "the unit stopped answering before the end of its object dictionary",
+    };
+    Err(CliError::message(Kind::NoAnswer, format!("{message}; {} entries were read", dump.entries.len()))
+        .hint("what was read is written all the same"))
 }
 
 fn configuration(reading: &DictionaryReading, product: Option<&Product>, facts: &Facts) -> Result<String, CliError> {

@@ -84,6 +84,15 @@ fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
     assert_eq!((same.code, same.out.as_str()), (Some(0), ""), "{}", same.err);
     let factory = world.run(&["dictionary", "diff", "one.json", "factory:axtc4co"], b"");
     assert_eq!((factory.code, factory.out.lines().count()), (Some(1), 2), "{}", factory.out);
+    // Half of it is written, and not taken for all of it.
+    let whole = fs::read_to_string(world.path("one.cast")).expect("a recording");
+    let lines: Vec<&str> = whole.lines().collect();
+    fs::write(world.path("half.cast"), lines[..lines.len() / 2].join("\n") + "\n").expect("written");
+    let half = world.run(&["dictionary", "dump", "--json", "--port", "replay:half.cast"], b"");
+    let read = json(&half.out);
+    assert_eq!((half.code, &read["complete"]), (Some(4), &false.into()), "{}", half.err);
+    assert_eq!(error_object(&half)["kind"], "no-answer", "{}", half.err);
+    assert!((50..227).contains(&read["entries"].as_array().expect("a list").len()), "{}", half.out);
     let csv = world.run(&[&again[..], &["--format", "csv"]].concat(), b"");
     assert_eq!(csv.out.lines().count(), 228, "{}", csv.out);
     let bad = world.run(&["dictionary", "diff", "u1-nowhere.json", "factory:axtc4co"], b"");
