@@ -152,7 +152,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         output.remark("");
     }
     if let Some(warning) = warning {
-        output.remark(&warning);
+        output.remark(&format!("axcon: {warning}"));
     }
     end
 }
