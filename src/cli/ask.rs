@@ -89,7 +89,7 @@ fn begin<T: Send + 'static>(
 fn await_answer<T>(inputs: &Receiver<Input>, answer: &Receiver<T>) -> Result<T, CliError> {
     loop {
         match inputs.recv() {
-            Ok(Input::Signal(_)) => return Err(interrupted()),
+            Ok(Input::Signal(_)) => return Err(CliError::interrupted()),
             Ok(_) => {}
             Err(_) => return Err(CliError::message(Kind::Failed, "nobody answers")),
         }
@@ -97,11 +97,6 @@ fn await_answer<T>(inputs: &Receiver<Input>, answer: &Receiver<T>) -> Result<T, 
             return Ok(answer);
         }
     }
-}
-
-/// What every command says that the user has interrupted.
-pub fn interrupted() -> CliError {
-    CliError::message(Kind::Interrupted, "interrupted")
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
             Err(CliError::message(Kind::NoAnswer, message)
                 .hint("'axcon identify' says whether the unit runs; 'axcon dictionary dump' shows its parameters"))
         }
-        outcome => talk.expect_done(outcome),
+        outcome => talk.expect_done(&outcome),
     };
     let facts = talk.session().facts().clone();
     talk.close(output);

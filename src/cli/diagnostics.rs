@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Global;
-use super::error::{CliError, Kind};
+use super::error::CliError;
 use super::output::Output;
 use super::talk::{Ended, Talk};
 use crate::session::{Command, Event};
@@ -71,8 +71,8 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     match ended? {
         // Without a count, the interrupt is the way to end.
         Ended::Finished { interrupted: true, .. } if args.count.is_none() => Ok(()),
-        Ended::Finished { interrupted: true, .. } => Err(CliError::message(Kind::Interrupted, "interrupted")),
-        Ended::Finished { outcome, interrupted: false } => talk.expect_done(outcome),
+        Ended::Finished { interrupted: true, .. } => Err(CliError::interrupted()),
+        Ended::Finished { outcome, interrupted: false } => talk.expect_done(&outcome),
         Ended::Lost { error, .. } => Err(error),
     }
 }

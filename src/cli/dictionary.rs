@@ -10,7 +10,7 @@ use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::output::Output;
 use super::talk::{Ended, Talk};
-use super::{files, link};
+use super::{files, link, names};
 use crate::device::Product;
 use crate::dump::{self, Difference, Dump, DumpError};
 use crate::session::{Command, DictionaryReading, Facts, Outcome};
@@ -27,7 +27,8 @@ enum Deed {
     /// Read the whole object dictionary.
     ///
     /// It is read through the unit's V, which works in pre-operational state only; meanwhile the unit may halt scanning
-    /// and CAN. The view is left in any case.
+    /// and CAN. The view is left in any case. Exit code 4 if the unit stops answering before the end: what it has shown is
+    /// written all the same.
     Dump {
         /// How it is written. Otherwise FILE's ending says so (.json, .csv, .dcf), or --json.
         #[arg(long, value_enum)]
@@ -126,7 +127,7 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
         }
         Ended::Finished { outcome, interrupted: false } => {
             return talk
-                .expect_done(outcome)
+                .expect_done(&outcome)
                 .and_then(|()| Err(CliError::message(Kind::Failed, "the reading ended without a result")));
         }
         Ended::Lost { error, .. } => {
@@ -135,9 +136,6 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
     };
     let product = facts.product.as_ref().and_then(|known| Product::named(&known.value));
     let dump = Dump::of(&reading, product, &facts);
-    if !dump.complete {
-        output.remark("axcon: the unit stopped answering before the end of its object dictionary");
-    }
     let text = match format {
         Format::Json => dump.json(),
         Format::Table => dump.table(),
@@ -145,9 +143,18 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
         Format::Dcf => configuration(&reading, product, &facts)?,
     };
     match out {
-        None => output.data(text.as_bytes()),
-        Some(file) => files::save(file, text.as_bytes(), global.yes),
+        None => output.data(text.as_bytes())?,
+        Some(file) => files::save(file, text.as_bytes(), global.yes)?,
     }
+    if dump.complete {
+        return Ok(());
+    }
+    let message = match talk.is_recorded() {
+        true => "the recording does not show the end of the object dictionary",
+        false => "the unit stopped answering before the end of its object dictionary",
+    };
+    Err(CliError::message(Kind::NoAnswer, format!("{message}; {} entries were read", dump.entries.len()))
+        .hint("what was read is written all the same"))
 }
 
 fn configuration(reading: &DictionaryReading, product: Option<&Product>, facts: &Facts) -> Result<String, CliError> {
@@ -161,7 +168,7 @@ fn configuration(reading: &DictionaryReading, product: Option<&Product>, facts: 
 fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), CliError> {
     let mut found = dump::differences(&source(left)?, &source(right)?);
     found.retain(|difference| all || difference.setting);
-    if output.json {
+    let written = if output.json {
         let differences = found.iter().map(|difference| DifferenceObject {
             index: &difference.index,
             subindex: difference.subindex,
@@ -171,35 +178,32 @@ fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), C
             setting: difference.setting,
         });
         let differences: Vec<_> = differences.collect();
-        output.object(&DiffObject { schema: "axcon.dictionary-diff/1", equal: differences.is_empty(), differences })?;
+        output.object(&DiffObject { schema: "axcon.dictionary-diff/1", equal: differences.is_empty(), differences })
     } else {
+        let mut lines = String::new();
         for difference in &found {
             let Difference { index, subindex, name, .. } = difference;
             let side = |value: Option<String>| value.unwrap_or_else(|| "not there".into());
             let (left, right) = (side(difference.shown_left()), side(difference.shown_right()));
-            let line = format!("{index}:{subindex:02X}  {name:<58} {left:>14}  {right:>14}\n");
-            output.data(line.as_bytes())?;
+            lines.push_str(&format!(
+                "{index}:{subindex:02X}  {name:<58} {left:>14}  {right:>14}
+"
+            ));
         }
-    }
-    if found.is_empty() { Ok(()) } else { Err(CliError::reported(Kind::Failed)) }
+        output.data(lines.as_bytes())
+    };
+    CliError::found((!found.is_empty()).then_some(Kind::Failed), written)
 }
 
 fn source(named: &str) -> Result<Dump, CliError> {
     if let Some(name) = named.strip_prefix(FACTORY) {
-        let product = Product::named(name).ok_or_else(|| {
-            let known: Vec<String> = Product::all().iter().map(|product| product.name.to_lowercase()).collect();
-            CliError::message(Kind::Usage, format!("'{name}' is no product; there is {}", known.join(", ")))
-        })?;
-        return Ok(Dump::factory(product));
+        let refused = |complaint| CliError::message(Kind::Usage, format!("'{named}': {complaint}"));
+        return names::product(name).map(Dump::factory).map_err(refused);
     }
     let file = Path::new(named);
-    let failed =
-        |error: anyhow::Error| CliError::new(Kind::Usage, error.context(format!("cannot read the dump '{named}'")));
-    let length = std::fs::metadata(file).map_err(|error| failed(error.into()))?.len();
-    if length > LARGEST_DUMP {
-        return Err(failed(anyhow::anyhow!("it has {length} bytes, a dump has at most {LARGEST_DUMP}")));
-    }
-    let text = std::fs::read_to_string(file).map_err(|error| failed(error.into()))?;
+    let text = files::read_text(file, LARGEST_DUMP).map_err(|error| {
+        CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the dump '{named}'")))
+    })?;
     Dump::parse(named, &text).map_err(|error| {
         let no_dump = matches!(error, DumpError::Syntax { .. });
         let error = CliError::new(Kind::Usage, error);

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use super::error::CliError;
-use super::image::product;
 use super::output::Output;
-use super::{Global, files};
+use super::{Global, files, names};
 use crate::device::{Product, eds};
 
 /// Arguments of `axcon eds`.
@@ -14,7 +13,7 @@ use crate::device::{Product, eds};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Which product, e.g. axtc4co.
-    #[arg(value_name = "PRODUCT", value_parser = product)]
+    #[arg(value_name = "PRODUCT", value_parser = names::product)]
     product: &'static Product,
     /// Write to FILE instead of standard output.
     #[arg(long, value_name = "FILE")]

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::Global;
 use super::error::{CliError, Kind};
 use super::output::Output;
-use crate::device::LoaderKind;
+use super::{Global, names};
+use crate::device::{LoaderKind, Product};
 
 /// Arguments of `axcon emulate`.
 ///
@@ -15,8 +15,8 @@ use crate::device::LoaderKind;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// What to emulate, e.g. axtc4co; several give several units.
-    #[arg(value_name = "PRODUCT", required = true, num_args = 1..=MOST_UNITS)]
-    products: Vec<String>,
+    #[arg(value_name = "PRODUCT", required = true, num_args = 1..=MOST_UNITS, value_parser = names::product)]
+    products: Vec<&'static Product>,
     /// Make PATH a link to the unit's serial port; further units get PATH-2, PATH-3 and so on.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long, value_name = "SEED", value_parser = clap::value_parser!(u64).range(1..))]
     dialect: Option<u64>,
     /// Which bootloader is in the unit, if not the product's own: g1, g2, g3, or g3-1.3, which hangs on odd data.
-    #[arg(long, value_name = "PROFILE", value_parser = loader)]
+    #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
     loader: Option<LoaderKind>,
     /// Let something go wrong: bytes lost, an XON that never comes, a reset or a power cut in the middle of a file, flash
     /// that fails, a slow adapter, a pulled cable. Several are possible; a number before SPEC says which unit it is for,
@@ -50,17 +50,6 @@ pub struct Args {
 
 /// Units of one run: each has a pseudo-terminal and a thread.
 const MOST_UNITS: usize = 256;
-
-/// A loader by its name.
-///
-/// # Errors
-/// If there is none of this name; the message says which there are.
-pub fn loader(name: &str) -> Result<LoaderKind, String> {
-    LoaderKind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
-        let known = LoaderKind::ALL.map(LoaderKind::name).join(", ");
-        format!("there is no such loader; there is {known}")
-    })
-}
 
 #[cfg(not(unix))]
 /// Says that it cannot be done here.
@@ -84,8 +73,8 @@ mod hosting {
     use serde::Serialize;
 
     use super::{Args, CliError, Global, Kind, Output};
-    use crate::device::Complaint;
-    use crate::device::Product;
+    use crate::cli::files;
+    use crate::device::{Complaint, Product};
     use crate::emulator::Unit;
     use crate::emulator::fault::{self, Fault};
     use crate::emulator::scenario::{self, LARGEST_FILE, Scenario, Stage, Verb};
@@ -172,14 +161,8 @@ mod hosting {
 
     /// The products of all units, in their order.
     fn products(args: &Args) -> Result<Vec<&'static Product>, CliError> {
-        let mut products = Vec::new();
-        for name in &args.products {
-            let product = Product::named(name).ok_or_else(|| {
-                let known: Vec<String> = Product::all().iter().map(|product| product.name.to_lowercase()).collect();
-                CliError::message(Kind::Usage, format!("there is no emulated '{name}'; there is {}", known.join(", ")))
-            })?;
-            products.extend(std::iter::repeat_n(product, usize::from(args.count)));
-        }
+        let repeated = |product| std::iter::repeat_n(product, usize::from(args.count));
+        let products: Vec<_> = args.products.iter().copied().flat_map(repeated).collect();
         if products.len() > super::MOST_UNITS {
             let message = format!("{} units are more than {}", products.len(), super::MOST_UNITS);
             return Err(CliError::message(Kind::Usage, message).hint("start 'axcon emulate' several times"));
@@ -227,19 +210,8 @@ mod hosting {
     /// A scenario's file: its name and its text.
     fn read_scenario(file: &Path) -> Result<(String, String), CliError> {
         let name = file.display().to_string();
-        let failed = |error| {
+        let text = files::read_text(file, LARGEST_FILE).map_err(|error| {
             CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the scenario '{name}'")))
-        };
-        let mut text = Vec::new();
-        std::fs::File::open(file)
-            .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut text))
-            .map_err(failed)?;
-        if text.len() as u64 > LARGEST_FILE {
-            let message = format!("the scenario '{name}' is larger than {} MiB", LARGEST_FILE >> 20);
-            return Err(CliError::message(Kind::Usage, message));
-        }
-        let text = String::from_utf8(text).map_err(|error| {
-            CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("'{name}' is no text")))
         })?;
         Ok((name, text))
     }
@@ -343,7 +315,10 @@ mod hosting {
                         Ok(Some(Order::HelpFaults)) => tell_help(fault::HELP, output)?,
                         Ok(Some(Order::Tell(verbs))) => {
                             for (place, verb) in verbs {
-                                tell(&units[place], place, verb, line.trim(), news, output);
+                                if !tell(&units[place], place, verb, line.trim(), news) {
+                                    let refused = Err("the unit takes no more orders at the moment".to_owned());
+                                    report(place, line.trim(), &refused, units.len(), output)?;
+                                }
                             }
                         }
                         Err(complaint) if output.json => {
@@ -379,15 +354,13 @@ mod hosting {
         output.data(format!("{}\n", text.trim_end()).as_bytes())
     }
 
-    fn tell(running: &Running, place: usize, verb: Verb, line: &str, news: &SyncSender<News>, output: &mut Output) {
+    /// Has a unit do something; `false` if it takes no order.
+    fn tell(running: &Running, place: usize, verb: Verb, line: &str, news: &SyncSender<News>) -> bool {
         let (news, line) = (news.clone(), line.to_owned());
-        let answered = move |answer| {
+        running.unit.order(verb, move |answer| {
             // The unit's thread must not wait for us: an answer that nobody can take is dropped.
             let _ = news.try_send(News::Answered { place, verb: line, answer });
-        };
-        if !running.unit.order(verb, answered) {
-            output.remark("the unit takes no more orders at the moment");
-        }
+        })
     }
 
     /// Says what came of a verb: data to standard output, refusals to standard error.

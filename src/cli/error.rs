@@ -4,6 +4,8 @@
 
 use std::fmt;
 
+use super::output::Closed;
+
 /// Why a command ended without success.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
@@ -140,6 +142,24 @@ impl CliError {
         CliError { kind, error: anyhow::Error::msg(kind.name()), hints: Vec::new(), reported: true }
     }
 
+    /// The end of a command that has told its finding on standard output: success, or what is left of it, the exit code.
+    /// That stands whoever still reads; that it could not be written is told besides.
+    ///
+    /// # Errors
+    /// If something was found that has an exit code, or `written` failed.
+    pub fn found(kind: Option<Kind>, written: Result<(), CliError>) -> Result<(), CliError> {
+        match (kind, written) {
+            (None, written) => written,
+            (Some(kind), Err(error)) if !error.error.is::<Closed>() => Err(CliError { kind, ..error }),
+            (Some(kind), _) => Err(CliError::reported(kind)),
+        }
+    }
+
+    /// What every command says that the user has interrupted.
+    pub fn interrupted() -> Self {
+        CliError::message(Kind::Interrupted, "interrupted")
+    }
+
     /// Adds what to do next.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
@@ -152,5 +172,22 @@ impl fmt::Display for CliError {
     /// Message and causes in one line, without hints.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:#}", self.error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_found_decides_and_not_who_reads_it() {
+        let closed = || Err(CliError::new(Kind::Failed, Closed));
+        let full = || Err(CliError::message(Kind::Failed, "no space left"));
+        let ended = |kind, written| CliError::found(kind, written).map_err(|error| (error.kind, error.reported)).err();
+        assert_eq!(ended(None, Ok(())), None);
+        assert_eq!(ended(None, full()), Some((Kind::Failed, false)));
+        assert_eq!(ended(Some(Kind::ImageRefused), Ok(())), Some((Kind::ImageRefused, true)));
+        assert_eq!(ended(Some(Kind::ImageRefused), closed()), Some((Kind::ImageRefused, true)));
+        assert_eq!(ended(Some(Kind::ImageRefused), full()), Some((Kind::ImageRefused, false)), "it is told why");
     }
 }

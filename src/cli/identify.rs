@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use super::Global;
-use super::ask::{self, confirm};
+use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::journal::Desk;
 use super::link;
@@ -98,17 +98,19 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
              or a newer one, brings the unit back"
         ));
     }
-    if output.json {
-        output.object(&object(&facts, &deep))?;
-    } else if matches!(facts.state, UnitState::Application | UnitState::Loader) {
-        output.data((text(&facts) + &deep.text()).as_bytes())?;
-    }
-    let result = match facts.state {
+    let found = match facts.state {
         UnitState::Application | UnitState::Loader => Ok(()),
         UnitState::Silent | UnitState::Unknown => Err(talk.no_unit()),
     };
+    let written = if output.json {
+        output.object(&object(&facts, &deep))
+    } else if found.is_ok() {
+        output.data((text(&facts) + &deep.text()).as_bytes())
+    } else {
+        Ok(())
+    };
     talk.close(output);
-    result
+    found.and(written)
 }
 
 /// What only the object dictionary says.
@@ -127,7 +129,7 @@ impl Deep {
             Outcome::DictionaryRead(reading) => reading,
             outcome => {
                 return talk
-                    .expect_done(outcome)
+                    .expect_done(&outcome)
                     .and_then(|()| Err(CliError::message(Kind::Failed, "the reading ended without a result")));
             }
         };
@@ -173,7 +175,7 @@ fn wait_for_banner(talk: &mut Talk, output: &mut Output) -> Result<(), CliError>
         Ok(if said { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     })?;
     if !undisturbed {
-        return Err(ask::interrupted());
+        return Err(CliError::interrupted());
     }
     if !said {
         let message = format!("no power-up messages within {} s", POWER_CYCLE.as_secs());
@@ -182,7 +184,7 @@ fn wait_for_banner(talk: &mut Talk, output: &mut Output) -> Result<(), CliError>
     let until = talk.now() + REST_OF_BANNER;
     match talk.listen(until, |_, _| Ok(ControlFlow::Continue(())))? {
         true => Ok(()),
-        false => Err(ask::interrupted()),
+        false => Err(CliError::interrupted()),
     }
 }
 

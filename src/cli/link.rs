@@ -70,14 +70,21 @@ pub fn journal_key(spec: &LinkSpec) -> Option<String> {
         LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_) => Some(spec.to_string()),
         LinkSpec::Serial(path) => {
             let resolved = std::fs::canonicalize(path).unwrap_or_else(|_| path.clone());
-            let listed = ports::list().unwrap_or_default();
-            let adapter = listed.iter().find(|port| std::path::Path::new(&port.path) == resolved);
-            let serial_number = adapter.and_then(|port| port.usb.as_ref()).and_then(|usb| usb.serial_number.clone());
-            Some(match serial_number {
-                Some(number) => format!("usb:{number}"),
-                None => std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
-            })
+            let own_name = || std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string();
+            Some(adapter_key(&ports::list().unwrap_or_default(), &resolved).unwrap_or_else(own_name))
         }
+    }
+}
+
+/// The name of an adapter's port that lasts: `usb:A1`. An adapter may have several ports, and some makers give all their
+/// adapters one number; behind each there is another unit, so the place it is plugged in tells them apart.
+fn adapter_key(found: &[Port], path: &Path) -> Option<String> {
+    let number = |port: &Port| port.usb.as_ref().and_then(|usb| usb.serial_number.clone());
+    let port = found.iter().find(|port| Path::new(&port.path) == path)?;
+    let of_its_number = number(port)?;
+    match found.iter().filter(|other| number(other).as_ref() == Some(&of_its_number)).count() {
+        1 => Some(format!("usb:{of_its_number}")),
+        _ => Some(format!("usb:{of_its_number} at {}", port.place.as_ref()?)),
     }
 }
 
@@ -321,13 +328,46 @@ mod tests {
         assert_eq!(only_port(Vec::new()).expect_err("none").kind, Kind::PortNone);
     }
 
+    fn adapter(path: &str, number: &str) -> Port {
+        let serial_number = Some(number.to_owned());
+        let usb = ports::Usb { vid: 0x0403, pid: 0x6001, serial_number, manufacturer: None, product: None };
+        Port { usb: Some(usb), ..port(path, ports::Kind::Usb) }
+    }
+
+    #[test]
+    fn ports_that_share_a_serial_number_share_no_note_in_the_journal() {
+        let placed = |path: &str, number: &str, place: &str| Port {
+            place: (!place.is_empty()).then(|| place.to_owned()),
+            ..adapter(path, number)
+        };
+        let found = [
+            placed("/dev/ttyUSB0", "A1", "1-1:1.0"),
+            placed("/dev/ttyUSB1", "0001", "1-2:1.0"),
+            placed("/dev/ttyUSB2", "0001", "1-3:1.0"),
+            placed("/dev/ttyUSB3", "FT4232", "1-4:1.0"),
+            placed("/dev/ttyUSB4", "FT4232", "1-4:1.1"),
+            placed("/dev/ttyUSB5", "0001", ""),
+            port("/dev/ttyS0", ports::Kind::Native),
+        ];
+        let keys: Vec<Option<String>> = found.iter().map(|port| adapter_key(&found, Path::new(&port.path))).collect();
+        let keys: Vec<Option<&str>> = keys.iter().map(Option::as_deref).collect();
+        assert_eq!(
+            keys,
+            [
+                Some("usb:A1"),
+                Some("usb:0001 at 1-2:1.0"),
+                Some("usb:0001 at 1-3:1.0"),
+                Some("usb:FT4232 at 1-4:1.0"),
+                Some("usb:FT4232 at 1-4:1.1"),
+                None,
+                None,
+            ]
+        );
+        assert_eq!(adapter_key(&found, Path::new("/dev/ttyUSB9")), None);
+    }
+
     #[test]
     fn an_adapter_is_found_by_its_serial_number() {
-        let adapter = |path: &str, number: &str| {
-            let serial_number = Some(number.to_owned());
-            let usb = ports::Usb { vid: 0x0403, pid: 0x6001, serial_number, manufacturer: None, product: None };
-            Port { usb: Some(usb), ..port(path, ports::Kind::Usb) }
-        };
         let found = [adapter("/dev/ttyUSB0", "A1"), adapter("/dev/ttyUSB1", "B2"), adapter("/dev/ttyUSB2", "B2")];
         for text in ["A1", "usb:A1"] {
             let spec = by_serial_number(&found, text).expect("one of them");

@@ -15,6 +15,7 @@ pub mod journal;
 pub mod link;
 pub mod load;
 pub mod manual;
+pub mod names;
 pub mod output;
 pub mod password;
 pub mod playback;

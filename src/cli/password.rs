@@ -49,7 +49,7 @@ pub fn ask(talk: Option<&mut Talk>) -> Result<Secret, CliError> {
         rpassword::prompt_password("Password: ").map(|password| Secret::new(password.into_bytes()))
     })?;
     let password = password.map_err(|error| match error.kind() {
-        std::io::ErrorKind::Interrupted => ask::interrupted(),
+        std::io::ErrorKind::Interrupted => CliError::interrupted(),
         _ => CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot ask for the password")),
     })?;
     accept(password, "the answer")

@@ -7,7 +7,7 @@ use jiff::tz::TimeZone;
 use serde::Serialize;
 
 use super::Global;
-use super::ask::{self, confirm};
+use super::ask::confirm;
 use super::error::CliError;
 use super::image::shown;
 use super::output::Output;
@@ -131,11 +131,15 @@ impl Findings {
         if found.is_some() {
             return self.listen(talk, seconds);
         }
-        let watched = self
-            .ask(talk, Command::StreamOn { source: Source::FieldValue, period: PERIOD }, "the stream")
-            .and_then(|()| self.listen(talk, seconds));
+        let begun = self.ask(talk, Command::StreamOn { source: Source::FieldValue, period: PERIOD }, "the stream");
+        let was_on = matches!(begun, Ok(Some(Outcome::StreamRuns { was_on: true })));
+        let watched = match begun {
+            Ok(Some(_)) => self.listen(talk, seconds),
+            Ok(None) => Ok(()),
+            Err(error) => Err(error),
+        };
         // However it ended.
-        watched.and(leave_as_found(talk, false, found, output))
+        watched.and(leave_as_found(talk, was_on, found, output))
     }
 
     fn listen(&mut self, talk: &mut Talk, seconds: u64) -> Result<(), CliError> {
@@ -144,27 +148,28 @@ impl Findings {
             self.fold(session, event);
             Ok(ControlFlow::Continue(()))
         })?;
-        if whole { Ok(()) } else { Err(ask::interrupted()) }
+        if whole { Ok(()) } else { Err(CliError::interrupted()) }
     }
 
-    /// Asks for something that the report can do without.
-    fn ask(&mut self, talk: &mut Talk, command: Command, what: &str) -> Result<(), CliError> {
+    /// Asks for something that the report can do without: `None` if the unit does not show it.
+    fn ask(&mut self, talk: &mut Talk, command: Command, what: &str) -> Result<Option<Outcome>, CliError> {
         let ended = talk.run(command, |session, event| {
             self.fold(session, event);
             Ok(())
         })?;
-        match ended {
-            Ended::Finished { interrupted: true, .. } => Err(ask::interrupted()),
-            Ended::Lost { error, .. } => Err(error),
-            Ended::Finished { outcome: Outcome::DictionaryRead(reading), .. } => {
-                self.reading = Some(*reading);
-                Ok(())
-            }
-            Ended::Finished { outcome, .. } => {
-                if let Err(error) = talk.expect_done(outcome) {
-                    self.missing.push(format!("Not found out: {what}. {error}."));
-                }
-                Ok(())
+        let outcome = match ended {
+            Ended::Finished { interrupted: true, .. } => return Err(CliError::interrupted()),
+            Ended::Lost { error, .. } => return Err(error),
+            Ended::Finished { outcome, .. } => outcome,
+        };
+        if let Outcome::DictionaryRead(reading) = &outcome {
+            self.reading = Some((**reading).clone());
+        }
+        match talk.expect_done(&outcome) {
+            Ok(()) => Ok(Some(outcome)),
+            Err(error) => {
+                self.missing.push(format!("Not found out: {what}. {error}."));
+                Ok(None)
             }
         }
     }

@@ -12,7 +12,7 @@ use super::error::{CliError, Kind};
 use super::link;
 use super::output::{Closed, Output};
 use super::talk::{Calendar, Ended, Talk};
-use super::{Global, ask, files};
+use super::{Global, files};
 use crate::device::Product;
 use crate::host::save::SaveError;
 use crate::session::{Command, Event, Outcome};
@@ -94,7 +94,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if args.off {
         let outcome = talk.ask(Command::StreamOff)?;
         talk.close(output);
-        talk.expect_done(outcome)?;
+        talk.expect_done(&outcome)?;
         if output.json {
             return output.object(&OffObject { schema: "axcon.stream-off/1", stream: "off" });
         }
@@ -125,8 +125,8 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let written = begun.and_then(|()| stream.keep_writing(Duration::from_secs(args.reconnect), output));
     let Stream { mut talk, mut sink, setting, was_on, .. } = stream;
     // However it ended, and also if the first row never came: what has been changed is changed back.
-    let is_lost = written.as_ref().is_err_and(|error| error.kind == Kind::PortGone);
-    let left = if setting.is_some() && !args.keep && !is_lost {
+    let is_gone = written.as_ref().is_err_and(|error| error.kind == Kind::PortGone || error.error.is::<AnotherUnit>());
+    let left = if setting.is_some() && !args.keep && !is_gone {
         leave_as_found(&mut talk, was_on, found, output)
     } else {
         Ok(())
@@ -180,8 +180,8 @@ impl Stream {
             Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => {
                 self.was_on |= was_on && is_first;
             }
-            Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(outcome),
-            Ended::Finished { interrupted: true, .. } => return Err(ask::interrupted()),
+            Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(&outcome),
+            Ended::Finished { interrupted: true, .. } => return Err(CliError::interrupted()),
             Ended::Lost { error, .. } => return Err(error),
         }
         match proof {
@@ -225,7 +225,7 @@ impl Stream {
             if let (Some(before), Some(now)) = (before, now)
                 && before != now
             {
-                return Err(another_unit(&format!("the unit is an {now} now and was an {before}")));
+                return Err(another_unit(format!("the unit is an {now} now and was an {before}")));
             }
             self.switch_on(source, period, output)?;
         }
@@ -282,7 +282,7 @@ pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
         Ok(ControlFlow::Continue(()))
     })?;
     if !undisturbed {
-        return Err(ask::interrupted());
+        return Err(CliError::interrupted());
     }
     Ok(first.zip(last).map(|((begun, _), (ended, source))| {
         let period = (rows > 1).then(|| ended.since(begun) / (rows - 1));
@@ -306,11 +306,11 @@ pub fn leave_as_found(
     match (was_on, found) {
         (false, _) => {
             let outcome = talk.ask(Command::StreamOff)?;
-            talk.expect_done(outcome)
+            talk.expect_done(&outcome)
         }
         (true, Some(Found { source, period: Some(period) })) => {
             let outcome = talk.ask(Command::StreamOn { source, period })?;
-            talk.expect_done(outcome)
+            talk.expect_done(&outcome)
         }
         (true, _) => {
             output.remark("axcon: the stream was on before, at a rate too slow to be seen; it is left at the new one");
@@ -381,7 +381,7 @@ impl Sink {
         let channels = channels_of(row);
         if let Some(before) = self.channels.filter(|&before| before != row.readings.len()) {
             let now = row.readings.len();
-            return Err(another_unit(&format!("the unit's rows have {now} values now and had {before}")));
+            return Err(another_unit(format!("the unit's rows have {now} values now and had {before}")));
         }
         let time = self.calendar.text(at);
         let mut text = Vec::new();
@@ -462,9 +462,14 @@ impl OutFile {
     }
 }
 
-fn another_unit(what: &str) -> CliError {
-    CliError::message(Kind::Failed, what.to_owned())
-        .hint("another unit answers: its values are not written behind those of the first one")
+/// Another unit answers than the one that was asked.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct AnotherUnit(String);
+
+fn another_unit(what: String) -> CliError {
+    CliError::new(Kind::Failed, AnotherUnit(what))
+        .hint("another unit answers: its values are not written behind those of the first one, and it is left as it is")
 }
 
 /// Names of a row's fields, from the layout that has as many.

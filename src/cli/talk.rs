@@ -6,11 +6,11 @@ use std::sync::mpsc::{Receiver, SyncSender};
 
 use jiff::Timestamp;
 
+use super::Global;
 use super::error::{CliError, Kind};
 use super::link;
 use super::output::{Output, Remarks};
 use super::playback::Playback;
-use super::{Global, ask};
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::LinkSpec;
@@ -99,7 +99,6 @@ impl Talk {
     pub fn open(global: &Global, output: &mut Output) -> Result<Self, CliError> {
         let spec: LinkSpec = link::spec(global)?;
         let (sender, inputs) = host::channel();
-        let signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
         let mut comeback = None;
         let (line, session) = if let LinkSpec::Replay(path) = &spec {
             let recording = Recording::open(path).map_err(link::recording_error)?;
@@ -114,6 +113,8 @@ impl Talk {
             let line = Line::Live(Box::new(Pump::new(connection, inputs, clock, recorder)));
             (line, Session::new(global.baud))
         };
+        // Not before: until then there is nothing to leave in order, and a server that does not answer may take seconds.
+        let signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
         let (port, remarks) = (spec.to_string(), output.err.clone());
         Ok(Talk { line, session, port, spec, comeback, inputs: sender, remarks, _signals: signals })
     }
@@ -121,7 +122,7 @@ impl Talk {
     /// Runs a job to its end; `news` hears every event on the way. An interrupt cancels the job, a second one is final.
     ///
     /// # Errors
-    /// If the command makes no sense, `news` fails, or a cancelled job finds no end.
+    /// If the command makes no sense, `news` fails, or a cancelled job finds no end: that is an interrupt, too.
     pub fn run(
         &mut self,
         command: Command,
@@ -145,6 +146,7 @@ impl Talk {
                     // Never refused: it needs no job.
                     let _ = self.session.command(now, Command::Cancel);
                 }
+                Err(PumpError::Interrupted(_) | PumpError::Deadline) => return Err(abandoned()),
                 Err(error @ (PumpError::Link(_) | PumpError::Send { .. })) => {
                     let now = self.now();
                     self.session.link_lost(now);
@@ -174,7 +176,7 @@ impl Talk {
     pub fn ask(&mut self, command: Command) -> Result<Outcome, CliError> {
         match self.run(command, |_, _| Ok(()))? {
             Ended::Finished { outcome, interrupted: false } => Ok(outcome),
-            Ended::Finished { interrupted: true, .. } => Err(CliError::message(Kind::Interrupted, "interrupted")),
+            Ended::Finished { interrupted: true, .. } => Err(CliError::interrupted()),
             Ended::Lost { error, .. } => Err(error),
         }
     }
@@ -222,7 +224,7 @@ impl Talk {
     pub fn hear_out(&mut self) -> Result<(), CliError> {
         match self.listen(Instant::NEVER, |_, _| Ok(ControlFlow::Continue(())))? {
             true => Ok(()),
-            false => Err(CliError::message(Kind::Interrupted, "interrupted")),
+            false => Err(CliError::interrupted()),
         }
     }
 
@@ -236,7 +238,7 @@ impl Talk {
             answer.try_recv().map_or(ControlFlow::Continue(()), ControlFlow::Break)
         });
         step.map_err(|error| match error {
-            PumpError::Interrupted(_) => ask::interrupted(),
+            PumpError::Interrupted(_) => CliError::interrupted(),
             error => link::pump_error(error),
         })
     }
@@ -389,30 +391,24 @@ impl Talk {
     ///
     /// # Errors
     /// If the outcome is not what was wanted.
-    pub fn expect_done(&self, outcome: Outcome) -> Result<(), CliError> {
+    pub fn expect_done(&self, outcome: &Outcome) -> Result<(), CliError> {
         let (error, heard) = match outcome {
             Outcome::Identified | Outcome::Done(_) | Outcome::StreamRuns { .. } | Outcome::DictionaryRead(_) => {
                 return Ok(());
             }
-            Outcome::Cancelled(_) => return Err(CliError::message(Kind::Interrupted, "interrupted")),
-            Outcome::Loaded(report) => return Err(CliError::message(Kind::Failed, report.what)),
+            Outcome::Cancelled(_) => return Err(CliError::interrupted()),
+            Outcome::Loaded(report) => return Err(CliError::message(Kind::Failed, report.what.clone())),
             Outcome::FileSent { end: FileEnd::Whole, .. } => return Ok(()),
             Outcome::FileSent { sent, total, end: FileEnd::Cancelled | FileEnd::LinkLost } => {
                 let message = format!("{sent} of the file's {total} bytes have left");
                 return Err(CliError::message(Kind::Interrupted, message));
             }
-            Outcome::Refused { reason, heard, .. } => (CliError::message(Kind::UnitRefused, reason), heard),
+            Outcome::Refused { reason, heard, .. } => (CliError::message(Kind::UnitRefused, reason.clone()), heard),
             Outcome::NoAnswer { awaited, heard, .. } if self.is_recorded() => {
                 let message = format!("the recording does not show what was looked for: {awaited}");
                 (CliError::message(Kind::NoAnswer, message), heard)
             }
-            Outcome::NoAnswer { awaited, heard, .. } => {
-                let message = format!("the unit did not answer as expected: {awaited} did not come");
-                let error = CliError::message(Kind::NoAnswer, message)
-                    .hint("no guess was made: the question was left with Enter, and nothing is changed")
-                    .hint("'axcon terminal' shows what the unit prints, and takes the answer by hand");
-                (error, heard)
-            }
+            Outcome::NoAnswer { awaited, heard, .. } => (unanswered(awaited), heard),
         };
         let said = heard.map(|span| self.quoted(span)).filter(|said| !said.is_empty());
         Err(match said {
@@ -435,6 +431,26 @@ impl Talk {
         let characters: Vec<char> = text.trim().chars().collect();
         characters[characters.len().saturating_sub(QUOTED)..].iter().collect()
     }
+}
+
+/// The error of a job that has waited in vain. Only a question that did not come was left as it stood; a row or a page
+/// is awaited when the unit has been told already.
+fn unanswered(awaited: &str) -> CliError {
+    let message = format!("the unit did not answer as expected: {awaited} did not come");
+    let error = CliError::message(Kind::NoAnswer, message);
+    if awaited.starts_with("the question") {
+        error
+            .hint("no guess was made: the question was left with Enter, and nothing is changed")
+            .hint("'axcon terminal' shows what the unit prints, and takes the answer by hand")
+    } else {
+        error.hint("'axcon terminal' shows what the unit prints")
+    }
+}
+
+/// The error of a job that was interrupted and has come to no end of its own.
+fn abandoned() -> CliError {
+    CliError::interrupted()
+        .hint("the unit may still stand in a dialogue, or in its view with scanning halted: Enter and X leave them")
 }
 
 /// Hints for a unit that does not answer: what has to be checked, most likely first (manuals, chapter 4).
@@ -467,4 +483,26 @@ fn finished(
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_of_a_question_it_is_said_that_nothing_is_changed() {
+        let says_so = |awaited: &str| {
+            let error = unanswered(awaited);
+            assert_eq!(error.kind, Kind::NoAnswer);
+            error.hints.iter().any(|hint| hint.contains("nothing is changed"))
+        };
+        assert!(says_so("the question for the stream's source"));
+        assert!(!says_so("a row of the stream") && !says_so("that the stream is off"));
+    }
+
+    #[test]
+    fn a_job_that_finds_no_end_was_interrupted_and_the_unit_may_want_something_done() {
+        let error = abandoned();
+        assert_eq!((error.kind, error.hints.len()), (Kind::Interrupted, 1));
+    }
 }

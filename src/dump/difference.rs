@@ -71,7 +71,9 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
                     let open = rounding(left, of_left, a).max(rounding(right, of_right, b));
                     (a - b).abs() <= open.max(b.abs() * f64::from(f32::EPSILON))
                 }
-                (a, b) => a == b,
+                // What is no number is what the unit printed.
+                (None, None) => of_left.text == of_right.text,
+                (Some(_), None) | (None, Some(_)) => false,
             },
             // The factory has nothing to say of what it does not set; a unit that does not show what it sets lacks it.
             (Some(_), None) => right.factory,
@@ -79,7 +81,9 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
             (None, None) => true,
         };
         let (left, right) = (of_left, of_right);
-        let shown = |entry: Option<&DumpEntry>| entry.map(DumpEntry::number);
+        let shown = |entry: Option<&DumpEntry>| {
+            entry.map(|entry| if entry.value.is_some() { entry.number() } else { entry.text.clone() })
+        };
         let name = left.or(right).map(|entry| entry.name.clone()).unwrap_or_default();
         let (index, subindex) = address.clone();
         let entry = left.or(right);
@@ -98,7 +102,8 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{half_a_unit, rounding};
+    use super::super::half_a_unit;
+    use super::*;
 
     #[test]
     fn a_number_may_be_off_by_half_of_what_is_printed_last() {
@@ -115,6 +120,26 @@ mod tests {
             let found = half_a_unit(numeral);
             assert!((found - expected).abs() < expected * 1e-9, "{numeral}: {found}");
         }
+    }
+
+    #[test]
+    fn what_is_no_number_is_compared_as_it_is_printed() {
+        let product = Product::named("AXTC4CO").expect("built in");
+        let (left, mut right) = (Dump::factory(product), Dump::factory(product));
+        assert_eq!(differences(&left, &right), []);
+        let mut left = left;
+        for dump in [&mut left, &mut right] {
+            dump.factory = false;
+            dump.entries[0].value = None;
+            dump.entries[0].text = "Ver. A".into();
+        }
+        assert_eq!(differences(&left, &right), []);
+        right.entries[0].text = "Ver. B".into();
+        let found = differences(&left, &right);
+        let sides: Vec<_> = found.iter().map(|found| (found.left.as_deref(), found.right.as_deref())).collect();
+        assert_eq!(sides, [(Some("Ver. A"), Some("Ver. B"))]);
+        left.entries[0].value = Some(1.into());
+        assert_eq!(differences(&left, &right)[0].left.as_deref(), Some("1"));
     }
 
     #[test]

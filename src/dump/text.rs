@@ -17,8 +17,7 @@ impl Dump {
                 unit.as_deref().filter(|_| entry.value.is_some()).map(|unit| format!(" {unit}")).unwrap_or_default();
             let meaning = meaning.as_deref().map(|meaning| format!("  {meaning}")).unwrap_or_default();
             let mark = if entry.deviates { "*" } else { " " };
-            let factory = entry.default.as_ref().filter(|_| entry.deviates);
-            let factory = factory.map(|_| format!("  (factory {})", entry.shown_default())).unwrap_or_default();
+            let factory = if entry.deviates { format!("  (factory {})", entry.shown_default()) } else { String::new() };
             text.push_str(&format!("{mark} {index}:{subindex:02X}  {name:<58} {value:>14}{unit}{meaning}{factory}\n"));
         }
         text.push_str(&format!("{} entries, {compared}\n", self.entries.len()));
@@ -55,4 +54,24 @@ impl Dump {
 
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Product;
+
+    #[test]
+    fn bits_and_what_the_factory_makes_them_are_written_alike() {
+        let mut dump = Dump::factory(Product::named("AXTC4CO").expect("built in"));
+        dump.entries.truncate(1);
+        let entry = &mut dump.entries[0];
+        (entry.bits, entry.deviates) = (true, true);
+        (entry.value, entry.default) = (Some(0x1FF.into()), Some(0x27F.into()));
+        assert!(
+            dump.table().contains("0x000001FF") && dump.table().contains("(factory 0x0000027F)"),
+            "{}",
+            dump.table()
+        );
+    }
 }

@@ -323,6 +323,8 @@ impl PortLink {
         let mut temporary = link.as_os_str().to_owned();
         temporary.push(format!(".{}.tmp", std::process::id()));
         let temporary = PathBuf::from(temporary);
+        // Left behind by a process of the same number that was killed: in a container they all have the same.
+        let _ = fs::remove_file(&temporary);
         std::os::unix::fs::symlink(target, &temporary).map_err(failed)?;
         if let Err(error) = fs::rename(&temporary, link) {
             let _ = fs::remove_file(&temporary);
@@ -383,6 +385,8 @@ mod tests {
 
         let stale = folder.path().join("stale");
         std::os::unix::fs::symlink("/dev/pts/4712", &stale).expect("a link");
+        let half_way = folder.path().join(format!("stale.{}.tmp", std::process::id()));
+        std::os::unix::fs::symlink("/dev/pts/4713", half_way).expect("a link");
         drop(create(&stale).expect("replaced"));
         assert!(fs::symlink_metadata(&stale).is_err(), "removed on drop");
 

@@ -9,7 +9,7 @@ mod trend;
 use std::collections::VecDeque;
 
 pub use diagnostics::{Diagnostics, Tracked};
-pub use scrollback::{Origin, Scrollback, TextLine};
+pub use scrollback::{KEPT_LINES, Origin, Scrollback, TextLine};
 pub use stream::{Channel, Fault, Mark, Sample, Stream};
 
 use crate::device::Product;

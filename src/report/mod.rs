@@ -164,12 +164,13 @@ impl Contents<'_> {
     fn transcript(&self, page: &mut Page) {
         page.section("Transcript");
         let lines = self.transcript.lines();
-        let left_out = lines.len().saturating_sub(MOST_LINES);
+        let skipped = lines.len().saturating_sub(MOST_LINES);
+        let left_out = self.transcript.start() + skipped as u64;
         if left_out > 0 {
-            page.remark(&format!("{left_out} earlier lines are left out: the recording has them."));
+            page.remark(&format!("{left_out} earlier lines are left out: a recording of the session has them."));
         }
         let shown: Vec<String> = lines
-            .skip(left_out)
+            .skip(skipped)
             .map(|line| {
                 let mark = match line.origin {
                     crate::monitor::Origin::Unit => " ",
@@ -229,6 +230,7 @@ fn known<T>(label: &str, fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::monitor::KEPT_LINES;
     use crate::record::Span;
     use crate::session::Event;
     use crate::wire::Text;
@@ -262,6 +264,27 @@ mod tests {
             "title, heading, link, two facts, remark, page, line"
         );
         assert!(!html.contains("http"), "nothing from elsewhere");
+    }
+
+    #[test]
+    fn all_lines_that_are_left_out_of_the_transcript_are_counted() {
+        let mut transcript = Scrollback::default();
+        let lines = KEPT_LINES + 7;
+        (0..lines).for_each(|number| transcript.note(Instant::ZERO, format!("line {number};")));
+        let contents = Contents {
+            link: "u0",
+            made: "2026-01-31 12:00",
+            facts: &Facts::default(),
+            monitor: &Monitor::default(),
+            dump: None,
+            missing: &[],
+            transcript: &transcript,
+            start_of_day: Duration::ZERO,
+        };
+        let html = contents.html();
+        assert!(html.contains(&format!("{} earlier lines are left out", lines - MOST_LINES)), "also those not kept");
+        assert!(html.contains(&format!("line {};", lines - MOST_LINES)));
+        assert!(!html.contains(&format!("line {};", lines - MOST_LINES - 1)));
     }
 
     #[test]

@@ -193,6 +193,21 @@ fn a_raw_socket_taken_for_a_remote_port_is_told_by_its_silence() {
 }
 
 #[test]
+fn whoever_waits_for_a_server_can_interrupt_that() {
+    let (asked, is_asked) = std::sync::mpsc::channel();
+    let server = Server::start(move |mut client| {
+        read_to(&mut client, ASKED);
+        asked.send(()).expect("somebody waits");
+        let _ = client.read_to_end(&mut Vec::new());
+    });
+    let world = World::new();
+    let running = world.start(&["identify", "--no-record", "--port", &server.link(RFC2217)]);
+    is_asked.recv().expect("it connects");
+    running.signal(rustix::process::Signal::INT);
+    assert_eq!(running.wait().code, None, "the signal itself ends it: there is nothing to leave in order");
+}
+
+#[test]
 fn what_a_unit_says_while_its_port_is_set_up_is_heard() {
     let server = Server::start(|mut client| {
         client.write_all(b"early,").expect("said");

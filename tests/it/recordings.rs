@@ -288,6 +288,30 @@ fn a_cable_that_comes_back_goes_on_in_the_same_recording() {
 }
 
 #[test]
+fn another_unit_behind_a_cable_that_is_back_is_left_as_it_is() {
+    let world = World::new();
+    let link = world.path("unit");
+    let emulator = world.start(&["emulate", "axtc4co", "--link", "u0", "--line-rate", "off"]);
+    emulator.wait_out("serial: ");
+    symlink(world.path("u0"), &link).expect("a link");
+    let port = link.to_str().expect("UTF-8");
+    let running = world.start(&["stream", "--port", port, "--period", "200", "--baud", "3000000"]);
+    running.wait_out(",fv,");
+    drop(emulator);
+    running.wait_err("waiting 10 s for it to come back");
+    fs::remove_file(&link).expect("pulled out");
+    let other = Puppet::start(Box::new(|_| Vec::new()));
+    symlink(other.path(), &link).expect("plugged in again");
+    running.wait_err("link back after");
+    let row = format!("{}\r\n", ["  25.0"; 8].join(";"));
+    (0..3).for_each(|_| other.say(row.as_bytes()));
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("the unit's rows have 8 values now and had 5"), "{}", ran.err);
+    assert_eq!(other.heard(), b"", "its stream is not ours to switch off");
+}
+
+#[test]
 fn a_cable_that_stays_away_is_exit_code_3() {
     let world = World::new();
     let link = world.path("unit");

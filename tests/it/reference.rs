@@ -36,9 +36,11 @@ fn describe(command: &Command, out: &mut String) {
     write!(out, "\n## {name}\n\n{}\n", text(about).trim()).expect("a string");
     let usage = command.clone().render_usage().to_string();
     write!(out, "\n```text\n{}\n```\n", usage.trim_start_matches("Usage: ").trim()).expect("a string");
-    let described = |arg: &&Arg| {
-        !arg.is_hide_set() && (is_root || !arg.is_global_set()) && !["help", "version"].contains(&arg.get_id().as_str())
+    // Every command has these; what it calls so itself and takes a value is its own.
+    let is_of_all = |arg: &Arg| {
+        matches!(arg.get_action(), ArgAction::Help | ArgAction::HelpShort | ArgAction::HelpLong | ArgAction::Version)
     };
+    let described = |arg: &&Arg| !arg.is_hide_set() && (is_root || !arg.is_global_set()) && !is_of_all(arg);
     let rows: Vec<String> = command.get_arguments().filter(described).map(row).collect();
     if !rows.is_empty() {
         write!(out, "\n| argument | means |\n|---|---|\n{}\n", rows.join("\n")).expect("a string");
@@ -83,7 +85,9 @@ fn row(arg: &Arg) -> String {
     if let Some(variable) = arg.get_env() {
         write!(means, " Environment: `{}`.", variable.to_string_lossy()).expect("a string");
     }
-    format!("| `{}` | {} |", shown.trim(), means.replace('|', "\\|"))
+    // A bar would end the cell, also one between the ticks of code.
+    let cell = |text: &str| text.replace('|', "\\|");
+    format!("| `{}` | {} |", cell(shown.trim()), cell(&means))
 }
 
 #[test]

@@ -145,11 +145,12 @@ fn inexpressible(error: ConvertError, name: &str) -> CliError {
 }
 
 fn refuse(report: &Report, name: &str, what: &str, output: &mut Output) -> Result<(), CliError> {
+    let mut written = Ok(());
     if output.json {
-        output.object(&super::ImageObject::new(report, name))?;
+        written = output.object(&super::ImageObject::new(report, name));
     } else {
         output.remark(report_text(report, name).trim_end());
         output.remark(&format!("axcon: {name} {what}"));
     }
-    Err(CliError::reported(Kind::ImageRefused))
+    CliError::found(Some(Kind::ImageRefused), written)
 }

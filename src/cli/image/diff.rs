@@ -32,12 +32,12 @@ pub(super) fn run(args: &Args, output: &mut Output) -> Result<(), CliError> {
     }
     let (a, b) = (Side::read(&args.a, output)?, Side::read(&args.b, output)?);
     let found = image::diff(a.image.image(), b.image.image());
-    if output.json {
-        output.object(&DiffObject::new(&a, &b, &found))?;
+    let written = if output.json {
+        output.object(&DiffObject::new(&a, &b, &found))
     } else {
-        output.data(text(&a, &b, &found).as_bytes())?;
-    }
-    if found.is_none() { Ok(()) } else { Err(CliError::reported(Kind::Failed)) }
+        output.data(text(&a, &b, &found).as_bytes())
+    };
+    CliError::found((!found.is_none()).then_some(Kind::Failed), written)
 }
 
 /// One of the two.

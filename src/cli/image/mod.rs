@@ -15,7 +15,7 @@ use clap::Subcommand;
 
 use super::error::{CliError, Kind};
 use super::output::Output;
-use super::{Global, files};
+use super::{Global, files, names};
 use crate::device::{LoaderKind, Product};
 use crate::image::make::{self, Recipe};
 use crate::image::{self, DefectId, Report, Severity, Target};
@@ -52,10 +52,10 @@ struct CheckArgs {
     /// The image; - is standard input.
     file: PathBuf,
     /// The product it should be for.
-    #[arg(long, value_name = "NAME", value_parser = product)]
+    #[arg(long, value_name = "NAME", value_parser = names::product)]
     product: Option<&'static Product>,
     /// The loader it is judged for; by default the one the product is believed to have.
-    #[arg(long, value_name = "PROFILE", value_parser = loader)]
+    #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
     loader: Option<LoaderKind>,
     /// Let this error pass. What is allowed is still listed.
     #[arg(long, value_name = "DEFECT", value_parser = allowable)]
@@ -71,7 +71,7 @@ struct InfoArgs {
 #[derive(Debug, clap::Args)]
 struct MakeArgs {
     /// The product it is for.
-    #[arg(long, value_name = "NAME", value_parser = product)]
+    #[arg(long, value_name = "NAME", value_parser = names::product)]
     product: &'static Product,
     /// The version it says it is, e.g. 1.2.0.
     #[arg(long, value_name = "VERSION")]
@@ -105,12 +105,12 @@ fn check(args: &CheckArgs, output: &mut Output) -> Result<(), CliError> {
     let expected = args.product.map(|product| product.name.as_str());
     let report = read_for(&args.file, &targets_with(args.loader), expected, &args.allow)?;
     let name = shown(&args.file);
-    if output.json {
-        output.object(&ImageObject::new(&report, &name))?;
+    let written = if output.json {
+        output.object(&ImageObject::new(&report, &name))
     } else {
-        output.data(report_text(&report, &name).as_bytes())?;
-    }
-    if report.is_ok() { Ok(()) } else { Err(CliError::reported(Kind::ImageRefused)) }
+        output.data(report_text(&report, &name).as_bytes())
+    };
+    CliError::found((!report.is_ok()).then_some(Kind::ImageRefused), written)
 }
 
 fn info(args: &InfoArgs, output: &mut Output) -> Result<(), CliError> {
@@ -204,20 +204,6 @@ fn targets() -> Vec<Target> {
 /// All products, with this loader instead of their own if one is given.
 pub fn targets_with(loader: Option<LoaderKind>) -> Vec<Target> {
     Product::all().iter().map(|product| product.target_with(loader.unwrap_or(product.loader.kind))).collect()
-}
-
-pub(super) fn product(name: &str) -> Result<&'static Product, String> {
-    Product::named(name).ok_or_else(|| {
-        let known: Vec<&str> = Product::all().iter().map(|product| product.name.as_str()).collect();
-        format!("no such product; known: {}", known.join(", "))
-    })
-}
-
-fn loader(name: &str) -> Result<LoaderKind, String> {
-    LoaderKind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
-        let known: Vec<&str> = LoaderKind::ALL.into_iter().map(LoaderKind::name).collect();
-        format!("no such loader; known: {}", known.join(", "))
-    })
 }
 
 /// Reads the name of a defect that may be allowed; `load --allow` uses it too.

@@ -12,7 +12,7 @@ use super::image::{self as image_cli, DefectObject};
 use super::journal::Desk;
 use super::output::Output;
 use super::talk::{Ended, Talk, no_answer_hints};
-use super::{Global, ask, link, password};
+use super::{Global, ask, link, names, password};
 use crate::device::{self, LoaderKind, Product};
 use crate::host::journal::Note;
 use crate::image::{CheckedImage, DefectId, Report};
@@ -33,14 +33,14 @@ pub struct Args {
     #[arg(long)]
     dry_run: bool,
     /// The unit's product, where the unit itself cannot say it (it waits in its loader).
-    #[arg(long, value_name = "NAME", value_parser = image_cli::product)]
+    #[arg(long, value_name = "NAME", value_parser = names::product)]
     product: Option<&'static Product>,
     /// Send long records instead of the file's own: the same words in fewer characters, a sixth less time.
     #[arg(long)]
     pack: bool,
     /// The loader the unit has, where it is known to be another than its product's (g1, g2, g3, g3-1.3); what it really
     /// does shows behind the first record in any case.
-    #[arg(long, value_name = "PROFILE", value_parser = super::emulate::loader)]
+    #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
     loader: Option<LoaderKind>,
     /// Read the password from FILE; otherwise AXCON_PASSWORD is taken, or it is asked for.
     #[arg(long, value_name = "FILE")]
@@ -91,14 +91,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
             let meter = Meter::new(global.port().unwrap_or_default(), output.json);
             upload(&prepared, global, meter, output)
         }
-        several if prepared.args.dry_run => {
-            for port in several {
-                let global = Global { ports: vec![port.clone()], ..global.clone() };
-                let meter = Meter::new(port, output.json);
-                upload(&prepared, &global, meter, output)?;
-            }
-            Ok(())
-        }
+        several if prepared.args.dry_run => several::plan(several, &prepared, global, output),
         several => {
             if !global.yes && !ask::is_yes(&format!("Upload to {} units? Type yes: ", several.len()), None, output)? {
                 return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
@@ -278,7 +271,7 @@ fn planned(
 
 /// The image has errors: report, nothing else.
 fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliError> {
-    if output.json {
+    let written = if output.json {
         let identity = report.facts.identity.as_ref();
         output.object(&LoadObject {
             schema: "axcon.load/1",
@@ -299,12 +292,13 @@ fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliErr
             remark: None,
             next: "use an image without errors",
             defects: image_cli::defect_objects(report),
-        })?;
+        })
     } else {
-        output.data(image_cli::report_text(report, name).as_bytes())?;
+        let written = output.data(image_cli::report_text(report, name).as_bytes());
         output.remark("axcon: the image is refused; nothing has been sent");
-    }
-    Err(CliError::reported(Kind::ImageRefused))
+        written
+    };
+    CliError::found(Some(Kind::ImageRefused), written)
 }
 
 /// Says what is going to happen.
@@ -386,7 +380,6 @@ fn conclude(
     let kind = exit_kind(report, lost.is_some());
     let next = report.advice();
     if output.json {
-        // What became of the unit decides, whoever still reads.
         let written = output.object(&LoadObject {
             schema: "axcon.load/1",
             port: Some(port),
@@ -407,7 +400,7 @@ fn conclude(
             next,
             defects: image_cli::defect_objects(image),
         });
-        return kind.map_or(written, |kind| Err(CliError::reported(kind)));
+        return CliError::found(kind, written);
     }
     let Some(kind) = kind else {
         let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));

@@ -10,7 +10,7 @@ use super::meter::{Board, Meter};
 use super::{Prepared, upload};
 use crate::cli::Global;
 use crate::cli::error::{CliError, Kind};
-use crate::cli::output::{self, Output, Remarks};
+use crate::cli::output::{self, Closed, Output, Remarks};
 
 #[derive(Serialize)]
 struct Summary<'a> {
@@ -105,28 +105,54 @@ pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut 
             .map(|upload| upload.join().unwrap_or((1, Vec::new(), b"axcon: panicked\n".to_vec())))
             .collect()
     });
+    let mut written = Ok(());
     for (port, (_, out, err)) in ports.iter().zip(&ended) {
         for line in String::from_utf8_lossy(err).lines() {
             output.remark(&if json { line.to_owned() } else { format!("{port}: {line}") });
         }
         for line in String::from_utf8_lossy(out).lines() {
-            output.data(format!("{port}: {line}\n").as_bytes())?;
+            written = written.and(output.data(format!("{port}: {line}\n").as_bytes()));
         }
     }
     let codes: Vec<u8> = ended.iter().map(|&(code, _, _)| code).collect();
-    let exit_code = shared_code(&codes);
-    if json {
-        let units = ports.iter().zip(&codes).map(|(port, &exit_code)| Unit { port, exit_code }).collect();
-        output.object(&Summary { schema: "axcon.loads/1", exit_code, units })?;
+    sum_up(ports, &codes, "run what was sent", written, output)
+}
+
+/// Finds out of each of them, one after the other, what an upload would do; one that cannot take it keeps nobody from
+/// looking at the next.
+///
+/// # Errors
+/// As [`run`], and if the user interrupts.
+pub fn plan(ports: &[String], prepared: &Prepared, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let mut codes = Vec::new();
+    for port in ports {
+        let global = Global { ports: vec![port.clone()], ..global.clone() };
+        match upload(prepared, &global, Meter::new(port, output.json), output) {
+            Err(error) if error.kind == Kind::Interrupted || error.error.is::<Closed>() => return Err(error),
+            planned => codes.push(output::conclude(output, planned)),
+        }
+    }
+    sum_up(ports, &codes, "can take it", Ok(()), output)
+}
+
+/// The last line, and the end of all.
+fn sum_up(
+    ports: &[String],
+    codes: &[u8],
+    deed: &str,
+    mut written: Result<(), CliError>,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    let exit_code = shared_code(codes);
+    if output.json {
+        let units = ports.iter().zip(codes).map(|(port, &exit_code)| Unit { port, exit_code }).collect();
+        written = output.object(&Summary { schema: "axcon.loads/1", exit_code, units });
     } else {
         let done = codes.iter().filter(|&&code| code == 0).count();
-        output.remark(&format!("{done} of {} units run what was sent", codes.len()));
+        output.remark(&format!("{done} of {} units {deed}", codes.len()));
     }
-    match Kind::ALL.into_iter().find(|kind| kind.exit_code() == exit_code) {
-        _ if exit_code == 0 => Ok(()),
-        Some(kind) => Err(CliError::reported(kind)),
-        None => Err(CliError::reported(Kind::Failed)),
-    }
+    let kind = Kind::ALL.into_iter().find(|kind| kind.exit_code() == exit_code).unwrap_or(Kind::Failed);
+    CliError::found((exit_code != 0).then_some(kind), written)
 }
 
 /// 0 if all are, the code that all failures share, else 1.

@@ -104,9 +104,10 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let (sender, inputs) = host::channel();
     let log = args.log.map(open_log).transpose()?;
     let sending = args.send.as_deref().map(|path| Sending::open(path, args.newline_out)).transpose()?;
-    let _signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
     let plan = link::recording(global)?;
     let connection = link::open(&spec, global, clock, sender.clone())?;
+    // Not before: until then there is nothing to leave in order, and a server that does not answer may take seconds.
+    let _signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
     let recorder = link::start_recording(&plan, &connection, clock, output)?;
     let interactive = io::stdin().is_terminal();
     let comeback = Comeback::of(&spec, link::options(global)).filter(|_| interactive);
@@ -151,9 +152,17 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         output.remark("");
     }
     if let Some(warning) = warning {
-        output.remark(&warning);
+        output.remark(&format!("axcon: {warning}"));
     }
     end
+}
+
+/// A hold that lasts so long has no end: its XON was lost. Loaders hold their sender for seconds while they erase.
+const STUCK: Duration = Duration::from_secs(30);
+
+/// When a command that nobody sits at gives up what it cannot send. Who sits at it sees that and leaves.
+fn stuck_at(held_since: Option<Instant>, waits: bool, interactive: bool) -> Option<Instant> {
+    held_since.filter(|_| waits && !interactive).map(|since| since + STUCK)
 }
 
 struct Conversation {
@@ -190,10 +199,17 @@ impl Conversation {
         loop {
             let now = self.clock.now();
             self.send(now, output)?;
-            let idle = self.ended && self.sending.is_none() && self.session.waiting() == 0;
-            let silent_at = idle.then(|| self.last + SILENCE);
+            let waits = self.sending.is_some() || self.session.waiting() > 0;
+            let silent_at = (self.ended && !waits).then(|| self.last + SILENCE);
             if silent_at.is_some_and(|at| at <= now) {
                 return self.finish_shown(output);
+            }
+            let stuck_at = stuck_at(self.session.held_since(), waits, self.interactive);
+            if stuck_at.is_some_and(|at| at <= now) {
+                self.finish_shown(output)?;
+                let message = format!("the unit has held us by XOFF for {} s, and something waits", STUCK.as_secs());
+                return Err(CliError::message(Kind::NoAnswer, message)
+                    .hint("its XON was lost, or it hangs: 'axcon identify' says whether it answers; then send again"));
             }
             let whole_at = self.shown.keeps_back().then(|| self.last + HALF_CHARACTER);
             if whole_at.is_some_and(|at| at <= now) {
@@ -210,7 +226,7 @@ impl Conversation {
             }
             let whole_at = whole_at.filter(|_| self.shown.keeps_back());
             let told_at = told_at.filter(|_| !self.hold_told);
-            let due = [silent_at, whole_at, self.retry, told_at, self.session.poll_timeout()];
+            let due = [silent_at, stuck_at, whole_at, self.retry, told_at, self.session.poll_timeout()];
             let input = match due.into_iter().flatten().min() {
                 None => inputs.recv().map_err(|_| RecvTimeoutError::Disconnected),
                 Some(at) => inputs.recv_timeout(self.clock.until(at)),
@@ -231,7 +247,12 @@ impl Conversation {
                     self.ended = true;
                     self.last = self.clock.now();
                 }
-                Ok(Input::Gone { error, .. }) => self.lost(link::link_error(error), output)?,
+                // Of a link that is given up already there is nothing more to say.
+                Ok(Input::Gone { link, error }) => {
+                    if self.connection.as_ref().is_some_and(|connection| connection.id() == link) {
+                        self.lost(link::link_error(error), output)?;
+                    }
+                }
                 Ok(Input::Signal(_)) => return Err(CliError::reported(Kind::Interrupted)),
                 Ok(Input::Wake) | Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
@@ -516,4 +537,18 @@ fn open_log(path: PathBuf) -> Result<(PathBuf, File), CliError> {
 
 fn log_error(path: &Path, error: io::Error) -> CliError {
     CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot write the log '{}'", path.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_nobody_sits_at_gives_up_and_only_if_something_waits() {
+        let since = Some(Instant::from_millis(500));
+        assert_eq!(stuck_at(since, true, false), Some(Instant::from_millis(500) + STUCK));
+        for (since, waits, interactive) in [(since, false, false), (since, true, true), (None, true, false)] {
+            assert_eq!(stuck_at(since, waits, interactive), None);
+        }
+    }
 }

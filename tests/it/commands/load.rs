@@ -293,6 +293,17 @@ fn several_units_are_uploaded_to_at_once_and_one_that_fails_disturbs_none() {
     let ran = world.run(&apart, b"");
     assert_eq!((ran.code, ran.out.as_str()), (Some(2), ""), "{}", ran.err);
     assert!(ran.err.contains("--port stands both before the command and behind it"), "{}", ran.err);
+    // One that is not there keeps nobody from looking at the others.
+    let dry = ["load", "new.S", "--dry-run", "--port", "u1", "--port", "missing", "--port", "u2"];
+    let ran = world.run(&dry, b"");
+    assert_eq!(ran.code, Some(3), "{}", ran.err);
+    assert!(ran.err.contains("unit   u1: ") && ran.err.contains("unit   u2: "), "{}", ran.err);
+    assert!(ran.err.contains("cannot open missing") && ran.err.ends_with("2 of 3 units can take it\n"), "{}", ran.err);
+    let ran = world.run(&[&dry[..], &["--json"]].concat(), b"");
+    let objects = objects(&ran.out);
+    let schemas: Vec<&str> = objects.iter().filter_map(|object| object["schema"].as_str()).collect();
+    assert_eq!(schemas, ["axcon.load/1", "axcon.load/1", "axcon.loads/1"], "{}", ran.out);
+    assert_eq!(objects[2]["units"][1], serde_json::json!({"port": "missing", "exit_code": 3}));
     drop(emulators);
 }
 

@@ -84,6 +84,15 @@ fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
     assert_eq!((same.code, same.out.as_str()), (Some(0), ""), "{}", same.err);
     let factory = world.run(&["dictionary", "diff", "one.json", "factory:axtc4co"], b"");
     assert_eq!((factory.code, factory.out.lines().count()), (Some(1), 2), "{}", factory.out);
+    // Half of it is written, and not taken for all of it.
+    let whole = fs::read_to_string(world.path("one.cast")).expect("a recording");
+    let lines: Vec<&str> = whole.lines().collect();
+    fs::write(world.path("half.cast"), lines[..lines.len() / 2].join("\n") + "\n").expect("written");
+    let half = world.run(&["dictionary", "dump", "--json", "--port", "replay:half.cast"], b"");
+    let read = json(&half.out);
+    assert_eq!((half.code, &read["complete"]), (Some(4), &false.into()), "{}", half.err);
+    assert_eq!(error_object(&half)["kind"], "no-answer", "{}", half.err);
+    assert!((50..227).contains(&read["entries"].as_array().expect("a list").len()), "{}", half.out);
     let csv = world.run(&[&again[..], &["--format", "csv"]].concat(), b"");
     assert_eq!(csv.out.lines().count(), 228, "{}", csv.out);
     let bad = world.run(&["dictionary", "diff", "u1-nowhere.json", "factory:axtc4co"], b"");
@@ -330,4 +339,50 @@ fn what_is_no_fact_is_not_counted_as_not_recognised() {
         let ran = bench.world.run(&["identify", "--json", "--port", recording], b"");
         assert_eq!(json(&ran.out)["unrecognised_lines"], 0, "{recording}: {}", ran.out);
     }
+}
+
+#[test]
+fn what_was_found_is_the_exit_code_whoever_still_reads() {
+    let world = World::new();
+    let bad = Path::new(env!("CARGO_MANIFEST_DIR")).join("firmware_images/bad/bad-checksum.elf.S");
+    let bad = bad.display().to_string();
+    fs::write(world.path("pw"), "AXIO-2010").expect("written");
+    for (name, version) in [("a.S", "1.2.0"), ("b.S", "1.3.0")] {
+        let make = ["image", "make", "--product", "axtc4co", "--version", version, "--words", "600", "--out", name];
+        assert_eq!(world.run(&make, b"").code, Some(0));
+    }
+    let silent = crate::support::puppet::Puppet::silent();
+    let port = silent.path().display().to_string();
+    for (args, code) in [
+        (&["image", "check", &bad][..], 5),
+        (&["image", "check", "a.S"], 0),
+        (&["image", "diff", "a.S", "b.S"], 1),
+        (&["image", "convert", &bad, "--out", "c.S"], 5),
+        (&["load", &bad, "--yes", "--password-file", "pw", "--port", "nowhere"], 5),
+        (&["dictionary", "diff", "factory:axtc4co", "factory:axrtd8co"], 1),
+        (&["identify", "--port", &port], 4),
+    ] {
+        for json in [&[][..], &["--json"]] {
+            let (reader, writer) = std::io::pipe().expect("a pipe");
+            drop(reader);
+            let mut command = world.command(&[args, json].concat());
+            let ran = command.stdout(writer).stderr(std::process::Stdio::null()).status().expect("it runs");
+            assert_eq!(ran.code(), Some(code), "{args:?} {json:?}");
+        }
+    }
+}
+
+#[test]
+fn a_report_leaves_a_stream_on_that_was_too_slow_to_be_seen() {
+    let bench = Bench::new();
+    let slow = bench.world.start(&["stream", "--period", "60000", "--keep", "--port", "u0", "--record", "slow.cast"]);
+    bench.world.wait_in("slow.cast", "\"i\",\"60000");
+    slow.signal(rustix::process::Signal::INT);
+    assert_eq!(slow.wait().code, Some(130));
+    let ran = bench.run(&["report", "--out", "unit.html", "--seconds", "1", "--no-dictionary"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.err.contains("the stream was on before, at a rate too slow to be seen"), "{}", ran.err);
+    assert_eq!(bench.run(&["stream", "--off", "--record", "off.cast"]).code, Some(0));
+    let said = bench.world.run(&["terminal", "--port", "replay:off.cast"], b"").out;
+    assert!(said.contains("RS-232 stream is now OFF"), "it was on: {said}");
 }
