@@ -126,7 +126,7 @@ impl Desk {
                 Effect::CheckImage { path, loader, allow } => {
                     let target = |it: &Product| it.target_with(loader.unwrap_or(it.loader.kind));
                     let targets: Vec<_> = Product::all().iter().map(target).collect();
-                    let file = new_image();
+                    let file = self.file(&path).unwrap_or_else(new_image);
                     let report = axcon::image::check(file.as_slice(), None, &targets, None, &allow).expect("a slice");
                     self.input(Input::ImageChecked(Box::new(ImageFacts::of_report(path, &report, &allow))));
                 }
@@ -276,7 +276,7 @@ impl Desk {
 fn connecting_shows_who_is_there() {
     let desk = Desk::new();
     let picture = desk.picture();
-    for text in ["AXTC4CO 1.1.0", "node 127", "application runs", "125 kbit/s", "pre-operational", "The stream is off"]
+    for text in ["AXTC4CO 1.1.0", "node 127", "application runs", "125 kbit/s", "pre-operational", "has sent no values"]
     {
         assert!(picture.contains(text), "no '{text}' in\n{picture}");
     }
@@ -350,7 +350,8 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
     desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("rows.csv").press(KeyCode::Enter);
     desk.run(Duration::from_secs(10)).keys("k");
     assert_eq!(desk.marks, ["mark 1"]);
-    assert!(desk.picture().contains("mark 1 is set, in chart, recording and file."), "{}", desk.picture());
+    let told = desk.picture();
+    assert!(told.contains("Mark 1 is set at ") && told.contains(", in chart, recording and file."), "{told}");
     desk.press(KeyCode::Left).press(KeyCode::Left);
     let held = desk.picture();
     assert!(held.contains("held, End follows again"), "{held}");
@@ -372,6 +373,63 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
     let rows = lines.len();
     desk.run(Duration::from_secs(5));
     assert_eq!(desk.files[Path::new("rows.csv")].split(|&byte| byte == b'\n').count(), rows + 1, "it has ended");
+}
+
+#[test]
+fn a_mark_goes_to_the_cursor_and_a_lost_link_into_the_file_of_rows() {
+    let mut desk = Desk::new();
+    desk.keys("6t1000").press(KeyCode::Enter);
+    desk.wait_for("every 1 s");
+    desk.run(Duration::from_secs(70)).keys("ke").key(KeyCode::Char('u'), KeyModifiers::CONTROL);
+    desk.keys("rows.csv").press(KeyCode::Enter);
+    // A minute has sixty steps.
+    for _ in 0..30 {
+        desk.press(KeyCode::Left);
+    }
+    desk.keys("k").pull().plug_in().run(Duration::from_secs(3));
+    let (first, second) = desk.marks[1].split_once(", ").expect("a mark of before");
+    assert_eq!((desk.marks[0].as_str(), first), ("mark 1", "mark 2"));
+    let before: f64 = second.strip_suffix(" s before").and_then(|seconds| seconds.parse().ok()).expect("seconds");
+    assert!((28.0..36.0).contains(&before), "{before}");
+    let text = String::from_utf8(desk.files[Path::new("rows.csv")].clone()).expect("text");
+    let words: Vec<&str> = text.lines().filter_map(|line| line.strip_suffix(",,,,,")?.split(',').nth(1)).collect();
+    assert_eq!(words, ["mark 1", "mark 2", "link lost", "link back"]);
+    let moment = |word: &str| text.lines().find(|line| line.contains(word)).expect(word).to_owned();
+    assert!(moment("mark 2") < moment("mark 1"), "it lies before: {text}");
+}
+
+#[test]
+fn the_stream_is_suggested_as_it_was_and_a_change_of_source_says_what_it_costs() {
+    let mut desk = Desk::new();
+    desk.keys("t20000").press(KeyCode::Enter);
+    desk.wait_for("every 20 s");
+    desk.run(Duration::from_secs(45)).pull().input(Input::LinkBack("/dev/ttyUSB0".into()));
+    desk.run(Duration::from_secs(5)).keys("6");
+    let told = desk.picture();
+    assert!(told.contains("No row since the unit is there again") && !told.contains("The stream is off"), "{told}");
+    desk.keys("t");
+    let asked = desk.picture();
+    assert!(asked.contains("› 20000") && !asked.contains("begin anew"), "{asked}");
+    desk.keys("p");
+    assert!(desk.picture().contains("The screens begin anew with it: 2 rows"), "{}", desk.picture());
+    desk.press(KeyCode::Esc).run(Duration::from_secs(20));
+    assert!(desk.picture().contains("every 20 s") && !desk.picture().contains("No row"), "{}", desk.picture());
+}
+
+#[test]
+fn an_older_version_is_refused_before_the_password_is_asked_for_and_goes_if_the_user_says_so() {
+    let mut desk = Desk::new();
+    desk.files.insert("/images/old.S".into(), image_of(Version::new(1, 0, 0)));
+    desk.keys("lp/images/old.S").press(KeyCode::Enter);
+    let plan = desk.picture();
+    assert!(plan.contains("the image is V1.0.0, older than the V1.1.0 that the unit runs. O sends it"), "{plan}");
+    desk.press(KeyCode::Enter);
+    assert!(desk.picture().contains("Not started: the image is V1.0.0"), "{}", desk.picture());
+    desk.keys("odowngrade").press(KeyCode::Enter);
+    let plan = desk.picture();
+    assert!(plan.contains("passed in spite of downgrade") && plan.contains("Enter start"), "{plan}");
+    desk.press(KeyCode::Enter).keys("AXIO-2010").press(KeyCode::Enter);
+    desk.wait_for("after 1.0.0");
 }
 
 #[test]
@@ -574,11 +632,17 @@ fn task_upload() {
 #[test]
 fn task_recover_an_upload_whose_cable_was_pulled() {
     let mut desk = Desk::new();
-    desk.about_to_load().keys("AXIO-2010").press(KeyCode::Enter);
+    desk.keys("t500").press(KeyCode::Enter);
+    desk.wait_for("every 500 ms");
+    desk.run(Duration::from_secs(3)).about_to_load().keys("AXIO-2010").press(KeyCode::Enter);
     desk.wait_for("30 %");
     desk.pull();
     assert_snapshot!("task_recover_lost", desk.drawn());
-    desk.plug_in().press(KeyCode::Enter).press(KeyCode::Enter);
+    desk.plug_in().keys("2");
+    // It says nothing, but it is where its upload has left it.
+    let told = desk.picture();
+    assert!(told.contains("AXTC4CO?") && told.contains("these are its last values"), "{told}");
+    desk.keys("4").press(KeyCode::Enter).press(KeyCode::Enter);
     let begun = desk.drawn();
     assert!(begun.contains("── Loading"), "neither label nor password need be asked for: {begun}");
     desk.wait_for("after 1.2.0");
@@ -662,7 +726,11 @@ fn console() -> App {
 
 /// An S-record file with V1.2.0, of the usual size.
 fn new_image() -> Vec<u8> {
+    image_of(Version::new(1, 2, 0))
+}
+
+fn image_of(version: Version) -> Vec<u8> {
     let target = axtc4co().target();
-    let recipe = make::Recipe { target: &target, version: Version::new(1, 2, 0), words: 0xC000, flaw: None };
+    let recipe = make::Recipe { target: &target, version, words: 0xC000, flaw: None };
     make::make(&recipe).expect("an image of the usual size")
 }

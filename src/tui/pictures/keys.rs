@@ -169,7 +169,7 @@ fn a_click_is_the_key_it_stands_on_and_the_wheel_moves() {
         assert!(stage.shows("› "), "{}", stage.picture());
         assert!(stage.shows("1001:00 Error Register"), "{}", stage.picture());
         for (tab, shows) in
-            [("6 Stream", "The stream is off"), ("8 Rec", "Looking for recordings"), ("5 Dict", "Object")]
+            [("6 Stream", "has sent no values"), ("8 Rec", "Looking for recordings"), ("5 Dict", "Object")]
         {
             click(&mut stage, left, tab);
             assert!(stage.shows(shows), "{}", stage.picture());
@@ -339,4 +339,42 @@ fn a_click_chooses_an_entry_of_a_list_and_a_second_one_does_it() {
             stage.picture()
         );
     }
+}
+
+#[test]
+fn keys_on_the_terminal_of_a_recording_are_the_consoles() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    stage.bytes(BANNER).keys("3");
+    assert!(stage.shows("H hex") && !stage.shows("keys to the unit"), "{}", stage.picture());
+    assert!(!stage.shows("F file"), "{}", stage.picture());
+    stage.keys("h");
+    assert!(stage.shows("── Hexadecimal ──"), "{}", stage.picture());
+    stage.keys("m");
+    assert!(stage.shows("Not sent: this is a recording. Press 1 to choose a link."), "{}", stage.picture());
+    stage.prefix().keys("2");
+    assert!(stage.shows("── Unit ──"), "whoever is used to the prefix is not stopped: {}", stage.picture());
+}
+
+#[test]
+fn a_recording_from_its_beginning_shows_nothing_that_has_not_happened_yet() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    stage.bytes(BANNER).bytes(b"Waiting for application S-Record.\r\n").keys("3");
+    assert!(stage.shows("S-Record"), "{}", stage.picture());
+    stage.input(Input::PlayedAnew(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    stage.bytes(BANNER);
+    assert!(stage.shows("from the beginning") && !stage.shows("S-Record"), "{}", stage.picture());
+}
+
+#[test]
+fn arrows_on_the_bench_add_up_also_when_they_are_faster_than_the_unit() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("emu:axtc4co").bytes(BANNER).bytes(MENU).wait(3000);
+    stage.keys("9").asked();
+    stage.press(KeyCode::Right).press(KeyCode::Right).press(KeyCode::Down).press(KeyCode::Right);
+    let orders = ["set 1 temperature 30.0", "set 1 temperature 40.0", "set 2 temperature 30.0"];
+    assert_eq!(stage.asked(), orders.map(|order| Effect::Order(order.into())));
+    stage.input(Input::Ordered { line: orders[0].into(), answer: Ok(None) }).press(KeyCode::Up).press(KeyCode::Right);
+    assert_eq!(stage.asked(), [Effect::Order("set 1 temperature 50.0".into())]);
 }

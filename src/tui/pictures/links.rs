@@ -4,7 +4,8 @@ use ratatui::crossterm::event::{KeyCode, KeyModifiers};
 
 use super::stage::*;
 use crate::endpoint::Transmit;
-use crate::tui::{App, Effect, Failure, Input, Options, Palette};
+use crate::time::Duration;
+use crate::tui::{App, Effect, Failure, Input, LinkInfo, Options, Pace, Palette, Playing};
 
 #[test]
 fn connecting_asks_the_unit_who_it_is() {
@@ -212,4 +213,32 @@ fn a_unit_without_a_name_shows_the_channels_of_its_diagnostics_as_they_are_named
     for channel in 1..=8 {
         assert!(picture.contains(&format!("RTD{channel}       {channel}1.5 °C")), "{picture}");
     }
+}
+
+#[test]
+fn a_recording_that_cannot_be_read_on_says_so_and_where() {
+    let mut stage = Stage::with_ports(SMALL).with_recordings();
+    stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    let seconds = Duration::from_secs(5);
+    stage.input(Input::Playing(Playing { position: seconds, length: Some(seconds), pace: Pace::AtOnce }));
+    let text = "x.cast:40:2: this is no event";
+    stage.input(Input::RecordingOver(Some(Failure { text: text.into(), hints: Vec::new() })));
+    assert!(stage.shows(&format!("── {text}")), "{}", stage.picture());
+    stage.press(KeyCode::Down);
+    assert!(stage.shows("cannot be read on") && stage.shows(&format!("  {text}")), "it stays: {}", stage.picture());
+}
+
+#[test]
+fn a_question_outlives_the_link_but_not_the_unit_it_was_about() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("dYe").lost();
+    assert!(stage.shows("Link lost") && stage.shows("› Ye"), "{}", stage.picture());
+    stage.keys("s").press(KeyCode::Enter);
+    assert!(stage.shows("Not sent: the link is lost."), "{}", stage.picture());
+    stage.keys("2t");
+    assert!(stage.shows("Not sent: the link is lost."), "{}", stage.picture());
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("dYe").lost().input(Input::LinkBack("/dev/ttyUSB0".into()));
+    stage.bytes(String::from_utf8_lossy(BANNER).replace("V1.1.0", "V9.9.9").as_bytes()).wait(5000);
+    assert!(stage.shows("Another unit") && !stage.shows("› Ye"), "{}", stage.picture());
 }

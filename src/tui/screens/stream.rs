@@ -67,7 +67,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('k'))],
         cmd: Cmd::Mark,
         short: "mark",
-        long: "mark this moment, or the one under the cursor, in chart, recording and CSV file",
+        long: "mark now or the cursor in chart, recording and CSV file",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
