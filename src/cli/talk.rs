@@ -407,7 +407,7 @@ impl Talk {
                 (CliError::message(Kind::NoAnswer, message), heard)
             }
             Outcome::NoAnswer { awaited, heard, .. } => {
-                let message = format!("the unit did not answer as expected: {awaited} did not come");
+                let message = format!("the unit did not answer as expected: {awaited}");
                 let error = CliError::message(Kind::NoAnswer, message)
                     .hint("no guess was made: the question was left with Enter, and nothing is changed")
                     .hint("'axcon terminal' shows what the unit prints, and takes the answer by hand");

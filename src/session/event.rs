@@ -223,7 +223,7 @@ pub enum Outcome {
         /// Which job.
         job: Job,
         /// What was awaited.
-        awaited: &'static str,
+        awaited: Awaited,
         /// Where the last text heard lies.
         heard: Option<Span>,
     },
@@ -260,6 +260,44 @@ pub enum FileEnd {
     Cancelled,
     /// The link is gone. Of what had left for it last, some may not have reached the unit.
     LinkLost,
+}
+
+/// What a job has waited for in vain. As text it says, as a sentence without its stop, what did not happen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Awaited {
+    /// The question that offers the stream's sources, behind T.
+    #[error("the unit did not ask which values its stream is to send")]
+    SourceQuestion,
+    /// The question behind that one.
+    #[error("the unit did not ask for the repetition time")]
+    PeriodQuestion,
+    /// The first row of a stream that was switched on.
+    #[error("no row of the stream came")]
+    Row,
+    /// A sign that no more rows will come.
+    #[error("the unit did not confirm that the stream is off")]
+    StreamOff,
+    /// The question behind D.
+    #[error("the unit did not ask for the Yes that restores its defaults")]
+    DefaultsQuestion,
+    /// The banner of a unit that restores its defaults.
+    #[error("the banner after the reset did not come")]
+    Banner,
+    /// Anything behind V.
+    #[error("the unit did not show its object dictionary")]
+    Dictionary,
+    /// An entry among what came behind V.
+    #[error("no entry of the object dictionary came")]
+    Entry,
+    /// The first page of diagnostics.
+    #[error("no page of diagnostics came")]
+    Page,
+    /// One more, behind the first ones.
+    #[error("the next page of diagnostics did not come")]
+    NextPage,
+    /// A sign that no more pages will come.
+    #[error("the unit did not confirm that the diagnostics are off")]
+    DiagnosticsOff,
 }
 
 /// What the unit showed of its object dictionary.

@@ -428,9 +428,7 @@ impl View {
                 }
                 self.tell(Tone::Good, done(*job));
             }
-            Outcome::NoAnswer { job, awaited, .. } => {
-                self.tell(Tone::Bad, format!("No answer: waited for {awaited}, {}.", doing(*job)));
-            }
+            Outcome::NoAnswer { awaited, .. } => self.tell(Tone::Bad, format!("No answer: {awaited}.")),
             Outcome::Refused { job, reason, .. } => {
                 self.tell(Tone::Bad, format!("The unit refused, {}: {reason}", doing(*job)));
             }
@@ -519,7 +517,7 @@ impl View {
 /// What is told of a unit that says nothing, until it says something.
 const NOBODY: &str = "Nobody has answered: check power, cable and port.";
 
-/// What a job was about, to follow "No answer: waited for ...,".
+/// What a job was about, to follow "Cancelled,".
 pub fn doing(job: Job) -> &'static str {
     match job {
         Job::Identify => "asking who is there",
