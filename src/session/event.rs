@@ -201,6 +201,16 @@ pub enum Event {
         total: usize,
     },
     /// A job has ended.
+    /// A file that is sent as it is does not come further: the unit holds it by XOFF, and has for long. Told once for each
+    /// hold. Nothing is given up: the user ends the wait, or the unit does, and then [`Event::FileProgress`] says so.
+    FileHeld {
+        /// Since when.
+        since: Instant,
+        /// Bytes that have left.
+        sent: usize,
+        /// Bytes of the file.
+        total: usize,
+    },
     Finished(Outcome),
 }
 

@@ -220,6 +220,9 @@ impl View {
                     sending.sent = *sent;
                 }
             }
+            Event::FileHeld { .. } => {
+                self.tell(Tone::Bad, "The unit does not let the file go on (XOFF): Esc ends the wait.");
+            }
             Event::Finished(outcome) => self.finished(now, outcome),
         }
     }

@@ -90,6 +90,10 @@ impl Alone {
     }
 }
 
+fn at(moment: Instant) -> u64 {
+    millis(moment.since(Instant::ZERO))
+}
+
 fn millis(span: Duration) -> u64 {
     u64::try_from(span.as_nanos() / 1_000_000).expect("a short story")
 }
@@ -288,6 +292,50 @@ fn a_file_goes_as_fast_as_the_line_and_not_to_a_unit_that_does_not_take_what_was
     assert_eq!(alone.session.waiting(), 0);
     alone.session.link_back(alone.now);
     assert!(!alone.session.password_open() && alone.session.held_since().is_none());
+}
+
+#[test]
+fn a_file_that_the_unit_does_not_let_go_on_waits_for_it_and_says_so_once() {
+    let mut alone = Alone::with(&[]);
+    alone.session.command(alone.now, Command::SendFile(vec![b'x'; 1_000])).expect("it is free");
+    alone.take_sent(Instant::ZERO);
+    let hold = |alone: &mut Alone, at: u64, byte: &[u8]| {
+        alone.now = Instant::from_millis(at);
+        alone.session.handle_bytes(alone.now, byte);
+        alone.take_sent(Instant::ZERO);
+    };
+    // What comes of it, and when, until nothing is due any more.
+    let news = |alone: &mut Alone| {
+        let mut news = Vec::new();
+        while let Some(due) = alone.session.poll_timeout() {
+            alone.now = due.max(alone.now);
+            alone.session.handle_timeout(alone.now);
+            alone.take_sent(Instant::ZERO);
+            while let Some(event) = alone.session.poll_event() {
+                match event {
+                    Event::FileHeld { since, sent, total } => {
+                        news.push(format!("{}: {sent} of {total} since {}", at(alone.now), at(since)));
+                    }
+                    Event::Finished(outcome) => news.push(format!("{}: {outcome:?}", at(alone.now))),
+                    _ => {}
+                }
+            }
+        }
+        news
+    };
+    hold(&mut alone, 10, b"\x13");
+    assert_eq!(news(&mut alone), ["3010: 64 of 1000 since 10"], "and nobody wakes for it any more");
+    assert_eq!(alone.session.job(), Some(Job::SendFile), "it is not given up");
+    // A hold of a moment is none of the user's business, one more that is long is.
+    hold(&mut alone, 60_000, b"\x11");
+    hold(&mut alone, 60_010, b"\x13");
+    hold(&mut alone, 60_020, b"\x11");
+    hold(&mut alone, 60_030, b"\x13");
+    let told = news(&mut alone);
+    assert!(told.len() == 1 && told[0].starts_with("63030: ") && told[0].ends_with("since 60030"), "{told:?}");
+    hold(&mut alone, 70_000, b"\x11");
+    let told = news(&mut alone);
+    assert!(told.len() == 1 && told[0].contains("sent: 1000, total: 1000, end: Whole"), "{told:?}");
 }
 
 #[test]
