@@ -158,7 +158,10 @@ impl Work for Diagnostics {
                         b'\r' => self.answers = false,
                         _ if self.answers => {}
                         b'd' | b'D' => self.answers = true,
-                        b's' | b'S' => self.switched_on = !self.switched_on,
+                        b's' | b'S' => {
+                            self.switched_on = !self.switched_on;
+                            self.page.pressed();
+                        }
                         b'v' | b'V' | b'm' | b'M' | b'l' | b'L' => self.switched_on = false,
                         _ => {}
                     }

@@ -102,6 +102,13 @@ impl Diagnostics {
         }
     }
 
+    fn switch_on(&mut self, desk: &mut Desk<'_>) {
+        desk.send(b"s");
+        self.page.pressed();
+        self.stage = Stage::Asked;
+        self.deadline = Some(desk.now + FIRST_PAGE);
+    }
+
     fn stop(&mut self, desk: &mut Desk<'_>, presses: u32, cancelled: bool) {
         desk.send(b"s");
         self.stage = Stage::Stopping { presses, at: desk.now, cancelled };
@@ -113,9 +120,7 @@ impl Diagnostics {
         let job = Job::Diagnostics;
         match self.stage {
             Stage::Watching => {
-                desk.send(b"s");
-                self.stage = Stage::Asked;
-                self.deadline = Some(desk.now + FIRST_PAGE);
+                self.switch_on(desk);
                 None
             }
             Stage::Asked => {
@@ -126,9 +131,7 @@ impl Diagnostics {
             }
             // What looked like a page before the key was none, or somebody has stopped them.
             Stage::Reading if self.taken == 1 => {
-                desk.send(b"s");
-                self.stage = Stage::Asked;
-                self.deadline = Some(desk.now + FIRST_PAGE);
+                self.switch_on(desk);
                 None
             }
             Stage::Reading => Some(Outcome::NoAnswer { job, awaited: Awaited::NextPage, heard: self.heard }),
