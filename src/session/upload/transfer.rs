@@ -96,6 +96,8 @@ pub(super) struct Transfer {
     /// Where a loader that keeps a page stops us.
     pages: Pages,
     /// It has done so elsewhere than believed.
+    /// The header and the first data have been acknowledged, each by a hold of its own: only a loader with a ring does so.
+    proven: bool,
     surprised: bool,
     /// Records before this one left before the loader was watched.
     watched_from: usize,
@@ -150,6 +152,7 @@ impl Transfer {
             longest_erase: longest_erase(flash),
             crossing: None,
             alive: false,
+            proven: false,
             begun: None,
             deadline: None,
             character_time: Duration::ZERO,
@@ -251,6 +254,7 @@ impl Transfer {
         let late = now.since(left_at).as_nanos() / self.character_time.as_nanos().max(1);
         let late = usize::try_from(late).unwrap_or(usize::MAX);
         self.size = Size::Packed(records::longest_acknowledged(WINDOW, late));
+                    self.proven |= self.taken == PROVEN;
         self.records = records::build(&self.image, self.size, records::LINE_END);
         self.bytes_total = self.records.iter().map(|record| record.text.len()).sum();
     }
@@ -293,7 +297,7 @@ impl Transfer {
     /// From the header on, as if nothing had been sent.
     pub(super) fn begin_again(&mut self) {
         self.start_over();
-        (self.again, self.window) = (false, Some(WINDOW));
+        (self.again, self.proven, self.window, self.before) = (false, false, Some(WINDOW), None);
         (self.header_passed, self.crossing, self.stopped_since) = (false, None, None);
     }
 
@@ -481,7 +485,7 @@ impl Transfer {
                 self.start_over();
                 return Ok(());
             }
-            Pacing::Records if self.taken < PROVEN => {
+            Pacing::Records if self.taken < PROVEN && !self.proven => {
                 self.pacing = Pacing::Pages;
                 self.header_passed = true;
                 self.watch();
