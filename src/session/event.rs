@@ -102,6 +102,7 @@ impl LoadOrder {
             moving: Duration::ZERO,
             moved: 0,
             held: None,
+            again: false,
         }
     }
 }
@@ -200,7 +201,6 @@ pub enum Event {
         /// Bytes of the file.
         total: usize,
     },
-    /// A job has ended.
     /// A file that is sent as it is does not come further: the unit holds it by XOFF, and has for long. Told once for each
     /// hold. Nothing is given up: the user ends the wait, or the unit does, and then [`Event::FileProgress`] says so.
     FileHeld {
@@ -211,6 +211,7 @@ pub enum Event {
         /// Bytes of the file.
         total: usize,
     },
+    /// A job has ended.
     Finished(Outcome),
 }
 
@@ -261,17 +262,6 @@ pub enum Outcome {
     },
 }
 
-/// Why the sending of a file has ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FileEnd {
-    /// All of it has left.
-    Whole,
-    /// The user has had enough; nothing of it leaves any more.
-    Cancelled,
-    /// The link is gone. Of what had left for it last, some may not have reached the unit.
-    LinkLost,
-}
-
 /// What a job has waited for in vain. As text it says, as a sentence without its stop, what did not happen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Awaited {
@@ -308,6 +298,17 @@ pub enum Awaited {
     /// A sign that no more pages will come.
     #[error("the unit did not confirm that the diagnostics are off")]
     DiagnosticsOff,
+}
+
+/// Why the sending of a file has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileEnd {
+    /// All of it has left.
+    Whole,
+    /// The user has had enough; nothing of it leaves any more.
+    Cancelled,
+    /// The link is gone. Of what had left for it last, some may not have reached the unit.
+    LinkLost,
 }
 
 /// What the unit showed of its object dictionary.
@@ -429,6 +430,9 @@ pub struct Progress {
     pub moved: usize,
     /// How long the unit has held us by XOFF, if it does.
     pub held: Option<Duration>,
+    /// Everything is being sent once more: the loader has shown that it had lost something. The counts are those of this
+    /// time, and begin at 0.
+    pub again: bool,
 }
 
 impl Progress {
@@ -641,6 +645,7 @@ mod tests {
             moving: Duration::ZERO,
             moved: 0,
             held: None,
+            again: false,
         };
         assert_eq!((progress.rate(), progress.eta()), (0.0, None));
         progress = Progress { bytes: 5_020, elapsed: Duration::from_secs(15), ..progress };

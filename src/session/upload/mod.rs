@@ -19,11 +19,11 @@ use super::event::{Event, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitN
 use super::flaw::Flaw;
 use super::identify::Identify;
 use super::job::{Desk, Signal, Work};
+use crate::device::{LoaderKind, Pacing, Product};
 use crate::image::DefectId;
 use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text, visible};
-use records::Size;
 use transfer::{Stall, Transfer};
 use verify::{After, NEW_BANNER};
 
@@ -141,11 +141,16 @@ enum Unheard {
     Filler,
 }
 
-/// Records and characters that an order sends, as far as that is known before the loader has shown what it is.
+/// Records and characters that an order sends to the loader it is believed to meet: the one the user has named, else that
+/// of the product, which is the image's as long as nobody has said another.
 pub(super) fn size(order: &LoadOrder) -> (usize, usize) {
-    let size = if order.packed { Size::Packed(records::LONGEST) } else { Size::AsInFile };
+    let image_for = || order.image.identity().map(|identity| identity.product.as_str());
+    let product = order.product.as_deref().or_else(image_for).and_then(Product::named);
+    let loader = order.loader.or_else(|| product.map(|product| product.loader.kind));
+    let pacing = loader.map_or(Pacing::Pages, LoaderKind::pacing);
+    let size = transfer::believed_size(order.packed, pacing);
     let records = records::build(order.image.image(), size, records::LINE_END);
-    (records.len(), records.iter().map(|record| record.text.len()).sum())
+    (records.len(), records::characters(&records))
 }
 
 impl Upload {
@@ -192,7 +197,7 @@ impl Upload {
             Message::Loader(LoaderText::Progress) => None,
             _ if self.order.flaw == Some(Flaw::SendsBehindErrors) => None,
             Message::Text | Message::Refusal => {
-                let sent = self.transfer.as_ref().map_or(0, |transfer| transfer.sent().0);
+                let sent = self.transfer.as_ref().map_or(0, |transfer| transfer.reached().sent);
                 if self.strange == 0 {
                     self.strange_from = sent;
                 }
@@ -458,7 +463,9 @@ impl Upload {
 
     fn report_progress_of(&mut self, phase: Phase, desk: &mut Desk<'_>) {
         let Some(transfer) = &self.transfer else { return };
-        let (records, bytes, bytes_total) = transfer.taken();
+        let reached = transfer.reached();
+        let (records, bytes) = (reached.taken, reached.bytes_taken);
+        let (records_total, bytes_total) = transfer.total();
         // The header is the first record.
         if records > 1 {
             self.first_data.get_or_insert((desk.now, bytes));
@@ -469,7 +476,7 @@ impl Upload {
         let progress = Progress {
             phase,
             records,
-            records_total: transfer.sent().1,
+            records_total,
             bytes,
             bytes_total,
             address: transfer.address().unwrap_or(0),
@@ -477,14 +484,15 @@ impl Upload {
             moving: desk.now.since(first),
             moved: bytes.saturating_sub(before),
             held: desk.transmitter.held_since().map(|since| desk.now.since(since)),
+            again: transfer.is_again(),
         };
+        let stands = |at: &Progress| (at.phase, at.records, at.records_total, at.again, at.held.is_some());
         let moved = self.progress.is_none_or(|before| {
-            (before.phase, before.records, before.held.is_some())
-                != (progress.phase, progress.records, progress.held.is_some())
+            stands(&before) != stands(&progress)
                 || progress.held.zip(before.held).is_some_and(|(now, before)| now >= before + HOLD_TOLD)
         });
-        self.hold_due = progress.held.map(|_| desk.now + HOLD_TOLD);
         if moved {
+            self.hold_due = progress.held.map(|_| desk.now + HOLD_TOLD);
             self.progress = Some(progress);
             desk.events.push_back(Event::Progress(progress));
         }
@@ -504,7 +512,8 @@ impl Upload {
 
     fn end(&mut self, desk: &Desk<'_>, verdict: Verdict, unit: UnitNow, what: impl Into<String>) -> Option<Outcome> {
         let transfer = self.transfer.as_ref();
-        let (records, records_total) = transfer.map_or((0, 0), Transfer::sent);
+        let records = transfer.map_or(0, |transfer| transfer.reached().sent);
+        let records_total = transfer.map_or(0, |transfer| transfer.total().0);
         Some(Outcome::Loaded(Box::new(LoadReport {
             verdict,
             phase: if verdict == Verdict::Done { Phase::Verify } else { self.phase() },

@@ -67,6 +67,17 @@ pub(super) enum Stall {
     Unacknowledged,
 }
 
+/// How far a transfer has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Reached {
+    /// Records let go, header and end included.
+    pub(super) sent: usize,
+    /// Records the loader must have taken.
+    pub(super) taken: usize,
+    /// Their characters.
+    pub(super) bytes_taken: usize,
+}
+
 /// An image on its way.
 #[derive(Debug)]
 pub(super) struct Transfer {
@@ -85,6 +96,8 @@ pub(super) struct Transfer {
     pacing: Pacing,
     /// Characters on their way to a ring at most. None: one record at a time.
     window: Option<usize>,
+    /// The header and the first data have been acknowledged, each by a hold of its own: only a loader with a ring does so.
+    proven: bool,
     /// Flow control has shown that something was taken: that nothing came where it was awaited shows nothing.
     acknowledged: bool,
     /// No hold came behind the header where none was expected.
@@ -96,8 +109,6 @@ pub(super) struct Transfer {
     /// Where a loader that keeps a page stops us.
     pages: Pages,
     /// It has done so elsewhere than believed.
-    /// The header and the first data have been acknowledged, each by a hold of its own: only a loader with a ring does so.
-    proven: bool,
     surprised: bool,
     /// Records before this one left before the loader was watched.
     watched_from: usize,
@@ -105,6 +116,9 @@ pub(super) struct Transfer {
     unheard_words: u32,
     /// Everything is being sent once more.
     again: bool,
+    /// How far it had come the first time, as long as nobody has answered the second: a unit without power takes no header
+    /// either, and what was taken stays taken until the loader erases it.
+    before: Option<Reached>,
     /// Since when a loader that stops us behind every record does so. The transmitter's own knowledge will not do: it
     /// takes a header that names a unit, and is echoed, for a unit that starts and has forgotten that it stopped us.
     stopped_since: Option<Instant>,
@@ -123,10 +137,9 @@ pub(super) struct Transfer {
 impl Transfer {
     /// An image for this flash. `packed`: in records as long as the loader can keep, instead of the file's.
     pub(super) fn new(image: &Image, flash: &FlashMap, pacing: Pacing, packed: bool, flaw: Option<Flaw>) -> Self {
-        let size = if packed { Size::Packed(records::LONGEST) } else { Size::AsInFile };
-        let line_end = if flaw == Some(Flaw::SendsCrLf) { b"\r\n" } else { records::LINE_END };
-        let records = records::build(image, size, line_end);
-        let bytes_total = records.iter().map(|record| record.text.len()).sum();
+        let size = believed_size(packed, pacing);
+        let records = records::build(image, size, line_end(flaw));
+        let bytes_total = records::characters(&records);
         Transfer {
             image: image.clone(),
             size,
@@ -139,6 +152,7 @@ impl Transfer {
             left_at: VecDeque::new(),
             pacing,
             window: Some(WINDOW),
+            proven: false,
             acknowledged: false,
             header_passed: false,
             end_passed: false,
@@ -148,11 +162,11 @@ impl Transfer {
             watched_from: 0,
             unheard_words: 0,
             again: false,
+            before: None,
             stopped_since: None,
             longest_erase: longest_erase(flash),
             crossing: None,
             alive: false,
-            proven: false,
             begun: None,
             deadline: None,
             character_time: Duration::ZERO,
@@ -205,6 +219,7 @@ impl Transfer {
     /// The loader has sent XOFF (`true`) or XON.
     pub(super) fn hold(&mut self, now: Instant, held: bool) {
         self.unheard_words = 0;
+        self.before = None;
         if self.pacing == Pacing::Pages && held && self.is_behind_the_header() {
             self.pacing = Pacing::Records;
         }
@@ -239,6 +254,7 @@ impl Transfer {
                     self.alive = false;
                     self.acknowledged = true;
                     self.take_one();
+                    self.proven |= self.taken == PROVEN;
                     // Behind a long hold the ring may have had more in it. It is empty now.
                     while self.left_at.front().is_some_and(|&left_at| left_at + HOLD_EXPECTED <= now) {
                         self.take_one();
@@ -253,10 +269,16 @@ impl Transfer {
         let Some(&left_at) = self.left_at.front().filter(|_| self.size != Size::AsInFile) else { return };
         let late = now.since(left_at).as_nanos() / self.character_time.as_nanos().max(1);
         let late = usize::try_from(late).unwrap_or(usize::MAX);
-        self.size = Size::Packed(records::longest_acknowledged(WINDOW, late));
-                    self.proven |= self.taken == PROVEN;
-        self.records = records::build(&self.image, self.size, records::LINE_END);
-        self.bytes_total = self.records.iter().map(|record| record.text.len()).sum();
+        self.resize(Size::Packed(records::longest_acknowledged(WINDOW, late)));
+    }
+
+    /// Builds the records anew. Nothing but the header may have left, which is the same in any size.
+    fn resize(&mut self, size: Size) {
+        if size != self.size {
+            self.size = size;
+            self.records = records::build(&self.image, size, line_end(self.flaw));
+            self.bytes_total = records::characters(&self.records);
+        }
     }
 
     /// The loader has printed something.
@@ -305,6 +327,8 @@ impl Transfer {
     pub(super) fn start_over_slowly(&mut self) {
         self.start_over();
         self.watch();
+        // The loader has asked for it.
+        self.before = None;
         self.header_passed = false;
         self.end_passed = false;
         self.crossing = None;
@@ -328,8 +352,9 @@ impl Transfer {
 
     /// The loader has said that it is through.
     pub(super) fn take_all_sent(&mut self) {
-        self.bytes_taken += self.records[self.taken..self.sent].iter().map(|record| record.text.len()).sum::<usize>();
+        self.bytes_taken += records::characters(&self.records[self.taken..self.sent]);
         self.taken = self.sent;
+        self.before = None;
         self.left_at.clear();
     }
 
@@ -338,24 +363,33 @@ impl Transfer {
         self.deadline
     }
 
-    /// Records let go, and records in all.
-    pub(super) fn sent(&self) -> (usize, usize) {
-        (self.sent, self.records.len())
+    /// How far it has come; the first time, as long as nobody has answered the second.
+    pub(super) fn reached(&self) -> Reached {
+        self.before.unwrap_or_else(|| self.reached_now())
     }
 
-    /// Records and characters the loader must have taken, and characters in all.
-    pub(super) fn taken(&self) -> (usize, usize, usize) {
-        (self.taken, self.bytes_taken, self.bytes_total)
+    /// Records and characters in all.
+    pub(super) fn total(&self) -> (usize, usize) {
+        (self.records.len(), self.bytes_total)
+    }
+
+    /// Whether what it has [`reached`](Transfer::reached) is that of a second time.
+    pub(super) fn is_again(&self) -> bool {
+        self.again && self.before.is_none()
     }
 
     /// Address of the data record let go last.
     pub(super) fn address(&self) -> Option<u32> {
-        self.records[..self.sent].iter().rev().find_map(|record| Some(*record.words.as_ref()?.start()))
+        self.records[..self.reached().sent].iter().rev().find_map(|record| Some(*record.words.as_ref()?.start()))
     }
 
     /// When the first record was let go.
     pub(super) fn begun(&self) -> Option<Instant> {
         self.begun
+    }
+
+    fn reached_now(&self) -> Reached {
+        Reached { sent: self.sent, taken: self.taken, bytes_taken: self.bytes_taken }
     }
 
     fn longest_hold(&self) -> Duration {
@@ -386,7 +420,7 @@ impl Transfer {
             Pacing::Records => {
                 let &left_at = self.left_at.back()?;
                 let next = self.records.get(self.sent)?;
-                let on_their_way: usize = self.records[self.taken..self.sent].iter().map(|sent| sent.text.len()).sum();
+                let on_their_way = records::characters(&self.records[self.taken..self.sent]);
                 let is_end = self.sent + 1 == self.records.len();
                 // The header and the first data have to show first that this loader answers.
                 let fits = self.window.is_some_and(|window| on_their_way + next.text.len() <= window);
@@ -418,6 +452,7 @@ impl Transfer {
 
     /// From the header on, one record at a time.
     fn start_over(&mut self) {
+        self.before = Some(self.reached());
         self.again = true;
         self.window = None;
         (self.sent, self.taken, self.bytes_taken) = (0, 0, 0);
@@ -473,7 +508,10 @@ impl Transfer {
     fn pass_unheld(&mut self) -> Result<(), Stall> {
         match self.pacing {
             // G1 says nothing behind the header.
-            Pacing::Records if self.taken == 0 && !self.again => self.pacing = Pacing::Pages,
+            Pacing::Records if self.taken == 0 && !self.again => {
+                self.pacing = Pacing::Pages;
+                self.resize(believed_size(self.size != Size::AsInFile, self.pacing));
+            }
             // That proves nothing: it may not have come.
             Pacing::Pages if self.sent == 1 => {
                 self.header_passed = true;
@@ -515,6 +553,20 @@ impl Transfer {
         self.take_all_sent();
         Ok(())
     }
+}
+
+/// Data bytes of the records for a loader that is believed to have this pacing. How late its acknowledgements are shows
+/// only behind the header; the adapters in use make no difference.
+pub(super) fn believed_size(packed: bool, pacing: Pacing) -> Size {
+    match (packed, pacing) {
+        (false, _) => Size::AsInFile,
+        (true, Pacing::Pages) => Size::Packed(records::LONGEST),
+        (true, Pacing::Records) => Size::Packed(records::longest_acknowledged(WINDOW, 0)),
+    }
+}
+
+fn line_end(flaw: Option<Flaw>) -> &'static [u8] {
+    if flaw == Some(Flaw::SendsCrLf) { b"\r\n" } else { records::LINE_END }
 }
 
 /// Data words of a record as compilers write them, and its characters with the line end.
