@@ -11,19 +11,19 @@ use crate::wire::stream::Source;
 use crate::wire::{Message, Prompt, SourceKeys, Text, visible};
 
 /// How long a unit may take to ask or to answer.
-const ANSWER: Duration = Duration::from_millis(1500);
+pub(super) const ANSWER: Duration = Duration::from_millis(1500);
 /// How long a single key may go without a reaction before Enter is sent behind it.
 const KEY_ALONE: Duration = Duration::from_millis(400);
 /// How long after T a line without a question means "switched off".
-const NO_QUESTION: Duration = Duration::from_millis(400);
+pub(super) const NO_QUESTION: Duration = Duration::from_millis(400);
 /// How long after T rows may still come that were on their way: those an adapter and the unit's own buffer held.
-const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
+pub(super) const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
 /// How often T is pressed to switch the stream off: it may be lost on the line.
 const MOST_TOGGLES: u32 = 3;
 /// How long behind the repetition time the unit may refuse it, or ask for it once more.
 const TAKEN: Duration = Duration::from_millis(600);
 /// No values come for 3 s after power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO): rows may take that long.
-const FIRST_VALUES: Duration = Duration::from_secs(6);
+pub(super) const FIRST_VALUES: Duration = Duration::from_secs(6);
 /// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
 const RESET: Duration = Duration::from_secs(10);
 

@@ -6,21 +6,13 @@
 //! the stream has stopped. A unit that starts anew goes on with a stream that is stored, so rows that do not come back say
 //! the same.
 
+use super::console::{ANSWER, FIRST_VALUES, NO_QUESTION, ROWS_ON_THEIR_WAY};
+use super::dialogue::LONGEST_TYPED;
 use crate::time::{Duration, Instant};
 use crate::wire::{Message, Prompt};
 
-/// How long behind T a question may take, and a row to go on.
-const ANSWER: Duration = Duration::from_millis(1500);
-/// How long behind T a line without a question means "switched off".
-const NO_QUESTION: Duration = Duration::from_millis(400);
-/// How long after T rows may still come that were on their way.
-const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
-/// No values come for 5 s after power-up (AXRTD8CO manual, section 1.1; 3 s on the AXTC4CO).
-const FIRST_VALUES: Duration = Duration::from_secs(6);
 /// The longest repetition time (errata E-105): rows that lie farther apart are of two streams.
 const LONGEST_PERIOD: Duration = Duration::from_secs(60);
-/// Bytes of a piece that somebody may have typed; a longer one is a record of a file.
-const LONGEST_TYPED: usize = 16;
 
 /// Waits for what shows whether the stream is still on.
 #[derive(Debug, Default)]
