@@ -44,12 +44,13 @@ struct Upload {
 impl Upload {
     /// Uploads to a unit of this product whose loader answers what is sent to it so; a record with its number.
     fn to(product: &str, loader: impl FnMut(usize, &str) -> Says) -> Self {
-        Upload::entered(product, &[(50_000, WAITS)], &[], loader)
+        Upload::entered(product, WORDS, &[(50_000, WAITS)], &[], loader)
     }
 
     /// The same, where this is said behind the password, and that behind a key before the first record.
     fn entered(
         product: &str,
+        words: u32,
         behind_password: &[(u64, &'static str)],
         behind_key: &[(u64, &'static str)],
         mut loader: impl FnMut(usize, &str) -> Says,
@@ -63,7 +64,7 @@ impl Upload {
             _ => "AXRTD8CO V1.1.0\r\nV - View\r\nD - Default\r\nT - Stream\r\nS - Diagnostics\r\nL - Load\r\n",
         };
         let (mut sent, mut said, mut progress): (Vec<(usize, Piece)>, _, _) = (Vec::new(), Vec::new(), Vec::new());
-        let load = Command::Load(Box::new(order(image_of(product, "1.2.0", WORDS))));
+        let load = Command::Load(Box::new(order(image_of(product, "1.2.0", words))));
         session.command(now, load).expect("it is free");
         let report = 'upload: loop {
             while let Some(piece) = session.poll_transmit() {
@@ -308,6 +309,21 @@ fn a_page_is_awaited_where_it_is_full_and_only_there() {
 }
 
 #[test]
+fn a_loader_whose_pages_are_known_gets_no_record_behind_a_page_it_says_nothing_of() {
+    // The first page is written as believed; behind the second, where the power goes, one more record would be for nobody.
+    let upload = Upload::entered("AXTC4CO", 3 * 256, &[(50_000, WAITS)], &[], |number, text| match number {
+        17 => with_pages(number, text),
+        _ => Vec::new(),
+    });
+    let report = &upload.report;
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
+    assert!(report.what.contains("fallen silent") && report.remark.is_none(), "{report:?}");
+    assert_eq!((upload.counts(), report.records), ([1, 33, 0], 34), "{report:?}");
+    let last = upload.sent.last().expect("a record").1.gone;
+    assert!((3_500..3_510).contains(&upload.end_behind(last)), "{}", upload.end_behind(last));
+}
+
+#[test]
 fn who_was_too_fast_goes_slower_once_and_another_error_ends_it() {
     let overrun = |error: &'static str| vec![(500, error), (300_000, WAITS)];
     let mut round = 0;
@@ -367,7 +383,7 @@ fn words_among_the_records_are_heard_out_and_many_of_them_are_no_loaders() {
 
 #[test]
 fn behind_its_prompt_a_loader_is_let_finish_and_what_is_none_gets_no_record() {
-    let entered = |says: &[(u64, &'static str)]| Upload::entered("AXTC4CO", says, &[], with_pages);
+    let entered = |says: &[(u64, &'static str)]| Upload::entered("AXTC4CO", WORDS, says, &[], with_pages);
     // It goes on printing: the header leaves when it has been silent for a moment.
     let upload = entered(&[(50_000, WAITS), (100_000, "(c) 2004\r\n"), (170_000, "ok\r\n")]);
     let (last, _) = upload.said[2];
@@ -401,7 +417,7 @@ fn what_answers_the_password_is_taken_for_what_it_is() {
         ("\r\nPassword: ", "did not accept the password"),
         ("\r\nV - View Object Dictionary\r\n", "did not accept the password"),
     ] {
-        let upload = Upload::entered("AXTC4CO", &[(50_000, says)], &[], with_pages);
+        let upload = Upload::entered("AXTC4CO", WORDS, &[(50_000, says)], &[], with_pages);
         let report = &upload.report;
         assert_eq!((report.verdict, report.unit), (Verdict::UnitRefused, UnitNow::Application), "{says:?}: {report:?}");
         assert!(report.what.contains(what) && upload.sent.is_empty(), "{says:?}: {report:?}");
@@ -421,7 +437,7 @@ fn what_answers_the_password_is_taken_for_what_it_is() {
         let loader = |number: usize, text: &str| {
             if product == "AXTC4CO" { with_pages(number, text) } else { with_ring(number, text) }
         };
-        let upload = Upload::entered(product, says, &[(20_000, WAITS)], loader);
+        let upload = Upload::entered(product, WORDS, says, &[(20_000, WAITS)], loader);
         let first = upload.keys.first().map(|(at, _)| (at + 5) / 10 * 10).filter(|at| *at < 8_000);
         assert_eq!(first, at, "{product}, {says:?}: {:?}", upload.keys);
         assert!(at.is_none() || upload.keys == [(upload.keys[0].0, "\r".to_owned())], "{:?}", upload.keys);
