@@ -8,7 +8,7 @@ use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
 use super::talk::Talk;
-use crate::session::{Command, Outcome};
+use crate::session::{Awaited, Command, Outcome};
 
 /// Arguments of `axcon defaults`.
 ///
@@ -37,8 +37,8 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     let result = match talk.ask(Command::RestoreDefaults)? {
-        Outcome::NoAnswer { awaited: awaited @ "the banner after the reset", .. } => {
-            let message = format!("the answer Yes has been given, but {awaited} did not come");
+        Outcome::NoAnswer { awaited: awaited @ Awaited::Banner, .. } => {
+            let message = format!("the answer Yes has been given, but {awaited}");
             Err(CliError::message(Kind::NoAnswer, message)
                 .hint("'axcon identify' says whether the unit runs; 'axcon dictionary dump' shows its parameters"))
         }

@@ -19,7 +19,7 @@ use crate::host::replay::Recording;
 use crate::host::signal::Signals;
 use crate::host::{self, Input};
 use crate::record::{Ending, Span};
-use crate::session::{Command, Event, FileEnd, Outcome, Session, UnitState};
+use crate::session::{Awaited, Command, Event, FileEnd, Outcome, Session, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::visible;
 
@@ -408,7 +408,7 @@ impl Talk {
                 let message = format!("the recording does not show what was looked for: {awaited}");
                 (CliError::message(Kind::NoAnswer, message), heard)
             }
-            Outcome::NoAnswer { awaited, heard, .. } => (unanswered(awaited), heard),
+            Outcome::NoAnswer { awaited, heard, .. } => (unanswered(*awaited), heard),
         };
         let said = heard.map(|span| self.quoted(span)).filter(|said| !said.is_empty());
         Err(match said {
@@ -435,10 +435,10 @@ impl Talk {
 
 /// The error of a job that has waited in vain. Only a question that did not come was left as it stood; a row or a page
 /// is awaited when the unit has been told already.
-fn unanswered(awaited: &str) -> CliError {
-    let message = format!("the unit did not answer as expected: {awaited} did not come");
+fn unanswered(awaited: Awaited) -> CliError {
+    let message = format!("the unit did not answer as expected: {awaited}");
     let error = CliError::message(Kind::NoAnswer, message);
-    if awaited.starts_with("the question") {
+    if matches!(awaited, Awaited::SourceQuestion | Awaited::PeriodQuestion | Awaited::DefaultsQuestion) {
         error
             .hint("no guess was made: the question was left with Enter, and nothing is changed")
             .hint("'axcon terminal' shows what the unit prints, and takes the answer by hand")
@@ -491,13 +491,13 @@ mod tests {
 
     #[test]
     fn only_of_a_question_it_is_said_that_nothing_is_changed() {
-        let says_so = |awaited: &str| {
+        let says_so = |awaited| {
             let error = unanswered(awaited);
             assert_eq!(error.kind, Kind::NoAnswer);
             error.hints.iter().any(|hint| hint.contains("nothing is changed"))
         };
-        assert!(says_so("the question for the stream's source"));
-        assert!(!says_so("a row of the stream") && !says_so("that the stream is off"));
+        assert!(says_so(Awaited::SourceQuestion) && says_so(Awaited::DefaultsQuestion));
+        assert!(!says_so(Awaited::Row) && !says_so(Awaited::StreamOff));
     }
 
     #[test]

@@ -39,6 +39,7 @@ impl Monitor {
             | Event::Held(_)
             | Event::Progress(_)
             | Event::FileProgress { .. }
+            | Event::FileHeld { .. }
             | Event::Finished(_) => {}
         }
     }

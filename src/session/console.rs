@@ -3,7 +3,7 @@
 //! Questions are answered by what they offer. Where a question is not understood the job leaves the dialogue, with
 //! Enter and no answer, and says what it was waiting for; it never guesses.
 
-use super::event::{Event, Job, Outcome};
+use super::event::{Awaited, Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
@@ -11,19 +11,19 @@ use crate::wire::stream::Source;
 use crate::wire::{Message, Prompt, SourceKeys, Text, visible};
 
 /// How long a unit may take to ask or to answer.
-const ANSWER: Duration = Duration::from_millis(1500);
+pub(super) const ANSWER: Duration = Duration::from_millis(1500);
 /// How long a single key may go without a reaction before Enter is sent behind it.
 const KEY_ALONE: Duration = Duration::from_millis(400);
 /// How long after T a line without a question means "switched off".
-const NO_QUESTION: Duration = Duration::from_millis(400);
+pub(super) const NO_QUESTION: Duration = Duration::from_millis(400);
 /// How long after T rows may still come that were on their way: those an adapter and the unit's own buffer held.
-const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
+pub(super) const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
 /// How often T is pressed to switch the stream off: it may be lost on the line.
 const MOST_TOGGLES: u32 = 3;
 /// How long behind the repetition time the unit may refuse it, or ask for it once more.
 const TAKEN: Duration = Duration::from_millis(600);
 /// No values come for 3 s after power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO): rows may take that long.
-const FIRST_VALUES: Duration = Duration::from_secs(6);
+pub(super) const FIRST_VALUES: Duration = Duration::from_secs(6);
 /// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
 const RESET: Duration = Duration::from_secs(10);
 
@@ -143,11 +143,11 @@ impl StreamOn {
 
     fn give_up(&mut self, desk: &mut Desk<'_>) -> Outcome {
         let awaited = match self.stage {
-            OnStage::Toggled => "the question for the stream's source",
-            OnStage::Source { .. } => "the question for the repetition time",
+            OnStage::Toggled => Awaited::SourceQuestion,
+            OnStage::Source { .. } => Awaited::PeriodQuestion,
             OnStage::Period { .. } | OnStage::Row => {
                 desk.facts.stream = None;
-                "a row of the stream"
+                Awaited::Row
             }
         };
         if self.is_asked() {
@@ -224,7 +224,7 @@ impl Work for StreamOff {
                 None
             }
             Signal::Heard(text, Message::Row(_)) => {
-                let awaited = "that the stream is off";
+                let awaited = Awaited::StreamOff;
                 Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: Some(text.span) })
             }
             Signal::Heard(..) => {
@@ -235,7 +235,7 @@ impl Work for StreamOff {
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => match desk.pending {
                 Some(text) => {
                     desk.leave_dialogue();
-                    let awaited = "that the stream is off";
+                    let awaited = Awaited::StreamOff;
                     Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: Some(text.span) })
                 }
                 None if self.heard => {
@@ -249,7 +249,7 @@ impl Work for StreamOff {
                     None
                 }
                 None => {
-                    let awaited = "that the stream is off";
+                    let awaited = Awaited::StreamOff;
                     Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: None })
                 }
             },
@@ -307,7 +307,7 @@ impl Work for RestoreDefaults {
                 if !self.confirmed {
                     desk.leave_dialogue();
                 }
-                let awaited = if self.confirmed { "the banner after the reset" } else { "the question for Yes" };
+                let awaited = if self.confirmed { Awaited::Banner } else { Awaited::DefaultsQuestion };
                 let heard = desk.pending.map(|text| text.span).or(self.heard);
                 Some(Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard })
             }

@@ -12,7 +12,7 @@ use crate::wire::diagnostics;
 /// computes needs a moment.
 const ANSWER: Duration = Duration::from_secs(3);
 /// Bytes of a piece that somebody may have typed: anything longer is a record of a file, and its letters are no keys.
-const LONGEST_TYPED: usize = 16;
+pub(super) const LONGEST_TYPED: usize = 16;
 
 /// The dialogue that is open, as far as keys tell.
 #[derive(Debug, Default)]

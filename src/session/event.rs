@@ -102,6 +102,7 @@ impl LoadOrder {
             moving: Duration::ZERO,
             moved: 0,
             held: None,
+            again: false,
         }
     }
 }
@@ -200,6 +201,16 @@ pub enum Event {
         /// Bytes of the file.
         total: usize,
     },
+    /// A file that is sent as it is does not come further: the unit holds it by XOFF, and has for long. Told once for each
+    /// hold. Nothing is given up: the user ends the wait, or the unit does, and then [`Event::FileProgress`] says so.
+    FileHeld {
+        /// Since when.
+        since: Instant,
+        /// Bytes that have left.
+        sent: usize,
+        /// Bytes of the file.
+        total: usize,
+    },
     /// A job has ended.
     Finished(Outcome),
 }
@@ -223,7 +234,7 @@ pub enum Outcome {
         /// Which job.
         job: Job,
         /// What was awaited.
-        awaited: &'static str,
+        awaited: Awaited,
         /// Where the last text heard lies.
         heard: Option<Span>,
     },
@@ -249,6 +260,44 @@ pub enum Outcome {
         /// Why it ended.
         end: FileEnd,
     },
+}
+
+/// What a job has waited for in vain. As text it says, as a sentence without its stop, what did not happen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Awaited {
+    /// The question that offers the stream's sources, behind T.
+    #[error("the unit did not ask which values its stream is to send")]
+    SourceQuestion,
+    /// The question behind that one.
+    #[error("the unit did not ask for the repetition time")]
+    PeriodQuestion,
+    /// The first row of a stream that was switched on.
+    #[error("no row of the stream came")]
+    Row,
+    /// A sign that no more rows will come.
+    #[error("the unit did not confirm that the stream is off")]
+    StreamOff,
+    /// The question behind D.
+    #[error("the unit did not ask for the Yes that restores its defaults")]
+    DefaultsQuestion,
+    /// The banner of a unit that restores its defaults.
+    #[error("the banner after the reset did not come")]
+    Banner,
+    /// Anything behind V.
+    #[error("the unit did not show its object dictionary")]
+    Dictionary,
+    /// An entry among what came behind V.
+    #[error("no entry of the object dictionary came")]
+    Entry,
+    /// The first page of diagnostics.
+    #[error("no page of diagnostics came")]
+    Page,
+    /// One more, behind the first ones.
+    #[error("the next page of diagnostics did not come")]
+    NextPage,
+    /// A sign that no more pages will come.
+    #[error("the unit did not confirm that the diagnostics are off")]
+    DiagnosticsOff,
 }
 
 /// Why the sending of a file has ended.
@@ -381,6 +430,9 @@ pub struct Progress {
     pub moved: usize,
     /// How long the unit has held us by XOFF, if it does.
     pub held: Option<Duration>,
+    /// Everything is being sent once more: the loader has shown that it had lost something. The counts are those of this
+    /// time, and begin at 0.
+    pub again: bool,
 }
 
 impl Progress {
@@ -593,6 +645,7 @@ mod tests {
             moving: Duration::ZERO,
             moved: 0,
             held: None,
+            again: false,
         };
         assert_eq!((progress.rate(), progress.eta()), (0.0, None));
         progress = Progress { bytes: 5_020, elapsed: Duration::from_secs(15), ..progress };

@@ -168,6 +168,19 @@ impl Session {
         }
     }
 
+    /// No sign of the stream has come for so long that it has stopped.
+    pub(super) fn look_at_stream(&mut self) {
+        if self.toggled.is_over(self.dated) {
+            self.stream_stopped();
+        }
+    }
+
+    fn stream_stopped(&mut self) {
+        if self.facts.stream.take().is_some() {
+            self.events.push_back(Event::FactsChanged);
+        }
+    }
+
     /// What a line means. A row without a number looks the same from either source: it is one of what was asked for.
     fn understand(&self, line: &str) -> Message {
         match self.vocabulary.line(line) {
@@ -188,6 +201,10 @@ impl Session {
     }
 
     fn heard(&mut self, text: Text, message: Message) {
+        self.look_at_stream();
+        if self.toggled.heard(self.dated, &message) {
+            self.stream_stopped();
+        }
         self.learn(&text, &message);
         // A unit that starts has forgotten that it stopped us, and will never say "go on".
         let starts = matches!(
@@ -253,6 +270,10 @@ impl Session {
                 }
                 if name.product.is_some() {
                     self.dialogue.named();
+                }
+                // An object of the view may be called like the product; a banner has its version as well.
+                if name.product.is_some() && name.version.is_some() && !asked && facts.stream.is_some() {
+                    self.toggled.restarted(self.dated);
                 }
                 if let Some(product) = &name.product {
                     facts.product = Some(Known { value: product.clone(), origin, span });

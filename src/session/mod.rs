@@ -17,6 +17,7 @@ mod job;
 mod overheard;
 mod redactor;
 mod sending;
+mod toggled;
 mod transmitter;
 mod upload;
 
@@ -36,6 +37,7 @@ use dialogue::Dialogue;
 use hearing::PromptWatch;
 use job::{Desk, Signal, Work};
 use redactor::Redactor;
+use toggled::Toggled;
 use transmitter::Transmitter;
 
 /// A conversation with one unit.
@@ -75,6 +77,8 @@ pub struct Session {
     menu_asked_at: Option<Instant>,
     /// Which lines answer a key.
     dialogue: Dialogue,
+    /// Whether the stream is still on.
+    toggled: Toggled,
     /// The line at hand was counted as one that nobody understands.
     counted: bool,
     /// Where in what was received the last echo of a secret begins and ends.
@@ -122,6 +126,7 @@ impl Session {
             recognises: true,
             menu_asked_at: None,
             dialogue: Dialogue::default(),
+            toggled: Toggled::default(),
             counted: false,
             echo: (0, 0),
             source: None,
@@ -263,6 +268,7 @@ impl Session {
         self.pass_to(now);
         self.hand_out_echo();
         self.look_at_prompt();
+        self.look_at_stream();
         if self.facts.state == UnitState::Silent && self.record.received() > 0 {
             self.facts.state = UnitState::Unknown;
         }
@@ -384,6 +390,9 @@ impl Session {
         // X leaves the view, behind which the menu stands.
         self.menu_asked_at = sent.iter().any(|key| matches!(key.to_ascii_lowercase(), b'm' | b'x')).then_some(self.now);
         self.dialogue.sent(self.now, sent);
+        if self.facts.stream.is_some() {
+            self.toggled.sent(self.now, sent);
+        }
     }
 
     /// Tells the running job something, and ends it if it says so.
@@ -463,6 +472,7 @@ impl Endpoint for Session {
         if self.prompt.due.is_some_and(|due| due <= self.now) {
             self.look_at_prompt();
         }
+        self.look_at_stream();
         self.signal(Signal::Tick);
     }
 
@@ -482,6 +492,7 @@ impl Endpoint for Session {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let job = self.running.as_ref().and_then(|running| running.work.deadline());
-        [self.prompt.due, self.echo_due, self.transmitter.poll_timeout(), job].into_iter().flatten().min()
+        let ours = [self.prompt.due, self.echo_due, self.toggled.due(), self.transmitter.poll_timeout()];
+        ours.into_iter().chain([job]).flatten().min()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::diagnostics::{Assembler, Page};
 use super::dictionary::Collector;
-use super::event::{Event, Job, Outcome};
+use super::event::{Awaited, Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::device::Product;
 use crate::record::Span;
@@ -41,7 +41,7 @@ impl Work for Dictionary {
                 None
             }
             Signal::Over if self.collector.count() == 0 => {
-                let awaited = "an entry of the object dictionary";
+                let awaited = Awaited::Entry;
                 Some(Outcome::NoAnswer { job: Job::ReadDictionary, awaited, heard: self.heard })
             }
             Signal::Over => {
@@ -158,7 +158,10 @@ impl Work for Diagnostics {
                         b'\r' => self.answers = false,
                         _ if self.answers => {}
                         b'd' | b'D' => self.answers = true,
-                        b's' | b'S' => self.switched_on = !self.switched_on,
+                        b's' | b'S' => {
+                            self.switched_on = !self.switched_on;
+                            self.page.pressed();
+                        }
                         b'v' | b'V' | b'm' | b'M' | b'l' | b'L' => self.switched_on = false,
                         _ => {}
                     }
@@ -170,7 +173,7 @@ impl Work for Diagnostics {
                 self.page(page, desk)
             }
             Signal::Over if self.taken == 0 => {
-                let awaited = "a page of diagnostics";
+                let awaited = Awaited::Page;
                 Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
             }
             Signal::Over => Some(Outcome::Done(Job::Diagnostics)),

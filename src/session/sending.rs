@@ -5,8 +5,11 @@
 
 use super::event::{Event, FileEnd, Outcome};
 use super::job::{Desk, Signal, Work};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
+/// How long the unit may hold the file until the user is told what is waited for: writing a page of flash takes it some
+/// 30 ms, and who looks at a number that stands still wonders behind some seconds.
+const LONG_HOLD: Duration = Duration::from_secs(3);
 /// Bytes that wait for the line at most: some pieces, so that it never runs dry, and little to call back.
 const AHEAD: usize = 256;
 
@@ -17,12 +20,14 @@ pub(super) struct SendFile {
     handed: usize,
     /// Bytes that have left the line's queue, as last told.
     told: usize,
+    /// The hold at hand has been told of.
+    hold_told: bool,
     deadline: Option<Instant>,
 }
 
 impl SendFile {
     pub(super) fn new(bytes: Vec<u8>) -> Self {
-        SendFile { bytes, handed: 0, told: 0, deadline: None }
+        SendFile { bytes, handed: 0, told: 0, hold_told: false, deadline: None }
     }
 
     /// Bytes that have left. What waits in the queue is the file's last part: what was typed before goes first.
@@ -49,9 +54,21 @@ impl SendFile {
         let end = self.bytes.len().min(self.handed + room);
         desk.typed.extend_from_slice(&self.bytes[self.handed..end]);
         self.handed = end;
-        // The line asks for more as long as something waits; when the last piece has left nobody says so.
-        let waiting = desk.transmitter.waiting() + desk.typed.len();
-        self.deadline = desk.transmitter.held_since().is_none().then(|| desk.now + desk.transmitter.time_for(waiting));
+        self.deadline = match desk.transmitter.held_since() {
+            // The line asks for more as long as something waits; when the last piece has left nobody says so.
+            None => {
+                self.hold_told = false;
+                let waiting = desk.transmitter.waiting() + desk.typed.len();
+                Some(desk.now + desk.transmitter.time_for(waiting))
+            }
+            Some(_) if self.hold_told => None,
+            Some(since) if desk.now < since + LONG_HOLD => Some(since + LONG_HOLD),
+            Some(since) => {
+                self.hold_told = true;
+                desk.events.push_back(Event::FileHeld { since, sent: left, total: self.bytes.len() });
+                None
+            }
+        };
         None
     }
 

@@ -3,6 +3,8 @@
 //! What a page shows is lost with the manual's figures, so nothing is expected of it: wherever a line puts a number
 //! behind words, that is a quantity with its label. The page itself stays as printed.
 
+use super::words::Words;
+
 /// A number on a page, and what the page calls it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quantity {
@@ -58,6 +60,16 @@ pub fn quantities(line: &str) -> Vec<Quantity> {
         }
     }
     found
+}
+
+/// Whether a line says that the pages have been switched on or off, as a unit may answer the key before its first page. A
+/// heading that tells of both has something else to say.
+pub fn is_switch(line: &str) -> bool {
+    let words = Words::of(line);
+    let on = ["on", "started", "enabled", "active", "running"];
+    let off = ["off", "stopped", "disabled", "inactive"];
+    let says = |states: &[&str]| words.iter().any(|word| states.contains(&word));
+    words.iter().any(|word| word.contains("diagnos")) && says(&on) != says(&off) && quantities(line).is_empty()
 }
 
 /// A word without the signs around it.
@@ -127,6 +139,20 @@ mod tests {
         ];
         for (line, expected) in table {
             assert_eq!(read(line), expected, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn what_answers_the_key_is_told_from_a_heading() {
+        for line in
+            ["Diagnostics ON.", "DIAGNOSTICS STARTED", "sDiagnostics: on", "Diagnostics OFF.", "diagnosis enabled"]
+        {
+            assert!(is_switch(line), "{line:?}");
+        }
+        for line in
+            ["--- Diagnostics ---", "Diagnostics (S: on/off)", "Diagnostics on: 12 s", "Supply on", "Diagnostics", ""]
+        {
+            assert!(!is_switch(line), "{line:?}");
         }
     }
 

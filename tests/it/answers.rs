@@ -2,7 +2,9 @@
 //! the session but its own deadlines, so a wait that does not end by itself shows here and nowhere else.
 
 use axcon::endpoint::Endpoint;
-use axcon::session::{Command, Event, FileEnd, Job, LoadReport, Outcome, Phase, Refusal, Session, UnitNow, Verdict};
+use axcon::session::{
+    Awaited, Command, Event, FileEnd, Job, LoadReport, Outcome, Phase, Refusal, Session, UnitNow, Verdict,
+};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::stream::Source;
@@ -88,6 +90,10 @@ impl Alone {
     }
 }
 
+fn at(moment: Instant) -> u64 {
+    millis(moment.since(Instant::ZERO))
+}
+
 fn millis(span: Duration) -> u64 {
     u64::try_from(span.as_nanos() / 1_000_000).expect("a short story")
 }
@@ -105,18 +111,13 @@ const MENU: &str = "AXRTD8CO V1.0.0\r\nV - View Object Dictionary\r\nD - Default
 fn a_silent_line_ends_every_job_by_its_own_deadlines() {
     let no_answer = |job, awaited| Outcome::NoAnswer { job, awaited, heard: None };
     let table = [
-        (on(), no_answer(Job::StreamOn, "the question for the stream's source"), "0:t 1500:t 3000:~", 3000),
-        (Command::StreamOff, no_answer(Job::StreamOff, "that the stream is off"), "0:t 1500:m", 3000),
-        (Command::RestoreDefaults, no_answer(Job::RestoreDefaults, "the question for Yes"), "0:d 1500:~", 1500),
-        (
-            Command::Diagnostics { pages: Some(1) },
-            no_answer(Job::Diagnostics, "a page of diagnostics"),
-            "1300:s",
-            1300 + 6500,
-        ),
+        (on(), no_answer(Job::StreamOn, Awaited::SourceQuestion), "0:t 1500:t 3000:~", 3000),
+        (Command::StreamOff, no_answer(Job::StreamOff, Awaited::StreamOff), "0:t 1500:m", 3000),
+        (Command::RestoreDefaults, no_answer(Job::RestoreDefaults, Awaited::DefaultsQuestion), "0:d 1500:~", 1500),
+        (Command::Diagnostics { pages: Some(1) }, no_answer(Job::Diagnostics, Awaited::Page), "1300:s", 1300 + 6500),
         (
             Command::ReadDictionary,
-            no_answer(Job::ReadDictionary, "the object dictionary"),
+            no_answer(Job::ReadDictionary, Awaited::Dictionary),
             "0:v 1200:x 1320:m 2520:x 2640:m 3840:x 3960:m",
             5160,
         ),
@@ -134,10 +135,7 @@ fn a_silent_line_ends_every_job_by_its_own_deadlines() {
 fn rows_behind_the_key_that_stops_them_are_forgiven_for_a_moment_and_it_is_pressed_three_times() {
     let mut alone = Alone::with(&[("t", 299, ROW), ("", 300, ROW), ("t", 400, ROW), ("t", 299, ROW), ("", 301, ROW)]);
     let (outcome, time) = alone.ask(Command::StreamOff);
-    assert!(
-        matches!(outcome, Outcome::NoAnswer { awaited: "that the stream is off", heard: Some(_), .. }),
-        "{outcome:?}"
-    );
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::StreamOff, heard: Some(_), .. }), "{outcome:?}");
     assert_eq!((alone.log().as_str(), time), ("0:t 300:t 700:t", 1001));
     // The second press is heard.
     let mut alone = Alone::with(&[("t", 310, ROW)]);
@@ -170,7 +168,7 @@ fn a_page_that_was_under_way_is_no_sign_that_the_key_was_lost_and_a_later_one_is
     // A unit that does not stop at all is told so.
     let script = [("s", 100, page), ("s", 1000, page), ("s", 1000, page), ("s", 1000, page)];
     let (outcome, _) = Alone::with(&script).ask(Command::Diagnostics { pages: Some(1) });
-    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "the end of the diagnostics", .. }), "{outcome:?}");
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::DiagnosticsOff, .. }), "{outcome:?}");
 }
 
 #[test]
@@ -183,7 +181,7 @@ fn silence_is_no_proof_that_anything_is_off() {
     let page = "Supply voltage: 24.1 V\r\n";
     let mut alone = Alone::with(&[("s", 100, page)]);
     let (outcome, time) = alone.ask(Command::Diagnostics { pages: Some(1) });
-    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "the end of the diagnostics", .. }), "{outcome:?}");
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::DiagnosticsOff, .. }), "{outcome:?}");
     assert_eq!((alone.log().as_str(), time), ("1300:s 1600:s 3100:m", 4600));
 }
 
@@ -216,7 +214,7 @@ fn a_slow_stream_counts_as_on_once_its_time_is_taken_and_a_refused_time_is_told_
     // No row comes: it was not on after all.
     let mut alone = Alone::with(&dialogue);
     let (outcome, _) = alone.ask(slow());
-    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "a row of the stream", .. }), "{outcome:?}");
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::Row, .. }), "{outcome:?}");
     assert_eq!(alone.session.facts().stream, None);
 }
 
@@ -258,14 +256,11 @@ fn a_question_that_nobody_expects_is_left_and_a_refusal_is_one() {
     // Somebody has left L open.
     let mut alone = Alone::with(&[("t", 5, "Password: ")]);
     let (outcome, _) = alone.ask(on());
-    assert!(
-        matches!(outcome, Outcome::NoAnswer { awaited: "the question for the stream's source", .. }),
-        "{outcome:?}"
-    );
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::SourceQuestion, .. }), "{outcome:?}");
     assert!(alone.log().ends_with(":~"), "{}", alone.log());
     let mut alone = Alone::with(&[("s", 5, "Password: ")]);
     let (outcome, _) = alone.ask(Command::Diagnostics { pages: Some(1) });
-    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "a page of diagnostics", .. }), "{outcome:?}");
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::Page, .. }), "{outcome:?}");
     assert!(alone.log().ends_with(":~"), "{}", alone.log());
     // The unit refuses in words that are known; rows of the other source are no proof.
     let period = ("f", 5, "Every how many ms? ");
@@ -300,6 +295,50 @@ fn a_file_goes_as_fast_as_the_line_and_not_to_a_unit_that_does_not_take_what_was
 }
 
 #[test]
+fn a_file_that_the_unit_does_not_let_go_on_waits_for_it_and_says_so_once() {
+    let mut alone = Alone::with(&[]);
+    alone.session.command(alone.now, Command::SendFile(vec![b'x'; 1_000])).expect("it is free");
+    alone.take_sent(Instant::ZERO);
+    let hold = |alone: &mut Alone, at: u64, byte: &[u8]| {
+        alone.now = Instant::from_millis(at);
+        alone.session.handle_bytes(alone.now, byte);
+        alone.take_sent(Instant::ZERO);
+    };
+    // What comes of it, and when, until nothing is due any more.
+    let news = |alone: &mut Alone| {
+        let mut news = Vec::new();
+        while let Some(due) = alone.session.poll_timeout() {
+            alone.now = due.max(alone.now);
+            alone.session.handle_timeout(alone.now);
+            alone.take_sent(Instant::ZERO);
+            while let Some(event) = alone.session.poll_event() {
+                match event {
+                    Event::FileHeld { since, sent, total } => {
+                        news.push(format!("{}: {sent} of {total} since {}", at(alone.now), at(since)));
+                    }
+                    Event::Finished(outcome) => news.push(format!("{}: {outcome:?}", at(alone.now))),
+                    _ => {}
+                }
+            }
+        }
+        news
+    };
+    hold(&mut alone, 10, b"\x13");
+    assert_eq!(news(&mut alone), ["3010: 64 of 1000 since 10"], "and nobody wakes for it any more");
+    assert_eq!(alone.session.job(), Some(Job::SendFile), "it is not given up");
+    // A hold of a moment is none of the user's business, one more that is long is.
+    hold(&mut alone, 60_000, b"\x11");
+    hold(&mut alone, 60_010, b"\x13");
+    hold(&mut alone, 60_020, b"\x11");
+    hold(&mut alone, 60_030, b"\x13");
+    let told = news(&mut alone);
+    assert!(told.len() == 1 && told[0].starts_with("63030: ") && told[0].ends_with("since 60030"), "{told:?}");
+    hold(&mut alone, 70_000, b"\x11");
+    let told = news(&mut alone);
+    assert!(told.len() == 1 && told[0].contains("sent: 1000, total: 1000, end: Whole"), "{told:?}");
+}
+
+#[test]
 fn a_loader_that_wants_a_key_gets_three_and_then_is_asked_who_it_is() {
     let script = [("\u{11}m", 3, MENU), ("l", 5, "Password: ")];
     let mut alone = Alone::with(&script);
@@ -329,7 +368,7 @@ fn the_question_for_yes_is_answered_once_and_only_a_banner_is_the_end() {
     // It never comes back.
     let mut alone = Alone::with(&[("d", 3, question), ("Yes~", 50, question)]);
     let (outcome, time) = alone.ask(Command::RestoreDefaults);
-    assert!(matches!(outcome, Outcome::NoAnswer { awaited: "the banner after the reset", heard: Some(_), .. }));
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::Banner, heard: Some(_), .. }));
     assert_eq!((alone.sent.len(), time), (2, alone.sent[1].0 + 10_000), "nothing is answered twice: {}", alone.log());
 }
 

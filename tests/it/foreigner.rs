@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use axcon::canopen::{DataType, Value};
 use axcon::device::Product;
 use axcon::endpoint::Endpoint;
-use axcon::session::{Command, Event, Job, Outcome, UnitState};
+use axcon::session::{Awaited, Command, Event, Job, Outcome, UnitState};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::diagnostics;
@@ -356,7 +356,7 @@ fn defaults_are_restored_where_the_question_offers_yes_and_never_guessed_where_i
     bench.wire.clear();
     let outcome = bench.ask(Command::RestoreDefaults);
     let Outcome::NoAnswer { awaited, heard: Some(heard), .. } = outcome else { panic!("{outcome:?}") };
-    assert_eq!(awaited, "the question for Yes");
+    assert_eq!(awaited, Awaited::DefaultsQuestion);
     let said = String::from_utf8(bench.session.record().bytes(heard)).expect("ASCII");
     assert!(said.contains("magic word"), "the question is shown: {said:?}");
     assert_eq!(bench.wire, b"d\r", "and left with Enter");

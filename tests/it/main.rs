@@ -22,6 +22,7 @@ mod live;
 #[cfg(unix)]
 mod network;
 mod oddities;
+mod paced;
 #[cfg(unix)]
 mod ptys;
 #[cfg(unix)]

@@ -233,6 +233,84 @@ fn a_loader_that_wants_a_key_and_erases_everything_gets_its_key_and_its_time() {
     assert!(bench.unit.unit().flash() == flash_with(&image), "and nothing else is left in the flash");
 }
 
+#[test]
+fn the_plan_is_what_is_sent_to_the_loader_that_is_believed_and_is_renewed_when_it_is_another() {
+    for (product, before, after) in [(axtc4co(), "1.1.0", "1.2.0"), (axrtd8co(), "2.1.1", "2.2.0")] {
+        let image = small_image(&product.name, after);
+        for (loader, packed) in LoaderKind::ALL.into_iter().flat_map(|loader| [(loader, false), (loader, true)]) {
+            for named in [None, Some(loader)] {
+                let flash = flash_with(&small_image(&product.name, before));
+                let mut bench = Bench::of(product, loader, flash, Duration::from_millis(1));
+                bench.run_for(Duration::from_secs(6));
+                let order = LoadOrder { packed, loader: named, ..order(image.clone()) };
+                let planned = order.at_its_beginning();
+                let is_believed = named.unwrap_or(product.loader.kind).pacing() == loader.pacing();
+                bench.command(Command::Load(Box::new(order)));
+                let story = format!("{} {loader:?}, packed {packed}, named {named:?}", product.name);
+                let (mut last, mut totals) = (planned, Vec::new());
+                while let Some(event) = bench.run_until(bench.now + Duration::from_secs(120), |event| {
+                    matches!(event, Event::Progress(_) | Event::Finished(_))
+                }) {
+                    let Event::Progress(progress) = event else { break };
+                    if totals.last() != Some(&(progress.records_total, progress.bytes_total)) {
+                        totals.push((progress.records_total, progress.bytes_total));
+                    }
+                    assert!(!progress.again && progress.bytes <= progress.bytes_total, "{story}: {progress:?}");
+                    last = progress;
+                }
+                assert_eq!((last.records, last.bytes), (last.records_total, last.bytes_total), "{story}: {last:?}");
+                // The image's records and none other, in as many characters as were told.
+                let begin = bench.wire.windows(3).position(|three| three == b"S0\x31").expect("a header");
+                let sent = bench.wire[begin..].split_inclusive(|byte| *byte == b'\r').take(last.records);
+                let sent: Vec<usize> = sent.filter(|record| record.starts_with(b"S")).map(<[u8]>::len).collect();
+                assert_eq!((sent.len(), sent.iter().sum()), (last.records, last.bytes), "{story}");
+                let changes = if is_believed || !packed { 1 } else { 2 };
+                assert_eq!(totals.len(), changes, "{story}: {totals:?}");
+                assert_eq!(totals[0], (planned.records_total, planned.bytes_total), "{story}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_was_taken_is_told_until_the_loader_begins_anew_and_then_that_it_does() {
+    // The power goes in the middle, and does not come back: nobody has taken anything back.
+    let image = small_image("AXRTD8CO", "2.2.0");
+    let mut bench = rtd8(Duration::from_millis(1));
+    bench.command(Command::Load(Box::new(order(image.clone()))));
+    let limit = bench.now + Duration::from_secs(60);
+    bench.run_until(limit, |event| matches!(event, Event::Progress(progress) if progress.records > 60));
+    let now = bench.now;
+    bench.unit.unit_mut().power_off(now);
+    let mut told = Vec::new();
+    let end = bench.run_until(now + Duration::from_secs(60), |event| {
+        told.extend(if let Event::Progress(progress) = event { Some(*progress) } else { None });
+        matches!(event, Event::Finished(_))
+    });
+    let Some(Event::Finished(Outcome::Loaded(report))) = end else { panic!("{end:?}") };
+    assert!(told.iter().all(|at| at.records > 60 && !at.again), "{told:?}");
+    assert!(report.records > 60 && report.address.is_some(), "{report:?}");
+    // The line loses one acknowledgement, both of its characters: all of it is sent once more, and that is told.
+    let mut bench = rtd8(Duration::from_millis(1));
+    let mut holds = 0;
+    bench.disturb_answers(move |_, byte| {
+        holds += u32::from(byte == 0x13);
+        if holds == 30 && matches!(byte, 0x11 | 0x13) { Vec::new() } else { vec![byte] }
+    });
+    bench.command(Command::Load(Box::new(order(image))));
+    let (mut told, mut again) = (Vec::new(), Vec::new());
+    let end = bench.run_until(bench.now + Duration::from_secs(120), |event| {
+        if let Event::Progress(progress) = event {
+            if progress.again { again.push(progress.records) } else { told.push(progress.records) }
+        }
+        matches!(event, Event::Finished(_))
+    });
+    let Some(Event::Finished(Outcome::Loaded(report))) = end else { panic!("{end:?}") };
+    assert_eq!(report.verdict, Verdict::Done, "{report:?}");
+    assert!(told.is_sorted() && told.last() > Some(&25), "{told:?}");
+    assert!(again.is_sorted() && again.first() == Some(&0) && again.last() == Some(&report.records), "{again:?}");
+}
+
 /// Whatever the product's file says, and the user does not know either: what the loader does decides.
 #[test]
 fn every_loader_in_every_unit_is_uploaded_to_at_any_latency_packed_or_not() {

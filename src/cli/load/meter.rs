@@ -264,6 +264,7 @@ mod tests {
             moving: Duration::from_secs(seconds),
             moved: bytes,
             held: None,
+            again: false,
         }
     }
 

@@ -30,6 +30,8 @@ pub(in crate::session) struct Assembler {
     due: Option<Instant>,
     /// Where a text without a line end ended when the page was first looked at.
     unended: Option<u64>,
+    /// The key has been pressed, and no page has come since: the unit may answer it on the lines before the first one.
+    is_answer: bool,
 }
 
 impl Assembler {
@@ -41,6 +43,11 @@ impl Assembler {
         self.at = now;
         self.due = Some(now + QUIET);
         self.unended = None;
+    }
+
+    /// The key that switches pages has been pressed.
+    pub(in crate::session) fn pressed(&mut self) {
+        self.is_answer = true;
     }
 
     /// When the page may be complete.
@@ -62,6 +69,12 @@ impl Assembler {
             lines.push(text.clone());
             // It has been read: what is painted over it is the next page.
             desk.cut = true;
+        }
+        if std::mem::take(&mut self.is_answer) {
+            let heading = lines.iter().take_while(|line| diagnostics::quantities(&line.text).is_empty());
+            let answers = heading.enumerate().filter(|(_, line)| diagnostics::is_switch(&line.text));
+            let answer = answers.last().map_or(0, |(at, _)| at + 1);
+            lines.drain(..answer);
         }
         let has_numbers = lines.iter().any(|line| !diagnostics::quantities(&line.text).is_empty());
         has_numbers.then_some(Page { at: self.at, lines })

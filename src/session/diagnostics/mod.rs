@@ -8,7 +8,7 @@ mod assembler;
 
 pub(super) use assembler::{Assembler, Page};
 
-use super::event::{Event, Job, Outcome};
+use super::event::{Awaited, Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
@@ -81,7 +81,7 @@ impl Diagnostics {
             }
             // The key was lost, or went the other way.
             Stage::Stopping { presses: MOST_STOPS, .. } => {
-                let awaited = "the end of the diagnostics";
+                let awaited = Awaited::DiagnosticsOff;
                 Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
             }
             Stage::Stopping { presses, cancelled, .. } => {
@@ -102,6 +102,13 @@ impl Diagnostics {
         }
     }
 
+    fn switch_on(&mut self, desk: &mut Desk<'_>) {
+        desk.send(b"s");
+        self.page.pressed();
+        self.stage = Stage::Asked;
+        self.deadline = Some(desk.now + FIRST_PAGE);
+    }
+
     fn stop(&mut self, desk: &mut Desk<'_>, presses: u32, cancelled: bool) {
         desk.send(b"s");
         self.stage = Stage::Stopping { presses, at: desk.now, cancelled };
@@ -113,25 +120,21 @@ impl Diagnostics {
         let job = Job::Diagnostics;
         match self.stage {
             Stage::Watching => {
-                desk.send(b"s");
-                self.stage = Stage::Asked;
-                self.deadline = Some(desk.now + FIRST_PAGE);
+                self.switch_on(desk);
                 None
             }
             Stage::Asked => {
                 if desk.pending.is_some() {
                     desk.leave_dialogue();
                 }
-                Some(Outcome::NoAnswer { job, awaited: "a page of diagnostics", heard: self.heard })
+                Some(Outcome::NoAnswer { job, awaited: Awaited::Page, heard: self.heard })
             }
             // What looked like a page before the key was none, or somebody has stopped them.
             Stage::Reading if self.taken == 1 => {
-                desk.send(b"s");
-                self.stage = Stage::Asked;
-                self.deadline = Some(desk.now + FIRST_PAGE);
+                self.switch_on(desk);
                 None
             }
-            Stage::Reading => Some(Outcome::NoAnswer { job, awaited: "the next page", heard: self.heard }),
+            Stage::Reading => Some(Outcome::NoAnswer { job, awaited: Awaited::NextPage, heard: self.heard }),
             Stage::Stopping { cancelled, .. } | Stage::AskingForMenu { cancelled } if self.answered => {
                 Some(if cancelled { Outcome::Cancelled(job) } else { Outcome::Done(job) })
             }
@@ -143,7 +146,7 @@ impl Diagnostics {
                 None
             }
             Stage::AskingForMenu { .. } => {
-                let awaited = "the end of the diagnostics";
+                let awaited = Awaited::DiagnosticsOff;
                 Some(Outcome::NoAnswer { job, awaited, heard: self.heard })
             }
         }
@@ -172,7 +175,7 @@ impl Work for Diagnostics {
             // A question is none of a page's lines; it is not ours to answer.
             Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults)) => {
                 desk.leave_dialogue();
-                let awaited = "a page of diagnostics";
+                let awaited = Awaited::Page;
                 Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
             }
             Signal::Heard(_, Message::Row(_) | Message::Prompt(_)) => None,

@@ -8,7 +8,7 @@ mod collector;
 
 pub(super) use collector::Collector;
 
-use super::event::{Event, Job, Known, Origin, Outcome};
+use super::event::{Awaited, Event, Job, Known, Origin, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::device::Product;
 use crate::record::Span;
@@ -157,7 +157,7 @@ impl ReadDictionary {
         Outcome::DictionaryRead(Box::new(self.collector.take(complete)))
     }
 
-    fn no_answer(&self, awaited: &'static str) -> Outcome {
+    fn no_answer(&self, awaited: Awaited) -> Outcome {
         Outcome::NoAnswer { job: Job::ReadDictionary, awaited, heard: self.heard }
     }
 
@@ -216,7 +216,7 @@ impl ReadDictionary {
         let menu_is_back = self.menu.count_ones() >= MENU_ENTRIES;
         match &mut self.stage {
             Stage::Opening if self.collector.count() == 0 && !self.answered => {
-                let outcome = self.no_answer("the object dictionary");
+                let outcome = self.no_answer(Awaited::Dictionary);
                 self.leave(desk, outcome);
                 None
             }
@@ -232,7 +232,7 @@ impl ReadDictionary {
                 if self.idle >= IDLE_ANSWERS || self.steps >= self.most_steps {
                     let complete = self.again || self.answered && self.steps < self.most_steps;
                     let outcome = if self.collector.count() == 0 {
-                        self.no_answer("an entry of the object dictionary")
+                        self.no_answer(Awaited::Entry)
                     } else {
                         self.finished(complete, desk)
                     };
@@ -288,7 +288,7 @@ impl Work for ReadDictionary {
                     }
                     (Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults | Prompt::Source(_)), _) => {
                         desk.leave_dialogue();
-                        let outcome = self.no_answer("the object dictionary");
+                        let outcome = self.no_answer(Awaited::Dictionary);
                         self.leave(desk, outcome);
                     }
                     (_, Stage::Opening | Stage::Walking) => {

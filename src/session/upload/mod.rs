@@ -10,48 +10,26 @@
 mod enter;
 mod pages;
 mod records;
-#[cfg(test)]
-mod tests;
+mod telling;
 mod transfer;
+mod under_way;
 mod verify;
 
-use super::event::{Event, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitNow, UnitState, Verdict};
-use super::flaw::Flaw;
+pub(super) use telling::size;
+
+use super::event::{LoadOrder, Outcome, Phase, Progress, UnitNow, UnitState, Verdict};
 use super::identify::Identify;
 use super::job::{Desk, Signal, Work};
 use crate::image::DefectId;
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
 use crate::version::Version;
-use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text, visible};
-use records::Size;
-use transfer::{Stall, Transfer};
-use verify::{After, NEW_BANNER};
+use crate::wire::Message;
+use transfer::Transfer;
+use verify::After;
 
-/// How long the loader may take after an error to say that it waits again.
-const RESTART: Duration = Duration::from_secs(2);
-/// Lines of words nobody knows that a loader may print between two acknowledgements: it may have something to say of its
-/// erasing. A menu that takes records for keys says one or two behind each.
-const MOST_STRANGE: usize = 3;
-/// Records to such a line behind which they are a loader's own way to show its progress: it has one for each page.
-const RECORDS_TO_A_PAGE: usize = 4;
-/// How long words are given to become something that is known: text whose line end the line has lost is looked at when it
-/// has stood still for 60 ms, an adapter of 20 ms on the way.
-const HEARD_OUT: Duration = Duration::from_millis(100);
-/// How long a loader with a ring may be silent behind the end record, before it is taken to wait for the rest of it.
-const END_UNHEARD: Duration = Duration::from_millis(1500);
 /// What brings a loader out of a record it has lost its place in: as many digits as the longest record has (it takes
 /// anything for a digit), and a line end. At a menu Enter does nothing.
 const FILLER: [u8; 516] = [b'\r'; 516];
-/// How often a hold is told of while it lasts.
-const HOLD_TOLD: Duration = Duration::from_secs(1);
-/// How late a loader that was found waiting may answer what it was asked before the first record, on a busy computer.
-const LATE_ANSWER: Duration = Duration::from_secs(2);
-/// The loaders' number for a record that came while another was parked.
-const OVERRUN: u32 = 5;
-/// Their number for characters lost or damaged on the line, as those are that come while a page is written.
-const DAMAGED: u32 = 1;
-/// Characters of a quotation.
-const QUOTED: usize = 160;
 
 /// The job.
 pub(super) struct Upload {
@@ -141,13 +119,6 @@ enum Unheard {
     Filler,
 }
 
-/// Records and characters that an order sends, as far as that is known before the loader has shown what it is.
-pub(super) fn size(order: &LoadOrder) -> (usize, usize) {
-    let size = if order.packed { Size::Packed(records::LONGEST) } else { Size::AsInFile };
-    let records = records::build(order.image.image(), size, records::LINE_END);
-    (records.len(), records.iter().map(|record| record.text.len()).sum())
-}
-
 impl Upload {
     pub(super) fn new(order: LoadOrder) -> Self {
         Upload {
@@ -175,120 +146,6 @@ impl Upload {
             after: After::default(),
             progress: None,
             first_data: None,
-        }
-    }
-
-    /// Whether the text is the header's, which some loaders echo, whatever it says.
-    fn is_echo_of_header(&self, text: &Text) -> bool {
-        let header = records::header(self.order.image.image());
-        let header = String::from_utf8_lossy(&header);
-        !header.trim().is_empty() && text.text.trim() == header.trim()
-    }
-
-    /// Something was heard while records are on their way: anything but the loader's progress ends the transfer.
-    fn transferring(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) {
-        let failed = match message {
-            _ if self.is_echo_of_header(text) => None,
-            Message::Loader(LoaderText::Progress) => None,
-            _ if self.order.flaw == Some(Flaw::SendsBehindErrors) => None,
-            Message::Text | Message::Refusal => {
-                let sent = self.transfer.as_ref().map_or(0, |transfer| transfer.sent().0);
-                if self.strange == 0 {
-                    self.strange_from = sent;
-                }
-                if has_a_word(&text.text) {
-                    self.strange += 1;
-                    self.talks_until = Some(desk.now + HEARD_OUT);
-                }
-                let pages = (sent - self.strange_from.min(sent)) / RECORDS_TO_A_PAGE;
-                let what = "what answers does not talk as a loader does".to_owned();
-                (self.strange > MOST_STRANGE.max(pages)).then_some((what, UnitNow::Unknown))
-            }
-            Message::Loader(LoaderText::Error(error)) => {
-                Some((format!("the loader reports error {error}"), UnitNow::Loader))
-            }
-            Message::Loader(LoaderText::Waiting | LoaderText::Restarting | LoaderText::AnyKey | LoaderText::Header)
-            | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
-                Some(("the loader started over and wants the file from its beginning".to_owned(), UnitNow::Loader))
-            }
-            Message::Loader(LoaderText::Loaded | LoaderText::Started) => {
-                Some(("the loader says it is done before the end of the file was sent".to_owned(), UnitNow::Unknown))
-            }
-            Message::Prompt(_) => {
-                Some(("the unit asks for something else in the middle of the file".to_owned(), UnitNow::Unknown))
-            }
-            Message::MenuKey(_)
-            | Message::Software(_)
-            | Message::Network(_)
-            | Message::FirstStart
-            | Message::Row(_) => {
-                Some(("the unit left its loader in the middle of the file".to_owned(), UnitNow::Application))
-            }
-        };
-        match failed {
-            None => {
-                if let Some(transfer) = &mut self.transfer {
-                    transfer.heard();
-                }
-            }
-            Some((what, unit)) => {
-                desk.transmitter.clear();
-                if unit != UnitNow::Loader {
-                    // What was on its way may have been keys for a menu: leave whatever dialogue they opened.
-                    desk.leave_dialogue();
-                }
-                let then = self.deserves_another(message, desk);
-                self.fail(desk, text.span.end, what, unit, then);
-            }
-        }
-    }
-
-    /// Whether the loader complains of something that would not be so the next time, and why.
-    fn deserves_another(&mut self, message: &Message, desk: &Desk<'_>) -> Option<Again> {
-        let Message::Loader(LoaderText::Error(error)) = message else { return None };
-        let transfer = self.transfer.as_ref()?;
-        let is_too_fast = match error {
-            // Characters that came while it was deaf are no overrun, and may have been damaged on the line as well.
-            LoaderError::Number(number) => *number == OVERRUN || *number == DAMAGED && transfer.is_surprised(),
-            LoaderError::Status(_) => false,
-        };
-        if is_too_fast && transfer.may_go_slower() {
-            return Some(Again::Slower);
-        }
-        let asked_at = self.asked_in_loader.take()?;
-        (desk.now < asked_at + LATE_ANSWER && transfer.has_hardly_begun()).then_some(Again::AsBefore)
-    }
-
-    /// Nothing is sent any more; what comes behind `mark` says what the unit is now.
-    fn fail(&mut self, desk: &Desk<'_>, mark: u64, what: String, unit: UnitNow, then: Option<Again>) {
-        self.mark = mark;
-        self.stage = Stage::Failing { what, unit, phase: self.phase(), then };
-        self.deadline = Some(desk.now + RESTART);
-    }
-
-    /// Something was heard behind a failure: the loader may wait for a file again.
-    fn failing(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let Stage::Failing { what, then, .. } = &self.stage else { return None };
-        match message {
-            Message::Loader(LoaderText::Waiting | LoaderText::AnyKey)
-            | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
-                let (what, then) = (what.clone(), *then);
-                if let (Some(then), Some(transfer)) = (then, &mut self.transfer) {
-                    match then {
-                        Again::Slower => transfer.start_over_slowly(),
-                        Again::AsBefore => transfer.begin_again(),
-                    }
-                    self.report_progress(desk);
-                    return self.entered(desk);
-                }
-                self.end(desk, Verdict::Failed, UnitNow::Loader, what)
-            }
-            _ if shows_application(message) => {
-                let what = what.clone();
-                self.after.note(message);
-                self.end(desk, Verdict::Failed, UnitNow::Application, what)
-            }
-            _ => None,
         }
     }
 
@@ -404,153 +261,6 @@ impl Upload {
             _ => None,
         }
     }
-
-    /// Until when no record goes, because something talks. A loader that takes records makes marks; words may be the
-    /// first ones of a unit that has started anew, whose keys the records would be.
-    fn hears_out(&mut self, desk: &Desk<'_>) -> Option<Instant> {
-        let words = desk.pending.map_or("", |text| &text.text);
-        let letters =
-            if has_a_word(words) { words.chars().filter(char::is_ascii_alphabetic).collect() } else { String::new() };
-        if self.talk != letters {
-            self.talks_until = (!letters.is_empty()).then_some(desk.now + HEARD_OUT).or(self.talks_until);
-            self.talk = letters;
-        }
-        self.talks_until.filter(|&until| desk.now < until && self.order.flaw != Some(Flaw::SendsBehindErrors))
-    }
-
-    fn transfer(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        if let Some(until) = self.hears_out(desk) {
-            self.deadline = Some(until);
-            return None;
-        }
-        let transfer = self.transfer.as_mut()?;
-        match transfer.advance(desk.now, desk.transmitter) {
-            Ok(false) => self.deadline = transfer.deadline(),
-            Ok(true) => {
-                self.mark = desk.received;
-                self.stage = Stage::Finish;
-                self.deadline = Some(desk.now + NEW_BANNER);
-                let ends = transfer.may_wait_in_a_record();
-                self.unheard = ends.then_some((desk.now + END_UNHEARD, Unheard::Filler));
-            }
-            Err(stall) => {
-                let unit = if transfer.is_taken() { UnitNow::Loader } else { UnitNow::Unknown };
-                let what = match stall {
-                    Stall::Held => "the loader stopped us (XOFF) and did not let us go on",
-                    Stall::Silent => "the loader has fallen silent",
-                    Stall::Unacknowledged => "the loader has not acknowledged a record (XOFF, XON), so it may be lost",
-                };
-                let fill_up = transfer.may_wait_in_a_record();
-                desk.transmitter.clear();
-                self.fail(desk, desk.received, what.to_owned(), unit, None);
-                if fill_up && stall != Stall::Held {
-                    self.fill_up(desk);
-                }
-            }
-        }
-        self.report_progress(desk);
-        None
-    }
-
-    fn report_progress(&mut self, desk: &mut Desk<'_>) {
-        self.report_progress_of(self.phase(), desk);
-    }
-
-    fn report_progress_of(&mut self, phase: Phase, desk: &mut Desk<'_>) {
-        let Some(transfer) = &self.transfer else { return };
-        let (records, bytes, bytes_total) = transfer.taken();
-        // The header is the first record.
-        if records > 1 {
-            self.first_data.get_or_insert((desk.now, bytes));
-        } else {
-            self.first_data = None; // It begins, perhaps anew.
-        }
-        let (first, before) = self.first_data.unwrap_or((desk.now, bytes));
-        let progress = Progress {
-            phase,
-            records,
-            records_total: transfer.sent().1,
-            bytes,
-            bytes_total,
-            address: transfer.address().unwrap_or(0),
-            elapsed: transfer.begun().map_or(Duration::ZERO, |begun| desk.now.since(begun)),
-            moving: desk.now.since(first),
-            moved: bytes.saturating_sub(before),
-            held: desk.transmitter.held_since().map(|since| desk.now.since(since)),
-        };
-        let moved = self.progress.is_none_or(|before| {
-            (before.phase, before.records, before.held.is_some())
-                != (progress.phase, progress.records, progress.held.is_some())
-                || progress.held.zip(before.held).is_some_and(|(now, before)| now >= before + HOLD_TOLD)
-        });
-        self.hold_due = progress.held.map(|_| desk.now + HOLD_TOLD);
-        if moved {
-            self.progress = Some(progress);
-            desk.events.push_back(Event::Progress(progress));
-        }
-    }
-
-    fn phase(&self) -> Phase {
-        match self.stage {
-            Stage::Check(_) => Phase::Check,
-            Stage::AskedForLoader | Stage::PasswordSent | Stage::AskWho(_) | Stage::Settle { .. } => Phase::EnterLoader,
-            Stage::Transfer if self.transfer.as_ref().is_some_and(Transfer::is_erasing) => Phase::Erase,
-            Stage::Transfer => Phase::Transfer,
-            Stage::Failing { phase, .. } => phase,
-            Stage::Finish => Phase::Finish,
-            Stage::AskVersion(_) => Phase::Verify,
-        }
-    }
-
-    fn end(&mut self, desk: &Desk<'_>, verdict: Verdict, unit: UnitNow, what: impl Into<String>) -> Option<Outcome> {
-        let transfer = self.transfer.as_ref();
-        let (records, records_total) = transfer.map_or((0, 0), Transfer::sent);
-        Some(Outcome::Loaded(Box::new(LoadReport {
-            verdict,
-            phase: if verdict == Verdict::Done { Phase::Verify } else { self.phase() },
-            unit,
-            found_in_loader: self.found_in_loader,
-            product: self.product.clone(),
-            version_before: self.version_before,
-            version_after: self.after.version.map(|(_, version)| version),
-            records,
-            records_total,
-            address: transfer.and_then(Transfer::address),
-            duration: transfer.and_then(Transfer::begun).map_or(Duration::ZERO, |begun| desk.now.since(begun)),
-            what: what.into(),
-            heard: self.heard.clone(),
-            misfit: self.misfit,
-            // Before a loader has taken everything, what it seems to be may have been a unit without power.
-            remark: transfer.and_then(Transfer::remark).filter(|_| verdict == Verdict::Done),
-        })))
-    }
-
-    /// Something is heard: what was to be sent to a loader that is not heard need not be, or not to its end. The marks
-    /// of records before are not it: without a line end they are heard late.
-    fn listen(&mut self, message: &Message, desk: &mut Desk<'_>) {
-        match self.stage {
-            _ if matches!(message, Message::Loader(LoaderText::Progress)) => {}
-            Stage::Finish | Stage::Failing { .. } => {
-                self.unheard = None;
-                if std::mem::take(&mut self.filled) {
-                    desk.transmitter.clear();
-                }
-            }
-            Stage::Check(_)
-            | Stage::AskedForLoader
-            | Stage::PasswordSent
-            | Stage::AskWho(_)
-            | Stage::Settle { .. }
-            | Stage::Transfer
-            | Stage::AskVersion(_) => {}
-        }
-    }
-
-    fn quote(&mut self, text: &Text, message: &Message) {
-        if !matches!(message, Message::Row(_)) {
-            self.heard = visible::line(text.text.trim().as_bytes()).chars().take(QUOTED).collect();
-        }
-    }
 }
 
 /// Whether only an application says so.
@@ -560,12 +270,6 @@ fn shows_application(message: &Message) -> bool {
         Message::Software(name) => name.version.is_some(),
         _ => false,
     }
-}
-
-/// Whether a text says something: damage and digits do not.
-fn has_a_word(text: &str) -> bool {
-    text.split(|c: char| !c.is_ascii_alphabetic())
-        .any(|word| word.len() >= 4 && !word.bytes().all(|c| c.is_ascii_hexdigit()))
 }
 
 impl Work for Upload {
@@ -627,5 +331,29 @@ impl Work for Upload {
 
     fn deadline(&self) -> Option<Instant> {
         [self.deadline, self.unheard.map(|(due, _)| due), self.hold_due].into_iter().flatten().min()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_an_application_shows_its_menu_its_first_start_rows_or_its_version() {
+        use crate::version::Version;
+        use crate::wire::{Confidence, LoaderText, MenuKey, SoftwareName};
+        let software = |version| {
+            Message::Software(SoftwareName {
+                product: Some("AXTC4CO".into()),
+                version,
+                confidence: Confidence::WithProduct,
+            })
+        };
+        assert!(shows_application(&Message::MenuKey(MenuKey::View)));
+        assert!(shows_application(&Message::FirstStart));
+        assert!(shows_application(&software(Some(Version::new(1, 2, 0)))));
+        // A loader names the product as well.
+        assert!(!shows_application(&software(None)));
+        assert!(!shows_application(&Message::Text) && !shows_application(&Message::Loader(LoaderText::Waiting)));
     }
 }

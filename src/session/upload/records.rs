@@ -79,6 +79,11 @@ pub(super) fn build(image: &Image, size: Size, line_end: &[u8]) -> Vec<Outgoing>
     records
 }
 
+/// Characters of these records.
+pub(super) fn characters(records: &[Outgoing]) -> usize {
+    records.iter().map(|record| record.text.len()).sum()
+}
+
 /// The header's text: no more than fits a record, and nothing that would act on us when a loader echoes it.
 pub(super) fn header(image: &Image) -> Vec<u8> {
     let printable = |&byte: &u8| if matches!(byte, b' '..=b'~') { byte } else { b'.' };
@@ -187,8 +192,7 @@ mod tests {
             let report = check(file.as_bytes(), None, &[], None, &allow).expect("a slice");
             let image = report.image().expect("nothing else is wrong with it");
             let records = build(image.image(), Size::AsInFile, LINE_END);
-            let leave: usize = records.iter().map(|record| record.text.len()).sum();
-            assert_eq!(report.facts.characters, leave as u64, "{file:?}");
+            assert_eq!(report.facts.characters, characters(&records) as u64, "{file:?}");
         }
     }
 

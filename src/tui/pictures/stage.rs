@@ -402,6 +402,7 @@ pub(super) fn progress() -> Progress {
         moving: Duration::from_millis(9_950),
         moved: 114_280,
         held: None,
+        again: false,
     }
 }
 

@@ -211,6 +211,9 @@ impl View {
                     sending.sent = *sent;
                 }
             }
+            Event::FileHeld { .. } => {
+                self.tell(Tone::Bad, "The unit does not let the file go on (XOFF): Esc ends the wait.");
+            }
             Event::Finished(outcome) => self.finished(now, outcome),
         }
     }
@@ -425,9 +428,7 @@ impl View {
                 self.stream_is_off |= *job == Job::StreamOff;
                 self.tell(Tone::Good, done(*job));
             }
-            Outcome::NoAnswer { job, awaited, .. } => {
-                self.tell(Tone::Bad, format!("No answer: waited for {awaited}, {}.", doing(*job)));
-            }
+            Outcome::NoAnswer { awaited, .. } => self.tell(Tone::Bad, format!("No answer: {awaited}.")),
             Outcome::Refused { job, reason, .. } => {
                 self.tell(Tone::Bad, format!("The unit refused, {}: {reason}", doing(*job)));
             }
@@ -519,7 +520,7 @@ impl View {
 /// What is told of a unit that says nothing, until it says something.
 const NOBODY: &str = "Nobody has answered: check power, cable and port.";
 
-/// What a job was about, to follow "No answer: waited for ...,".
+/// What a job was about, to follow "Cancelled,".
 pub fn doing(job: Job) -> &'static str {
     match job {
         Job::Identify => "asking who is there",

@@ -1,0 +1,117 @@
+//! What is told of an upload: its size beforehand, where it stands, and how it has ended.
+
+use super::super::event::{Event, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitNow, Verdict};
+use super::super::job::Desk;
+use super::{Stage, Upload, records, transfer};
+use crate::device::{LoaderKind, Pacing, Product};
+use crate::time::Duration;
+use crate::wire::{Message, Text, visible};
+use transfer::Transfer;
+
+/// How often a hold is told of while it lasts.
+const HOLD_TOLD: Duration = Duration::from_secs(1);
+/// Characters of a quotation.
+const QUOTED: usize = 160;
+
+/// Records and characters that an order sends to the loader it is believed to meet: the one the user has named, else that
+/// of the product, which is the image's as long as nobody has said another.
+pub(in crate::session) fn size(order: &LoadOrder) -> (usize, usize) {
+    let image_for = || order.image.identity().map(|identity| identity.product.as_str());
+    let product = order.product.as_deref().or_else(image_for).and_then(Product::named);
+    let loader = order.loader.or_else(|| product.map(|product| product.loader.kind));
+    let pacing = loader.map_or(Pacing::Pages, LoaderKind::pacing);
+    let size = transfer::believed_size(order.packed, pacing);
+    let records = records::build(order.image.image(), size, records::LINE_END);
+    (records.len(), records::characters(&records))
+}
+
+impl Upload {
+    pub(super) fn report_progress(&mut self, desk: &mut Desk<'_>) {
+        self.report_progress_of(self.phase(), desk);
+    }
+
+    pub(super) fn report_progress_of(&mut self, phase: Phase, desk: &mut Desk<'_>) {
+        let Some(transfer) = &self.transfer else { return };
+        let reached = transfer.reached();
+        let (records, bytes) = (reached.taken, reached.bytes_taken);
+        let (records_total, bytes_total) = transfer.total();
+        // The header is the first record.
+        if records > 1 {
+            self.first_data.get_or_insert((desk.now, bytes));
+        } else {
+            self.first_data = None; // It begins, perhaps anew.
+        }
+        let (first, before) = self.first_data.unwrap_or((desk.now, bytes));
+        let progress = Progress {
+            phase,
+            records,
+            records_total,
+            bytes,
+            bytes_total,
+            address: transfer.address().unwrap_or(0),
+            elapsed: transfer.begun().map_or(Duration::ZERO, |begun| desk.now.since(begun)),
+            moving: desk.now.since(first),
+            moved: bytes.saturating_sub(before),
+            held: desk.transmitter.held_since().map(|since| desk.now.since(since)),
+            again: transfer.is_again(),
+        };
+        let stands = |at: &Progress| (at.phase, at.records, at.records_total, at.again, at.held.is_some());
+        let moved = self.progress.is_none_or(|before| {
+            stands(&before) != stands(&progress)
+                || progress.held.zip(before.held).is_some_and(|(now, before)| now >= before + HOLD_TOLD)
+        });
+        if moved {
+            self.hold_due = progress.held.map(|_| desk.now + HOLD_TOLD);
+            self.progress = Some(progress);
+            desk.events.push_back(Event::Progress(progress));
+        }
+    }
+
+    pub(super) fn phase(&self) -> Phase {
+        match self.stage {
+            Stage::Check(_) => Phase::Check,
+            Stage::AskedForLoader | Stage::PasswordSent | Stage::AskWho(_) | Stage::Settle { .. } => Phase::EnterLoader,
+            Stage::Transfer if self.transfer.as_ref().is_some_and(Transfer::is_erasing) => Phase::Erase,
+            Stage::Transfer => Phase::Transfer,
+            Stage::Failing { phase, .. } => phase,
+            Stage::Finish => Phase::Finish,
+            Stage::AskVersion(_) => Phase::Verify,
+        }
+    }
+
+    pub(super) fn end(
+        &mut self,
+        desk: &Desk<'_>,
+        verdict: Verdict,
+        unit: UnitNow,
+        what: impl Into<String>,
+    ) -> Option<Outcome> {
+        let transfer = self.transfer.as_ref();
+        let records = transfer.map_or(0, |transfer| transfer.reached().sent);
+        let records_total = transfer.map_or(0, |transfer| transfer.total().0);
+        Some(Outcome::Loaded(Box::new(LoadReport {
+            verdict,
+            phase: if verdict == Verdict::Done { Phase::Verify } else { self.phase() },
+            unit,
+            found_in_loader: self.found_in_loader,
+            product: self.product.clone(),
+            version_before: self.version_before,
+            version_after: self.after.version.map(|(_, version)| version),
+            records,
+            records_total,
+            address: transfer.and_then(Transfer::address),
+            duration: transfer.and_then(Transfer::begun).map_or(Duration::ZERO, |begun| desk.now.since(begun)),
+            what: what.into(),
+            heard: self.heard.clone(),
+            misfit: self.misfit,
+            // Before a loader has taken everything, what it seems to be may have been a unit without power.
+            remark: transfer.and_then(Transfer::remark).filter(|_| verdict == Verdict::Done),
+        })))
+    }
+
+    pub(super) fn quote(&mut self, text: &Text, message: &Message) {
+        if !matches!(message, Message::Row(_)) {
+            self.heard = visible::line(text.text.trim().as_bytes()).chars().take(QUOTED).collect();
+        }
+    }
+}
