@@ -367,7 +367,8 @@ mod tests {
         let product = Product::named("AXTC4CO").expect("built in");
         let facts = Facts::default();
         let at = ObjectAddress::new(0x6100, 1);
-        let read = |value| ReadEntry { at, value, text: "TC1 0xFFFFFFFF".into(), span: Default::default(), known: true };
+        let read =
+            |value| ReadEntry { at, value, text: "TC1 0xFFFFFFFF".into(), span: Default::default(), known: true };
         let dump = |value| {
             let entries = vec![read(value)];
             Dump::of(&DictionaryReading { entries, complete: true, unrecognised_lines: 0 }, Some(product), &facts)
