@@ -10,6 +10,7 @@
 
 mod g3;
 mod paged;
+mod voice;
 
 use super::Board;
 use super::memory::Flash;

@@ -13,8 +13,8 @@ mod reader;
 mod ring;
 
 use super::super::memory::{Flash, StartDelay, Written};
-use super::super::uart::{XOFF, XON};
 use super::super::{Board, Reset};
+use super::voice::Voice;
 use crate::time::{Duration, Instant};
 pub use reader::Version;
 use reader::{Fault, Kind, Read, Reader};
@@ -41,10 +41,7 @@ pub struct Loader {
     loading: bool,
     /// The receiver could not read a character; the reader has not seen it yet.
     unreadable: bool,
-    /// XOFF has been sent, XON not yet.
-    holds_sender: bool,
-    /// Marks or a header's text have been printed on the last line.
-    line_begun: bool,
+    voice: Voice,
 }
 
 /// What the loader is doing. Meanwhile the interrupt goes on to fill the ring.
@@ -74,15 +71,14 @@ impl Loader {
             activity: Activity::Reading,
             loading: false,
             unreadable: false,
-            holds_sender: false,
-            line_begun: false,
+            voice: Voice::default(),
         };
-        loader.say(board, &format!("\r\n{}\r\n", version.header()));
+        loader.voice.say(board, &format!("\r\n{}\r\n", version.header()));
         if board.product.loader.asks_for_key {
-            loader.say(board, ANY_KEY);
+            loader.voice.say(board, ANY_KEY);
             loader.activity = Activity::AwaitingKey { until: may_leave.then(|| board.now + KEY_TIME) };
         } else {
-            loader.prompt(board);
+            loader.voice.prompt(board);
         }
         loader
     }
@@ -92,16 +88,15 @@ impl Loader {
         match self.activity {
             Activity::AwaitingKey { .. } => {
                 self.activity = Activity::Reading;
-                self.say(board, "\r\n");
-                self.prompt(board);
+                self.voice.say(board, "\r\n");
+                self.voice.prompt(board);
             }
             Activity::Leaving => {}
             Activity::Reading | Activity::Erasing { .. } | Activity::Programming | Activity::Complaining { .. } => {
                 self.ring.push(character);
                 // The interrupt looks for CR only, wherever in a record the reader may be.
-                if character == b'\r' && !self.holds_sender {
-                    self.holds_sender = true;
-                    board.uart.send(board.now, &[XOFF]);
+                if character == b'\r' {
+                    self.voice.hold(board);
                 }
                 self.read(board);
             }
@@ -138,7 +133,7 @@ impl Loader {
         }
         match self.activity {
             Activity::AwaitingKey { .. } => {
-                self.say(board, "\r\n");
+                self.voice.say(board, "\r\n");
                 self.activity = Activity::Leaving;
                 *board.reset = Some(Reset::Start);
             }
@@ -170,7 +165,7 @@ impl Loader {
 
     /// Whether the sender is stopped.
     pub fn holds_sender(&self) -> bool {
-        self.holds_sender
+        self.voice.holds_sender()
     }
 
     /// Reads the ring until it is empty or something has to be waited for.
@@ -181,15 +176,14 @@ impl Loader {
                 return;
             }
             let Some(character) = self.ring.pop() else {
-                self.let_go_on(board);
+                self.voice.let_go_on(board);
                 return;
             };
             match self.reader.take(character, self.loading) {
                 Ok(Read::Nothing) => {}
                 // As it comes: the loader does not look at what it echoes.
                 Ok(Read::Text(byte)) => {
-                    board.uart.send(board.now, &[byte]);
-                    self.line_begun = true;
+                    self.voice.echo(board, &[byte]);
                 }
                 Ok(Read::Words { address, words }) => self.program(board, address, words),
                 Ok(Read::End(kind)) => self.take(board, kind),
@@ -201,15 +195,14 @@ impl Loader {
     fn take(&mut self, board: &mut Board<'_>, kind: Kind) {
         match kind {
             Kind::Header => {
-                self.end_line(board);
+                self.voice.end_line(board);
                 self.loading = true;
                 // From here on only a complete file brings an application.
                 board.parameters.change(board.stores, |values| values.start_delay = StartDelay::WaitsForEver);
                 self.erase(board, 0);
             }
             Kind::Data => {
-                self.say(board, &board.product.loader.progress.to_string());
-                self.line_begun = true;
+                self.voice.mark(board);
             }
             Kind::Terminator(entry) if entry >= board.flash.map().program_words => {
                 self.fail(board, Fault::StartAddress);
@@ -245,10 +238,10 @@ impl Loader {
             values.start_delay = StartDelay::AtOnce;
             values.first_start = true;
         });
-        self.end_line(board);
+        self.voice.end_line(board);
         let loaded = board.product.console.loaded.as_deref().unwrap_or(LOADED);
-        self.say(board, &format!("{loaded}\r\n"));
-        self.let_go_on(board);
+        self.voice.say(board, &format!("{loaded}\r\n"));
+        self.voice.let_go_on(board);
         self.activity = Activity::Leaving;
         *board.reset = Some(Reset::Start);
     }
@@ -257,30 +250,10 @@ impl Loader {
     fn fail(&mut self, board: &mut Board<'_>, fault: Fault) {
         self.reader = Reader::new(self.version);
         self.loading = false;
-        self.end_line(board);
-        self.say(board, &format!("Error: {:04X}\r\n", fault.bit()));
-        self.prompt(board);
+        self.voice.end_line(board);
+        self.voice.say(board, &format!("Error: {:04X}\r\n", fault.bit()));
+        self.voice.prompt(board);
         self.activity = Activity::Complaining { until: board.uart.finished_at() };
-    }
-
-    fn let_go_on(&mut self, board: &mut Board<'_>) {
-        if std::mem::take(&mut self.holds_sender) {
-            board.uart.send(board.now, &[XON]);
-        }
-    }
-
-    fn prompt(&mut self, board: &mut Board<'_>) {
-        self.say(board, &format!("{}\r\n", board.product.console.loader_prompt));
-    }
-
-    fn end_line(&mut self, board: &mut Board<'_>) {
-        if std::mem::take(&mut self.line_begun) {
-            self.say(board, "\r\n");
-        }
-    }
-
-    fn say(&mut self, board: &mut Board<'_>, text: &str) {
-        board.uart.send(board.now, text.as_bytes());
     }
 }
 

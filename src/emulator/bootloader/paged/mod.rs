@@ -15,8 +15,8 @@ mod record;
 use std::collections::VecDeque;
 
 use super::super::memory::{Flash, StartDelay, Written};
-use super::super::uart::{XOFF, XON};
 use super::super::{Board, Reset};
+use super::voice::Voice;
 use crate::time::Instant;
 use profile::Ending;
 pub use profile::{G1, G2, Profile};
@@ -37,10 +37,7 @@ pub struct Loader {
     heard_at: Instant,
     /// Texts are leaving and nobody listens until then.
     deaf_until: Instant,
-    /// XOFF has been sent, XON not yet.
-    holds_sender: bool,
-    /// Dots have been printed on the last line.
-    line_begun: bool,
+    voice: Voice,
 }
 
 /// What the loader is doing.
@@ -98,12 +95,11 @@ impl Loader {
             load: None,
             heard_at: board.now,
             deaf_until: Instant::ZERO,
-            holds_sender: false,
-            line_begun: false,
+            voice: Voice::default(),
         };
-        loader.say(board, profile.header);
+        loader.voice.say(board, profile.header);
         loader.deaf_until = board.uart.finished_at();
-        loader.prompt(board);
+        loader.voice.prompt(board);
         loader
     }
 
@@ -167,7 +163,7 @@ impl Loader {
 
     /// Whether the sender is stopped.
     pub fn holds_sender(&self) -> bool {
-        self.holds_sender
+        self.voice.holds_sender()
     }
 
     fn take(&mut self, board: &mut Board<'_>, record: Record) {
@@ -189,7 +185,7 @@ impl Loader {
 
     /// From here on only a complete file brings the application back.
     fn begin(&mut self, board: &mut Board<'_>) {
-        self.let_go_on(board);
+        self.voice.let_go_on(board);
         self.activity = Activity::Listening;
         self.load = Some(Load::default());
         board.parameters.change(board.stores, |values| values.start_delay = StartDelay::WaitsForEver);
@@ -202,13 +198,11 @@ impl Loader {
             if let Some(rest) = self.fill_page(board, data) {
                 records.push_front(rest);
                 self.activity = Activity::AwaitingSilence(Then::TakeUp(records));
-                if !std::mem::replace(&mut self.holds_sender, true) {
-                    board.uart.send(board.now, &[XOFF]);
-                }
+                self.voice.hold(board);
                 return;
             }
         }
-        self.let_go_on(board);
+        self.voice.let_go_on(board);
     }
 
     /// Puts the words of a record into the page buffer. Gives those from where another page begins.
@@ -245,8 +239,7 @@ impl Loader {
     }
 
     fn written(&mut self, board: &mut Board<'_>, then: Then) {
-        self.say(board, &board.product.loader.progress.to_string());
-        self.line_begun = true;
+        self.voice.mark(board);
         self.go_on(board, then);
     }
 
@@ -254,7 +247,7 @@ impl Loader {
         match then {
             Then::TakeUp(parked) => self.collect(board, parked),
             Then::Finish(entry) => {
-                self.let_go_on(board);
+                self.voice.let_go_on(board);
                 self.finish(board, entry);
             }
         }
@@ -266,14 +259,14 @@ impl Loader {
             values.start_delay = StartDelay::AtOnce;
             values.first_start = true;
         });
-        self.end_line(board);
+        self.voice.end_line(board);
         match self.profile.ending {
             Ending::Counts => {
                 let (program, data) = (load.program_words, load.data_words);
-                self.say(board, &format!("Loaded 0x{program:04X} Program and 0x{data:04X} Data words.\r\n"));
-                self.say(board, "Application started.\r\n");
+                self.voice.say(board, &format!("Loaded 0x{program:04X} Program and 0x{data:04X} Data words.\r\n"));
+                self.voice.say(board, "Application started.\r\n");
             }
-            Ending::Address => self.say(board, &format!("Application started from address 0x{entry:04X}\r\n")),
+            Ending::Address => self.voice.say(board, &format!("Application started from address 0x{entry:04X}\r\n")),
         }
         self.activity = Activity::Leaving;
         *board.reset = Some(Reset::Start);
@@ -284,31 +277,11 @@ impl Loader {
         self.decoder = Decoder::new(self.profile.ignores);
         self.activity = Activity::Listening;
         self.load = None;
-        self.end_line(board);
-        self.say(board, &format!("Error # {:04}\r\nRestarting.\r\n", fault.number()));
+        self.voice.end_line(board);
+        self.voice.say(board, &format!("Error # {:04}\r\nRestarting.\r\n", fault.number()));
         self.deaf_until = board.uart.finished_at();
-        self.let_go_on(board);
-        self.prompt(board);
-    }
-
-    fn let_go_on(&mut self, board: &mut Board<'_>) {
-        if std::mem::take(&mut self.holds_sender) {
-            board.uart.send(board.now, &[XON]);
-        }
-    }
-
-    fn prompt(&mut self, board: &mut Board<'_>) {
-        self.say(board, &format!("{}\r\n", board.product.console.loader_prompt));
-    }
-
-    fn end_line(&mut self, board: &mut Board<'_>) {
-        if std::mem::take(&mut self.line_begun) {
-            self.say(board, "\r\n");
-        }
-    }
-
-    fn say(&mut self, board: &mut Board<'_>, text: &str) {
-        board.uart.send(board.now, text.as_bytes());
+        self.voice.let_go_on(board);
+        self.voice.prompt(board);
     }
 }
 
