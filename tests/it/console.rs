@@ -351,7 +351,7 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
     desk.run(Duration::from_secs(10)).keys("k");
     assert_eq!(desk.marks, ["mark 1"]);
     let told = desk.picture();
-    assert!(told.contains("Mark 1 is set at ") && told.contains(", in chart, recording and file."), "{told}");
+    assert!(told.contains("Mark 1 is set at ") && told.contains(", in chart and file."), "{told}");
     desk.press(KeyCode::Left).press(KeyCode::Left);
     let held = desk.picture();
     assert!(held.contains("held, End follows again"), "{held}");

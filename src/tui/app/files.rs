@@ -116,7 +116,12 @@ impl App {
         let at = at.unwrap_or(self.now).min(self.now);
         let mark = self.view.monitor.stream.mark(at);
         let text = marked(mark.number, self.now.since(at));
-        let places = if self.view.export.is_some() { "chart, recording and file" } else { "chart and recording" };
+        let places = match (self.view.link.recording.is_some(), self.view.export.is_some()) {
+            (true, true) => "chart, recording and file",
+            (true, false) => "chart and recording",
+            (false, true) => "chart and file",
+            (false, false) => "the chart",
+        };
         let time = format::time_of_day(self.start_of_day, at);
         self.view.tell(Tone::Quiet, format!("Mark {} is set at {time}, in {places}.", mark.number));
         self.scrollback.note(self.now, text.clone());

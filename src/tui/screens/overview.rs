@@ -201,14 +201,16 @@ fn is_current(scene: Scene) -> bool {
 /// The limits of one channel in a line, or how to see them.
 fn limits_line(scene: Scene, source: Source, channel: &str, has_columns: bool) -> Line<'static> {
     let (theme, view) = (scene.theme, scene.view);
+    let reads = |how: &str| if view.can_send() { format!("{how}V reads them") } else { String::new() };
     let text = match (view.current_dictionary(), view.limits(channel)) {
         _ if source != Source::FieldValue => return Line::default(),
         (None, _) if view.dictionary.is_some() => {
-            "  Limits: those read are from before the restart, V reads them again.".to_owned()
+            format!("  Limits: those read are from before the restart{}.", reads(", "))
         }
-        (None, _) => "  Limits: not read yet, V reads them.".to_owned(),
+        (None, _) => format!("  Limits: not read so far{}.", reads(", ")),
         (Some(read), _) if has_columns => {
-            format!("  Limits read {}; V reads them again.", format::time_of_day(scene.start_of_day, read.at))
+            let time = format::time_of_day(scene.start_of_day, read.at);
+            format!("  Limits read {time}{}.", reads("; "))
         }
         (Some(_), None) => format!("  {channel} has no limits."),
         (Some(read), Some(limits)) => {
