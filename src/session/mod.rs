@@ -22,6 +22,7 @@ mod transmitter;
 mod upload;
 
 pub use event::*;
+pub use upload::{LoadReport, Phase, Progress, UnitNow, Verdict};
 
 use std::collections::VecDeque;
 
