@@ -131,14 +131,31 @@ pub enum Job {
     SendFile,
 }
 
+impl Job {
+    /// What it is about, to follow "still" or "cancelled,".
+    pub fn doing(self) -> &'static str {
+        match self {
+            Job::Identify => "asking who is there",
+            Job::StreamOn => "switching the stream on",
+            Job::StreamOff => "switching the stream off",
+            Job::RestoreDefaults => "restoring the defaults",
+            Job::ReadDictionary => "reading the object dictionary",
+            Job::Diagnostics => "reading the diagnostics",
+            Job::Overhear => "listening",
+            Job::Load => "loading new software",
+            Job::SendFile => "sending a file",
+        }
+    }
+}
+
 /// Why a command was not taken. Nothing has been sent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// Another job runs.
-    #[error("busy with another job ({0:?})")]
+    #[error("axcon is still {}", .0.doing())]
     Busy(Job),
     /// The period is outside what the unit takes.
-    #[error("a repetition time of {0:?} is outside 1 ms to 60 s")]
+    #[error("a repetition time of {} ms is outside 1 ms to 60 s", .0.as_secs_f64() * 1000.0)]
     Period(Duration),
     /// The password is empty or holds a control character, which would end it early.
     #[error("the password is empty or holds a control character")]
@@ -405,4 +422,17 @@ pub enum UnitState {
     Application,
     /// The bootloader waits for a file.
     Loader,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_says_in_words_what_keeps_the_command_back() {
+        assert_eq!(Refusal::Busy(Job::ReadDictionary).to_string(), "axcon is still reading the object dictionary");
+        let period = |micros| Refusal::Period(Duration::from_micros(micros)).to_string();
+        assert_eq!(period(500), "a repetition time of 0.5 ms is outside 1 ms to 60 s");
+        assert_eq!(period(60_001_000), "a repetition time of 60001 ms is outside 1 ms to 60 s");
+    }
 }
