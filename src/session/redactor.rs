@@ -1,7 +1,7 @@
 //! Keeps the password out of the record wherever the unit repeats it.
 //!
-//! Behind the password's own prompt everything is secret up to the end of the line. This is for the rest: a unit that
-//! says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
+//! Behind the password's own prompt everything is secret up to the end of the line (`password.rs`). This is for the rest:
+//! a unit that says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
 //! next ones tell, for a moment at most: they are handed out when the line has been silent, or when flow control stands
 //! among them, which cannot wait. The password is looked for across either, so no more of it than its first three
 //! characters can be seen.
@@ -15,7 +15,7 @@ use crate::wire::{XOFF, XON};
 /// A password shorter than this is found in too much that has nothing to do with it, and so is its beginning.
 const SHORTEST: usize = 4;
 /// Longer ones are compared as far as this.
-const LONGEST: usize = 128;
+pub(super) const LONGEST: usize = 128;
 
 /// Finds one secret in a stream of bytes.
 #[derive(Default)]
@@ -50,11 +50,6 @@ impl Redactor {
             length += usize::from(secret[at] == secret[length]);
             self.fallback[at] = length;
         }
-    }
-
-    /// Whether there is nothing to look for.
-    pub(super) fn is_idle(&self) -> bool {
-        self.secret.is_empty()
     }
 
     /// Takes bytes and gives those whose nature is known, in their order.
@@ -190,9 +185,9 @@ mod tests {
     #[test]
     fn what_may_be_its_beginning_is_kept_back_and_given_once() {
         let mut redactor = Redactor::default();
-        assert!(redactor.is_idle() && !redactor.keeps_back());
+        assert!(!redactor.keeps_back());
         redactor.look_for(b"AXIO-2010");
-        assert!(!redactor.is_idle() && !redactor.keeps_back());
+        assert!(!redactor.keeps_back());
         assert_eq!(redactor.push(b"no AXI"), [(b"no ".to_vec(), Secrecy::Open)]);
         assert!(redactor.keeps_back());
         assert_eq!(redactor.flush(), [(b"AXI".to_vec(), Secrecy::Open)]);
