@@ -80,14 +80,6 @@ impl Pace {
         }
     }
 
-    /// Nothing is on its way any more.
-    pub(super) fn begin_again(&mut self) {
-        match self {
-            Pace::Pages(paging) => (paging.crossing, paging.header_passed) = (None, false),
-            Pace::Ring(ring) => *ring = Ring::default(),
-        }
-    }
-
     /// Since when a loader stops us that does so behind every record.
     pub(super) fn stopped_since(&self) -> Option<Instant> {
         match self {

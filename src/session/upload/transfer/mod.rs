@@ -195,11 +195,14 @@ impl Transfer {
         self.way.taken <= 1
     }
 
-    /// From the header on, as if nothing had been sent.
+    /// From the header on, as if nothing had been sent. What the loader has seemed to show of its pace so far it has not:
+    /// it was busy with something else, and its silence behind the header has perhaps made another kind of loader of it.
     pub(super) fn begin_again(&mut self) {
         self.start_over();
         (self.again, self.before) = (false, None);
-        self.pace.begin_again();
+        let (pacing, page_words) = self.believed;
+        self.pace = Pace::believed(pacing, page_words);
+        self.resize(believed_size(self.packed, pacing));
     }
 
     /// Everything once more from the header on, with no belief about pages.
