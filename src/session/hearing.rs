@@ -5,8 +5,9 @@
 use super::Session;
 use super::event::{Event, Job, Known, Origin, UnitState};
 use super::job::Signal;
+use super::redactor::Piece;
 use crate::endpoint::Secrecy;
-use crate::record::{Direction, REDACTED};
+use crate::record::Direction;
 use crate::time::{Duration, Instant};
 use crate::wire::{Confidence, Item, LoaderText, Message, NmtState, Prompt, Text};
 
@@ -16,9 +17,6 @@ const PROMPT_QUIET: Duration = Duration::from_millis(60);
 
 /// Bytes of a question for the password at most; what goes on longer is looked at when the unit has fallen silent.
 const LONGEST_PROMPT: usize = 200;
-
-/// How long bytes that may be the beginning of the password wait for the next ones.
-const ECHO_QUIET: Duration = Duration::from_millis(30);
 
 /// How long behind the question for the menu what comes is its answer.
 const MENU_ANSWER: Duration = Duration::from_millis(1500);
@@ -48,49 +46,27 @@ impl Session {
     pub(super) fn append(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
-            let (part, is_echo) = if self.echo_is_secret {
-                let end = rest.iter().position(|&byte| byte == b'\r' || byte == b'\n');
-                (&rest[..end.unwrap_or(rest.len())], true)
-            } else {
-                (rest, false)
-            };
-            if part.is_empty() {
-                self.echo_is_secret = false;
-                continue;
-            }
-            rest = &rest[part.len()..];
-            if is_echo {
-                self.hand_out_echo();
-                self.take_in(part, Secrecy::Secret);
-                continue;
-            }
-            if self.redactor.is_idle() {
-                self.take_in(part, Secrecy::Open);
-                continue;
-            }
-            for (bytes, secrecy) in self.redactor.push(part) {
-                self.take_in(&bytes, secrecy);
-            }
+            let pieces = self.password.take(&mut rest);
+            self.take_in(pieces);
         }
-        self.echo_due = self.redactor.keeps_back().then(|| self.now + ECHO_QUIET);
+        self.password.wait_for_more(self.now);
     }
 
     /// What looks like the beginning of the password has stood still for long enough.
     pub(super) fn hand_out_echo(&mut self) {
-        self.echo_due = None;
-        for (bytes, secrecy) in self.redactor.flush() {
-            self.take_in(&bytes, secrecy);
-        }
+        let pieces = self.password.hand_out();
+        self.take_in(pieces);
     }
 
-    fn take_in(&mut self, bytes: &[u8], secrecy: Secrecy) {
-        if secrecy == Secrecy::Secret {
-            let from = self.record.received();
-            let begins = if self.echo.1 == from { self.echo.0 } else { from };
-            self.echo = (begins, from + bytes.len() as u64);
+    fn take_in(&mut self, pieces: Vec<Piece>) {
+        for (bytes, secrecy) in pieces {
+            if secrecy == Secrecy::Secret {
+                let from = self.record.received();
+                self.password.received(from..from + bytes.len() as u64);
+            }
+            self.record.push(self.dated, Direction::FromUnit, secrecy, &bytes);
+            self.frame(&bytes);
         }
-        self.record.push(self.dated, Direction::FromUnit, secrecy, bytes);
-        self.frame(bytes);
     }
 
     fn frame(&mut self, bytes: &[u8]) {
@@ -112,22 +88,27 @@ impl Session {
                 && text.span.end > self.prompt.seen
                 && self.vocabulary.asks_password(&text.text)
         });
-        self.password_asked |= asks_password;
+        if asks_password {
+            self.password.question();
+        }
         self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);
     }
 
     /// A line is complete.
     fn line(&mut self, mut text: Text) {
         if self.recognises {
-            self.redactor.scrub(&mut text.text);
+            self.password.scrub(&mut text.text);
         }
-        let matters = self.password_asked || self.recognises;
+        let matters = self.password.is_asked() || self.recognises;
         let question = matters.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
         // Rows of the stream may go on while the unit waits for its password.
-        self.password_asked &= match question {
+        let still_asks = match question {
             Some((prompt, _)) => prompt == Prompt::Password,
-            None => self.password_asked && self.vocabulary.is_row(&text.text),
+            None => self.password.is_asked() && self.vocabulary.is_row(&text.text),
         };
+        if !still_asks {
+            self.password.question_over();
+        }
         if !self.recognises {
             return;
         }
@@ -135,7 +116,9 @@ impl Session {
             return;
         }
         if let Some((prompt, at)) = question {
-            self.password_asked |= prompt == Prompt::Password;
+            if prompt == Prompt::Password {
+                self.password.question();
+            }
             let row = Text { text: text.text.split_off(at), ..text.clone() };
             if !self.prompt.was(&text) {
                 self.hear_line(text, Message::Prompt(prompt));
@@ -147,7 +130,7 @@ impl Session {
     }
 
     fn hear_line(&mut self, mut text: Text, message: Message) {
-        self.conceal(&mut text);
+        self.password.conceal(&mut text);
         self.heard(text, message);
     }
 
@@ -155,13 +138,13 @@ impl Session {
     pub(super) fn look_at_prompt(&mut self) {
         self.prompt.due = None;
         let Some(mut text) = self.framer.pending() else { return };
-        self.redactor.scrub(&mut text.text);
+        self.password.scrub(&mut text.text);
         self.prompt.seen = text.span.end;
         let message = match self.vocabulary.prompt(&text.text) {
             Some(prompt) => Message::Prompt(prompt),
             None => self.understand(&text.text),
         };
-        self.conceal(&mut text);
+        self.password.conceal(&mut text);
         if message != Message::Text {
             self.prompt.heard = Some(text.clone());
             self.heard(text, message);
@@ -189,14 +172,6 @@ impl Session {
                 Message::Row(other.unwrap_or(row))
             }
             other => other,
-        }
-    }
-
-    /// Makes a text unreadable that may be an echo of the password, in whatever form the unit or the line gave it.
-    pub(super) fn conceal(&self, text: &mut Text) {
-        if text.span.start < self.echo.1 && self.echo.0 < text.span.end {
-            let star = |c: char| if c.is_whitespace() { c } else { char::from(REDACTED) };
-            text.text = text.text.chars().map(star).collect();
         }
     }
 

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::event::{Event, Facts, Outcome};
+use super::password::PasswordGuard;
 use super::transmitter::Transmitter;
 use crate::endpoint::{Secrecy, Transmit};
 use crate::time::Instant;
@@ -44,8 +45,8 @@ pub(super) struct Desk<'a> {
     pub(super) understood: bool,
     /// Bytes received so far: text that begins here or later is newer than this moment.
     pub(super) received: u64,
-    /// Set when secret bytes have been queued: what comes back until the next line end may echo them.
-    pub(super) echo_is_secret: &'a mut bool,
+    /// Is told when secret bytes have been queued.
+    pub(super) password: &'a mut PasswordGuard,
     /// What a job puts here goes out as if it were typed: a password among it is known by where it is asked for.
     pub(super) typed: Vec<u8>,
 }
@@ -62,7 +63,7 @@ impl Desk<'_> {
     pub(super) fn send_secret(&mut self, secret: &[u8]) {
         self.transmitter.push_piece(Transmit { bytes: secret.to_vec(), secrecy: Secrecy::Secret });
         self.transmitter.push_piece(Transmit::open(*b"\r"));
-        *self.echo_is_secret = true;
+        self.password.sent();
         self.cut = true;
     }
 

@@ -15,6 +15,7 @@ mod hearing;
 mod identify;
 mod job;
 mod overheard;
+mod password;
 mod redactor;
 mod sending;
 mod toggled;
@@ -22,10 +23,9 @@ mod transmitter;
 mod upload;
 
 pub use event::*;
+pub use upload::{LoadReport, Phase, Progress, UnitNow, Verdict};
 
 use std::collections::VecDeque;
-
-use zeroize::Zeroizing;
 
 use crate::device::Product;
 use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
@@ -36,7 +36,7 @@ use crate::wire::{Framer, Message, Vocabulary};
 use dialogue::Dialogue;
 use hearing::PromptWatch;
 use job::{Desk, Signal, Work};
-use redactor::Redactor;
+use password::PasswordGuard;
 use toggled::Toggled;
 use transmitter::Transmitter;
 
@@ -55,20 +55,8 @@ pub struct Session {
     queued: Option<Running>,
     events: VecDeque<Event>,
     prompt: PromptWatch,
-    /// The unit asks for the password: what is typed now is secret.
-    password_asked: bool,
-    /// A password has been typed or sent, and the unit may echo it: what comes is secret until its line ends.
-    echo_is_secret: bool,
-    /// L has been typed by hand: what follows up to Enter may be the password, even if the unit asks for it in words we
-    /// do not know.
-    load_key: bool,
-    /// What has been typed since the last Enter is no key of the menu.
-    typing_text: bool,
-    redactor: Redactor,
-    /// What has been typed by hand of the password so far.
-    typed_secret: Zeroizing<Vec<u8>>,
-    /// When bytes that the redactor keeps back are handed out.
-    echo_due: Option<Instant>,
+    /// What is secret of all that is typed and received.
+    password: PasswordGuard,
     /// It listens to a recording: nothing is ever sent.
     passive: bool,
     /// Lines are looked at for what they mean.
@@ -81,8 +69,6 @@ pub struct Session {
     toggled: Toggled,
     /// The line at hand was counted as one that nobody understands.
     counted: bool,
-    /// Where in what was received the last echo of a secret begins and ends.
-    echo: (u64, u64),
     /// What the stream was asked to send, or was last seen to.
     source: Option<Source>,
 }
@@ -115,20 +101,13 @@ impl Session {
             queued: None,
             events: VecDeque::new(),
             prompt: PromptWatch::default(),
-            password_asked: false,
-            echo_is_secret: false,
-            load_key: false,
-            typing_text: false,
-            redactor: Redactor::default(),
-            typed_secret: Zeroizing::default(),
-            echo_due: None,
+            password: PasswordGuard::default(),
             passive: false,
             recognises: true,
             menu_asked_at: None,
             dialogue: Dialogue::default(),
             toggled: Toggled::default(),
             counted: false,
-            echo: (0, 0),
             source: None,
         }
     }
@@ -207,7 +186,7 @@ impl Session {
                     if password.is_empty() || password.iter().any(u8::is_ascii_control) {
                         return Err(Refusal::Password);
                     }
-                    self.redactor.look_for(password);
+                    self.password.look_for(password);
                 }
                 (Job::Load, Box::new(upload::Upload::new(*order)))
             }
@@ -242,8 +221,7 @@ impl Session {
     pub fn link_back(&mut self, now: Instant) {
         self.now = self.now.max(now);
         self.transmitter.hold(now, false);
-        (self.password_asked, self.echo_is_secret) = (false, false);
-        (self.load_key, self.typing_text) = (false, false);
+        self.password.cut_off();
         self.cut_line();
     }
 
@@ -307,7 +285,7 @@ impl Session {
 
     /// Whether the unit is asking for the password: what is typed now is secret.
     pub fn password_open(&self) -> bool {
-        self.password_asked || self.echo_is_secret
+        self.password.is_open()
     }
 
     /// Whether a file can be sent as it is.
@@ -320,11 +298,6 @@ impl Session {
             () if self.held_since().is_some() && self.waiting() > 0 => Err(Refusal::Held),
             () => Ok(()),
         }
-    }
-
-    /// Whether all that was typed since the last Enter can be keys of the menu. An `l` in a word is none.
-    fn typed_menu_keys_only(&self, typed: &[u8]) -> bool {
-        !self.typing_text && typed.iter().all(|key| b"mvdtslx".contains(&key.to_ascii_lowercase()))
     }
 
     fn bytes(&mut self, bytes: &[u8]) -> Result<(), Refusal> {
@@ -344,39 +317,16 @@ impl Session {
 
     /// Queues keys; what is typed where the password is asked for is secret.
     fn type_in(&mut self, keys: &[u8]) -> Result<(), Refusal> {
-        for piece in keys.split_inclusive(|key| matches!(key, b'\r' | b'l' | b'L')) {
-            let secret = self.password_open() || self.load_key;
-            let (typed, enter) =
-                if piece.ends_with(b"\r") { piece.split_at(piece.len() - 1) } else { (piece, &[][..]) };
-            let secrecy = if secret { Secrecy::Secret } else { Secrecy::Open };
-            if !(self.transmitter.push_text(typed, secrecy) && self.transmitter.push_text(enter, Secrecy::Open)) {
+        for stroke in password::strokes(keys) {
+            let secrecy = self.password.secrecy_of_keys();
+            let queued = self.transmitter.push_text(stroke.keys, secrecy)
+                && self.transmitter.push_text(stroke.enter, Secrecy::Open);
+            if !queued {
                 return Err(Refusal::Held);
             }
-            if secret {
-                self.note_typed(typed, !enter.is_empty());
-            }
-            self.echo_is_secret |= secret && !typed.is_empty();
-            let is_load_key = matches!(typed.last(), Some(b'l' | b'L')) && self.typed_menu_keys_only(typed);
-            self.load_key = enter.is_empty() && (secret || is_load_key);
-            self.typing_text = enter.is_empty() && !self.typed_menu_keys_only(typed);
+            self.password.typed(&stroke);
         }
         Ok(())
-    }
-
-    /// Keeps what is typed where a password is wanted, to know it again should the unit repeat it.
-    fn note_typed(&mut self, typed: &[u8], entered: bool) {
-        for &key in typed {
-            match key {
-                0x08 | 0x7F => {
-                    self.typed_secret.pop();
-                }
-                _ => self.typed_secret.push(key),
-            }
-        }
-        if entered {
-            let typed = std::mem::take(&mut self.typed_secret);
-            self.redactor.look_for(&typed);
-        }
     }
 
     /// The time is `now`, also for what has been heard.
@@ -402,7 +352,7 @@ impl Session {
         let before = self.facts.clone();
         let pending = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric));
         let pending = pending.map(|mut text| {
-            self.conceal(&mut text);
+            self.password.conceal(&mut text);
             text
         });
         let mut desk = Desk {
@@ -414,7 +364,7 @@ impl Session {
             cut: false,
             understood: false,
             received: self.record.received(),
-            echo_is_secret: &mut self.echo_is_secret,
+            password: &mut self.password,
             typed: Vec::new(),
         };
         let outcome = running.work.handle(signal, &mut desk);
@@ -466,7 +416,7 @@ impl Endpoint for Session {
 
     fn handle_timeout(&mut self, now: Instant) {
         self.pass_to(now);
-        if self.echo_due.is_some_and(|due| due <= self.now) {
+        if self.password.due().is_some_and(|due| due <= self.now) {
             self.hand_out_echo();
         }
         if self.prompt.due.is_some_and(|due| due <= self.now) {
@@ -492,7 +442,7 @@ impl Endpoint for Session {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let job = self.running.as_ref().and_then(|running| running.work.deadline());
-        let ours = [self.prompt.due, self.echo_due, self.toggled.due(), self.transmitter.poll_timeout()];
+        let ours = [self.prompt.due, self.password.due(), self.toggled.due(), self.transmitter.poll_timeout()];
         ours.into_iter().chain([job]).flatten().min()
     }
 }

@@ -1,7 +1,7 @@
 //! Keeps the password out of the record wherever the unit repeats it.
 //!
-//! Behind the password's own prompt everything is secret up to the end of the line. This is for the rest: a unit that
-//! says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
+//! Behind the password's own prompt everything is secret up to the end of the line (`password.rs`). This is for the rest:
+//! a unit that says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
 //! next ones tell, for a moment at most: they are handed out when the line has been silent, or when flow control stands
 //! among them, which cannot wait. The password is looked for across either, so no more of it than its first three
 //! characters can be seen.
@@ -15,7 +15,7 @@ use crate::wire::{XOFF, XON};
 /// A password shorter than this is found in too much that has nothing to do with it, and so is its beginning.
 const SHORTEST: usize = 4;
 /// Longer ones are compared as far as this.
-const LONGEST: usize = 128;
+pub(super) const LONGEST: usize = 128;
 
 /// Finds one secret in a stream of bytes.
 #[derive(Default)]
@@ -27,19 +27,23 @@ pub(super) struct Redactor {
     matched: usize,
     /// How many of these have been handed out.
     told: usize,
+    /// What was kept back for the secret that was looked for before, and has not been handed out.
+    left: Pieces,
 }
 
 /// Bytes, and whether they are the secret.
 pub(super) type Piece = (Vec<u8>, Secrecy);
 
 impl Redactor {
-    /// Looks for this secret from now on.
+    /// Looks for this secret from now on. What is too short to be looked for, as an Enter alone is, leaves the one that
+    /// was looked for before.
     pub(super) fn look_for(&mut self, secret: &[u8]) {
         let secret = &secret[..secret.len().min(LONGEST)];
-        *self = Redactor::default();
-        if secret.len() < SHORTEST {
+        if secret.len() < SHORTEST || secret == self.secret.as_slice() {
             return;
         }
+        let left = Pieces(self.flush());
+        *self = Redactor { left, ..Redactor::default() };
         self.secret = Zeroizing::new(secret.to_vec());
         self.fallback = vec![0; secret.len()];
         let mut length = 0;
@@ -52,17 +56,13 @@ impl Redactor {
         }
     }
 
-    /// Whether there is nothing to look for.
-    pub(super) fn is_idle(&self) -> bool {
-        self.secret.is_empty()
-    }
-
     /// Takes bytes and gives those whose nature is known, in their order.
     pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<Piece> {
+        let mut pieces = std::mem::take(&mut self.left);
         if self.secret.is_empty() {
-            return vec![(bytes.to_vec(), Secrecy::Open)];
+            pieces.push(bytes, Secrecy::Open);
+            return pieces.0;
         }
-        let mut pieces = Pieces::default();
         for &byte in bytes {
             if matches!(byte, XON | XOFF) {
                 self.tell(&mut pieces);
@@ -91,12 +91,12 @@ impl Redactor {
 
     /// Whether bytes are kept back.
     pub(super) fn keeps_back(&self) -> bool {
-        self.matched > self.told
+        self.matched > self.told || !self.left.0.is_empty()
     }
 
     /// What was kept back: no more will come soon. If it does all the same, it is known as the rest.
     pub(super) fn flush(&mut self) -> Vec<Piece> {
-        let mut pieces = Pieces::default();
+        let mut pieces = std::mem::take(&mut self.left);
         self.tell(&mut pieces);
         pieces.0
     }
@@ -190,15 +190,33 @@ mod tests {
     #[test]
     fn what_may_be_its_beginning_is_kept_back_and_given_once() {
         let mut redactor = Redactor::default();
-        assert!(redactor.is_idle() && !redactor.keeps_back());
+        assert!(!redactor.keeps_back());
         redactor.look_for(b"AXIO-2010");
-        assert!(!redactor.is_idle() && !redactor.keeps_back());
+        assert!(!redactor.keeps_back());
         assert_eq!(redactor.push(b"no AXI"), [(b"no ".to_vec(), Secrecy::Open)]);
         assert!(redactor.keeps_back());
         assert_eq!(redactor.flush(), [(b"AXI".to_vec(), Secrecy::Open)]);
         assert!(!redactor.keeps_back());
         assert_eq!(redactor.flush(), []);
         assert_eq!(redactor.push(b"O-2010"), [(b"O-2010".to_vec(), Secrecy::Secret)], "the rest is known as such");
+    }
+
+    #[test]
+    fn another_secret_loses_nothing_that_was_kept_back_and_too_short_a_one_is_none() {
+        let mut redactor = Redactor::default();
+        redactor.look_for(b"AXIO-2010");
+        assert_eq!(redactor.push(b"AXIO"), []);
+        redactor.look_for(b"1234");
+        assert!(redactor.keeps_back());
+        let both =
+            [(b"AXIO".to_vec(), Secrecy::Secret), (b"-".to_vec(), Secrecy::Open), (b"1234".to_vec(), Secrecy::Secret)];
+        assert_eq!(redactor.push(b"-1234"), both);
+        assert_eq!(redactor.push(b"12"), []);
+        redactor.look_for(b"AXIO");
+        assert_eq!(redactor.flush(), [(b"12".to_vec(), Secrecy::Open)]);
+        redactor.look_for(b"");
+        redactor.look_for(b"x");
+        assert_eq!(redactor.push(b"AXIO"), [(b"AXIO".to_vec(), Secrecy::Secret)]);
     }
 
     #[test]

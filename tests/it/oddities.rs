@@ -288,6 +288,58 @@ fn an_answer_of_a_waiting_loader_that_comes_late_is_not_the_first_records() {
     assert_eq!(headers, 2, "it was sent anew");
 }
 
+#[test]
+fn silence_before_a_late_answer_says_nothing_of_how_the_loader_stops_its_sender() {
+    // It has a ring, and is found waiting. Its complaint of what it was asked comes when its silence behind the header has
+    // made another kind of loader of it; once it has begun anew it erases, and an adapter shows that late.
+    let (mut line, mut asked, mut headers) = (String::new(), 0, 0);
+    let complaint = "Error # 0002\r\nRestarting.\r\nWaiting for application S-Record.\r\n";
+    let unit = Odd::new(move |key| match key {
+        b'm' => said(complaint),
+        b'\r' => {
+            let record = std::mem::take(&mut line);
+            asked += u32::from(record.is_empty());
+            match record.get(..2) {
+                None if asked == 1 => vec![(1_600, complaint.into())],
+                Some("S7") => vec![
+                    (40, "\r\nAXRTD8CO V1.2.0\r\n".into()),
+                    (60, MENU.replace("AXTC4CO V1.1.0", "AXRTD8CO V1.2.0")),
+                ],
+                Some("S0") => {
+                    headers += 1;
+                    if headers == 1 {
+                        vec![(5, "*".into())]
+                    } else {
+                        vec![(200, "\u{13}".into()), (1_500, "\u{11}".into())]
+                    }
+                }
+                Some("S3") if headers == 2 => said("\u{13}\u{11}"),
+                _ => Vec::new(),
+            }
+        }
+        b'S' | b'0'..=b'9' | b'A'..=b'F' => {
+            line.push(key.into());
+            Vec::new()
+        }
+        _ => Vec::new(),
+    });
+    let mut bench = Visit::to(unit);
+    let order = LoadOrder { product: Some("AXRTD8CO".into()), packed: true, ..order(small_image("AXRTD8CO", "1.2.0")) };
+    let Outcome::Loaded(report) = bench.ask(Command::Load(Box::new(order))) else { panic!("an upload") };
+    assert_eq!(report.verdict, Verdict::Done, "{report:?}");
+    assert!(report.found_in_loader && report.remark.is_none(), "{report:?}");
+    let sent: Vec<(Instant, &[u8])> =
+        bench.session.record().entries().map(|entry| (entry.at, &entry.bytes[..])).collect();
+    let begins = |kind: &[u8]| sent.iter().filter(|(_, bytes)| bytes.starts_with(kind)).collect::<Vec<_>>();
+    let (headers, data) = (begins(b"S0"), begins(b"S3"));
+    let before = data.iter().filter(|(at, _)| *at < headers[1].0).count();
+    assert!(headers.len() == 2 && before > 0, "{} headers, {before} records before the second", headers.len());
+    let first = data[before].0.since(headers[1].0);
+    assert!(first >= Duration::from_millis(1_500), "data leaves for a loader that is erasing: {first:?}");
+    let longest = data[before..].iter().map(|(_, bytes)| bytes.len()).max();
+    assert!(longest < Some(300), "its ring keeps several of the records: {longest:?}");
+}
+
 /// A row of the stream, which comes so fast that the unit is never silent for long.
 const ROW: &str = "  23.500;  24.000;  24.000;  25.000; 100.125\r\n";
 

@@ -1,9 +1,9 @@
 //! The way into the loader: who is there and may have this image, L, the password, a key where one is wanted, the prompt.
 
-use super::super::event::{Facts, Outcome, UnitNow, UnitState, Verdict};
+use super::super::event::{Facts, Outcome, UnitState};
 use super::super::identify::Identify;
 use super::super::job::{Desk, Signal, Work};
-use super::{FILLER, Stage, Transfer, Unheard, Upload, shows_application};
+use super::{FILLER, Stage, Transfer, Unheard, UnitNow, Upload, Verdict, shows_application};
 use crate::device::{Product, longest_erase};
 use crate::time::{Duration, Instant};
 use crate::wire::{LoaderText, Message, Prompt};

@@ -10,14 +10,16 @@
 mod enter;
 mod pages;
 mod records;
+mod report;
 mod telling;
 mod transfer;
 mod under_way;
 mod verify;
 
+pub use report::{LoadReport, Phase, Progress, UnitNow, Verdict};
 pub(super) use telling::size;
 
-use super::event::{LoadOrder, Outcome, Phase, Progress, UnitNow, UnitState, Verdict};
+use super::event::{LoadOrder, Outcome, UnitState};
 use super::identify::Identify;
 use super::job::{Desk, Signal, Work};
 use crate::image::DefectId;

@@ -1,8 +1,8 @@
 //! What is told of an upload: its size beforehand, where it stands, and how it has ended.
 
-use super::super::event::{Event, LoadOrder, LoadReport, Outcome, Phase, Progress, UnitNow, Verdict};
+use super::super::event::{Event, LoadOrder, Outcome};
 use super::super::job::Desk;
-use super::{Stage, Upload, records, transfer};
+use super::{LoadReport, Phase, Progress, Stage, UnitNow, Upload, Verdict, records, transfer};
 use crate::device::{LoaderKind, Pacing, Product};
 use crate::time::Duration;
 use crate::wire::{Message, Text, visible};

@@ -1,11 +1,11 @@
 //! Records on their way: what is heard meanwhile, when the next ones wait for it, and what a failure makes of the unit.
 
-use super::super::event::{Outcome, UnitNow, Verdict};
+use super::super::event::Outcome;
 use super::super::flaw::Flaw;
 use super::super::job::Desk;
 use super::transfer::Stall;
 use super::verify::NEW_BANNER;
-use super::{Again, Stage, Unheard, Upload, records, shows_application};
+use super::{Again, Stage, Unheard, UnitNow, Upload, Verdict, records, shows_application};
 use crate::time::{Duration, Instant};
 use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text};
 

@@ -1,10 +1,10 @@
 //! Behind the end record: what comes back has to say that it is what was sent.
 
-use super::super::event::{Outcome, Phase, UnitNow, Verdict};
+use super::super::event::Outcome;
 use super::super::flaw::Flaw;
 use super::super::identify::Identify;
 use super::super::job::{Desk, Signal, Work};
-use super::{Stage, Upload};
+use super::{Phase, Stage, UnitNow, Upload, Verdict};
 use crate::time::Duration;
 use crate::version::Version;
 use crate::wire::{Confidence, LoaderText, Message, Prompt};

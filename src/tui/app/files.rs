@@ -10,7 +10,7 @@ use crate::tui::input::{Effect, FIRST_BYTES, Failure, FileEntry, ImageFacts};
 use crate::tui::picker::{begins_like_an_image, is_image_name};
 use crate::tui::popup::{Popup, Purpose, Question};
 use crate::tui::screens::dictionary::other_product;
-use crate::tui::view::{Export, Sending, Tone, doing, marked};
+use crate::tui::view::{Export, Sending, Tone, marked};
 use crate::tui::visible;
 use crate::tui::widgets::format;
 use crate::wire::stream::Row;
@@ -74,7 +74,7 @@ impl App {
         let job = self.view.job.filter(|job| *job != Job::Identify);
         let refusal = self.session.as_ref().and_then(|session| session.may_send_file().err());
         let why = match (job, refusal) {
-            (Some(job), _) => format!("axcon is still {}. A file goes alone", doing(job)),
+            (Some(job), _) => format!("axcon is still {}. A file goes alone", job.doing()),
             (None, Some(refusal)) => refusal.to_string(),
             (None, None) => return true,
         };

@@ -32,7 +32,7 @@ use super::screens::stream::Stream;
 use super::screens::terminal::Terminal;
 use super::screens::{Scene, ScreenId};
 use super::theme::{Palette, Theme};
-use super::view::{LinkState, Tone, View, doing};
+use super::view::{LinkState, Tone, View};
 use super::widgets::lines;
 use crate::endpoint::Endpoint;
 use crate::monitor::Scrollback;
@@ -539,7 +539,7 @@ impl App {
                 true
             }
             Err(Refusal::Busy(job)) => {
-                self.view.tell(Tone::Bad, format!("Not sent: axcon is still {}.", doing(job)));
+                self.view.tell(Tone::Bad, format!("Not sent: axcon is still {}.", job.doing()));
                 false
             }
             Err(refusal) => {

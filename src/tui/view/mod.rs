@@ -435,16 +435,16 @@ impl View {
             }
             Outcome::NoAnswer { awaited, .. } => self.tell(Tone::Bad, format!("No answer: {awaited}.")),
             Outcome::Refused { job, reason, .. } => {
-                self.tell(Tone::Bad, format!("The unit refused, {}: {reason}", doing(*job)));
+                self.tell(Tone::Bad, format!("The unit refused, {}: {reason}", job.doing()));
             }
             Outcome::Cancelled(Job::StreamOn) if self.facts.stream.is_some() => {
                 self.tell(Tone::Quiet, "The stream is switched on; its first row has not come yet.");
             }
             Outcome::Cancelled(job) if matches!(self.link.state, LinkState::Lost(_)) => {
-                self.tell(Tone::Bad, format!("The link was lost, {}.", doing(*job)));
+                self.tell(Tone::Bad, format!("The link was lost, {}.", job.doing()));
             }
             Outcome::Cancelled(Job::Diagnostics) => self.tell(Tone::Quiet, done(Job::Diagnostics)),
-            Outcome::Cancelled(job) => self.tell(Tone::Quiet, format!("Cancelled, {}.", doing(*job))),
+            Outcome::Cancelled(job) => self.tell(Tone::Quiet, format!("Cancelled, {}.", job.doing())),
             Outcome::FileSent { sent, total, end } => self.file_sent(*sent, *total, *end),
             Outcome::Loaded(report) => {
                 self.load.progress = None;
@@ -524,21 +524,6 @@ impl View {
 
 /// What is told of a unit that says nothing, until it says something.
 const NOBODY: &str = "Nobody has answered: check power, cable and port.";
-
-/// What a job was about, to follow "Cancelled,".
-pub fn doing(job: Job) -> &'static str {
-    match job {
-        Job::Identify => "asking who is there",
-        Job::StreamOn => "switching the stream on",
-        Job::StreamOff => "switching the stream off",
-        Job::RestoreDefaults => "restoring the defaults",
-        Job::ReadDictionary => "reading the object dictionary",
-        Job::Diagnostics => "reading the diagnostics",
-        Job::Overhear => "listening",
-        Job::Load => "loading new software",
-        Job::SendFile => "sending a file",
-    }
-}
 
 fn done(job: Job) -> &'static str {
     match job {

@@ -1,0 +1,354 @@
+//! Keeps the password to the line: decides which bytes are secret, of those that are typed and of those that come.
+//!
+//! It knows the password from three sides, and none of them needs the others:
+//! - *The question.* As long as the unit asks for the password, what is typed is secret. The session hears the question
+//!   and its end; rows of the stream that go on meanwhile are no end.
+//! - *The keys.* Behind an L of the menu what follows up to Enter may be the password, even if the unit asks for it in
+//!   words that nobody knows; and a password that has been begun is one up to its Enter, whatever becomes of the question.
+//! - *The answers.* What comes behind a secret that was typed or sent may be its echo, in whatever form, up to the end of
+//!   the line. Wherever else the unit repeats it, the [`Redactor`] finds it.
+//!
+//! What holds whatever happens:
+//! - What has been called secret is never called open later, and nothing that is typed or received is lost by being secret.
+//! - A limit makes more secret, never less: what is typed beyond [`LONGEST`] is as secret as what is before it.
+//! - It has no `Debug`, so that nothing that holds it can be printed with the password in it.
+
+use std::ops::Range;
+
+use zeroize::Zeroizing;
+
+use super::redactor::{LONGEST, Piece, Redactor};
+use crate::endpoint::Secrecy;
+use crate::record::REDACTED;
+use crate::time::{Duration, Instant};
+use crate::wire::Text;
+
+/// How long bytes that may be the beginning of the password wait for the next ones.
+const ECHO_QUIET: Duration = Duration::from_millis(30);
+
+/// What is secret in a conversation with a unit.
+#[derive(Default)]
+pub(super) struct PasswordGuard {
+    /// The unit asks for the password.
+    asked: bool,
+    /// A password has been typed or sent, and the unit may echo it: what comes is secret until its line ends.
+    echoes: bool,
+    typed: Typed,
+    redactor: Redactor,
+    /// When bytes that the redactor keeps back are handed out.
+    due: Option<Instant>,
+    /// Where in what was received the last secret lies.
+    received: Range<u64>,
+}
+
+/// What has been typed by hand since the last Enter.
+#[derive(Default)]
+enum Typed {
+    /// Nothing but what can be keys of the menu; an `l` among them would have been the last.
+    #[default]
+    MenuKeys,
+    /// Words of some kind: an `l` in them is no key.
+    Text,
+    /// What may be a password: it goes on up to Enter.
+    Secret(TypedSecret),
+}
+
+/// A part of what was typed, which is secret or open as a whole.
+pub(super) struct Stroke<'a> {
+    /// The keys.
+    pub(super) keys: &'a [u8],
+    /// The Enter behind them, or nothing. It is never secret.
+    pub(super) enter: &'a [u8],
+}
+
+/// What was typed in parts: Enter ends a password, and behind an L begins what may be one.
+pub(super) fn strokes(typed: &[u8]) -> impl Iterator<Item = Stroke<'_>> {
+    typed.split_inclusive(|key| matches!(key, b'\r' | b'l' | b'L')).map(|part| {
+        let (keys, enter) = part.split_at(part.len() - usize::from(part.ends_with(b"\r")));
+        Stroke { keys, enter }
+    })
+}
+
+impl PasswordGuard {
+    /// This is the password: wherever the unit repeats it, it is secret.
+    pub(super) fn look_for(&mut self, secret: &[u8]) {
+        self.redactor.look_for(secret);
+    }
+
+    /// The unit asks for the password.
+    pub(super) fn question(&mut self) {
+        self.asked = true;
+    }
+
+    /// It has gone on to something else.
+    pub(super) fn question_over(&mut self) {
+        self.asked = false;
+    }
+
+    /// Whether it asks.
+    pub(super) fn is_asked(&self) -> bool {
+        self.asked
+    }
+
+    /// Whether a password is in the air: the unit asks, or may be echoing one.
+    pub(super) fn is_open(&self) -> bool {
+        self.asked || self.echoes
+    }
+
+    /// The conversation was cut off: nothing that was under way in it goes on. What is looked for stays.
+    pub(super) fn cut_off(&mut self) {
+        (self.asked, self.echoes, self.typed) = (false, false, Typed::MenuKeys);
+    }
+
+    /// What the next keys are that are typed by hand.
+    pub(super) fn secrecy_of_keys(&self) -> Secrecy {
+        let is_secret = self.is_open() || matches!(self.typed, Typed::Secret(_));
+        if is_secret { Secrecy::Secret } else { Secrecy::Open }
+    }
+
+    /// These keys have been typed; what they are was [asked](PasswordGuard::secrecy_of_keys) before.
+    pub(super) fn typed(&mut self, stroke: &Stroke<'_>) {
+        let mut typed = std::mem::take(&mut self.typed);
+        if self.is_open() && !matches!(typed, Typed::Secret(_)) {
+            typed = Typed::Secret(TypedSecret::new());
+        }
+        self.typed = match typed {
+            Typed::Secret(mut secret) => {
+                secret.type_in(stroke.keys);
+                self.echoes |= !stroke.keys.is_empty();
+                if !stroke.enter.is_empty() {
+                    self.redactor.look_for(&secret.kept);
+                }
+                Typed::Secret(secret)
+            }
+            // An `l` in a word is no key.
+            Typed::MenuKeys if stroke.keys.iter().all(|key| b"mvdtslx".contains(&key.to_ascii_lowercase())) => {
+                match stroke.keys.last() {
+                    Some(b'l' | b'L') => Typed::Secret(TypedSecret::new()),
+                    Some(_) | None => Typed::MenuKeys,
+                }
+            }
+            Typed::MenuKeys | Typed::Text => Typed::Text,
+        };
+        if !stroke.enter.is_empty() {
+            self.typed = Typed::MenuKeys;
+        }
+    }
+
+    /// A secret has been queued by a job: what comes back until the next line end may echo it.
+    pub(super) fn sent(&mut self) {
+        self.echoes = true;
+    }
+
+    /// Takes some of the bytes that have come and gives those whose nature is known, in their order. To be called until
+    /// none are left: each time what was given has been looked at first, since a job may answer to it with a secret.
+    pub(super) fn take(&mut self, bytes: &mut &[u8]) -> Vec<Piece> {
+        let is_line_end = |byte: &u8| matches!(byte, b'\r' | b'\n');
+        if self.echoes && bytes.first().is_some_and(is_line_end) {
+            self.echoes = false;
+        }
+        if !self.echoes {
+            return self.redactor.push(std::mem::take(bytes));
+        }
+        let end = bytes.iter().position(is_line_end).unwrap_or(bytes.len());
+        let (echo, rest) = bytes.split_at(end);
+        *bytes = rest;
+        let mut pieces = self.hand_out();
+        pieces.push((echo.to_vec(), Secrecy::Secret));
+        pieces
+    }
+
+    /// All that has come has been taken: what is kept back waits for a moment from now on.
+    pub(super) fn wait_for_more(&mut self, now: Instant) {
+        self.due = self.redactor.keeps_back().then(|| now + ECHO_QUIET);
+    }
+
+    /// When what is kept back is to be [handed out](PasswordGuard::hand_out).
+    pub(super) fn due(&self) -> Option<Instant> {
+        self.due
+    }
+
+    /// What looked like the beginning of the password has stood still for long enough.
+    pub(super) fn hand_out(&mut self) -> Vec<Piece> {
+        self.due = None;
+        self.redactor.flush()
+    }
+
+    /// Secret bytes lie here in what was received. Those that follow upon each other are one echo.
+    pub(super) fn received(&mut self, secret: Range<u64>) {
+        let begins = if self.received.end == secret.start { self.received.start } else { secret.start };
+        self.received = begins..secret.end;
+    }
+
+    /// Makes a text unreadable that may be an echo of the password, in whatever form the unit or the line gave it.
+    pub(super) fn conceal(&self, text: &mut Text) {
+        if text.span.start < self.received.end && self.received.start < text.span.end {
+            let star = |c: char| if c.is_whitespace() { c } else { char::from(REDACTED) };
+            text.text = text.text.chars().map(star).collect();
+        }
+    }
+
+    /// Replaces the password in a text.
+    pub(super) fn scrub(&self, text: &mut String) {
+        self.redactor.scrub(text);
+    }
+}
+
+/// What has been typed of a password by hand, as the unit has it: with what was taken back taken back.
+///
+/// It keeps as much as is ever compared. Of the rest it only counts the keys, so that taking back works; they are as
+/// secret as the others, and no memory grows by somebody who leans on a key where the unit asks.
+struct TypedSecret {
+    kept: Zeroizing<Vec<u8>>,
+    /// How many more have been typed.
+    beyond: usize,
+}
+
+impl TypedSecret {
+    fn new() -> Self {
+        // With its room from the beginning: a vector that grows leaves copies behind that nobody wipes.
+        TypedSecret { kept: Zeroizing::new(Vec::with_capacity(LONGEST)), beyond: 0 }
+    }
+
+    fn type_in(&mut self, keys: &[u8]) {
+        for &key in keys {
+            match key {
+                0x08 | 0x7F if self.beyond > 0 => self.beyond -= 1,
+                0x08 | 0x7F => {
+                    self.kept.pop();
+                }
+                _ if self.kept.len() < LONGEST => self.kept.push(key),
+                _ => self.beyond += 1,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Span;
+
+    /// Types it, and gives what of it is secret as stars.
+    fn type_in(guard: &mut PasswordGuard, typed: &str) -> String {
+        let mut shown = String::new();
+        for stroke in strokes(typed.as_bytes()) {
+            let open = guard.secrecy_of_keys() == Secrecy::Open;
+            shown.extend(stroke.keys.iter().map(|&key| char::from(if open { key } else { REDACTED })));
+            shown.extend(stroke.enter.iter().map(|_| '/'));
+            guard.typed(&stroke);
+        }
+        shown
+    }
+
+    /// What is left of what comes, in one piece.
+    fn hear(guard: &mut PasswordGuard, said: &str) -> String {
+        let mut bytes = said.as_bytes();
+        let mut pieces = Vec::new();
+        while !bytes.is_empty() {
+            pieces.extend(guard.take(&mut bytes));
+        }
+        guard.wait_for_more(Instant::ZERO);
+        shown(pieces)
+    }
+
+    fn shown(pieces: Vec<Piece>) -> String {
+        let bytes = pieces.into_iter().flat_map(|(bytes, secrecy)| {
+            bytes.into_iter().map(move |byte| if secrecy == Secrecy::Open { byte } else { REDACTED })
+        });
+        bytes.map(char::from).collect()
+    }
+
+    #[test]
+    fn behind_an_l_of_the_menu_all_is_secret_up_to_enter_and_an_l_in_a_word_is_none() {
+        for (typed, expected) in [
+            ("mlAXIO-2010\rm", "ml*********/*"),
+            ("L\rm", "L/m"),
+            ("hello\rlx\r", "hello/l*/"),
+            ("ml l\r", "ml**/"),
+            ("vll\r", "vl*/"),
+            ("all\rm", "all/m"),
+        ] {
+            assert_eq!(type_in(&mut PasswordGuard::default(), typed), expected, "{typed:?}");
+        }
+        // One key at a time is the same.
+        let mut guard = PasswordGuard::default();
+        let shown: String = "mlAX\r".chars().map(|key| type_in(&mut guard, &key.to_string())).collect();
+        assert_eq!(shown, "ml**/");
+        assert!(guard.is_open(), "it may be echoed");
+        assert_eq!(hear(&mut guard, "AX\r\nV"), "**\r\nV");
+        assert!(!guard.is_open());
+    }
+
+    #[test]
+    fn what_is_typed_at_the_question_is_secret_and_stays_so_when_the_question_is_over() {
+        let mut guard = PasswordGuard::default();
+        assert_eq!(type_in(&mut guard, "he"), "he");
+        guard.question();
+        assert!(guard.is_asked() && guard.is_open());
+        assert_eq!(type_in(&mut guard, "AXI"), "***");
+        guard.question_over();
+        assert_eq!(hear(&mut guard, "\r\n"), "\r\n");
+        assert!(!guard.is_open());
+        assert_eq!(type_in(&mut guard, "O-2010\rm"), "******/*", "the rest of it, and what its echo may be among");
+        assert_eq!(hear(&mut guard, "\r\nAXIO-2010!"), "\r\n*********!");
+    }
+
+    #[test]
+    fn an_echo_is_secret_in_any_form_up_to_the_end_of_its_line() {
+        let mut guard = PasswordGuard::default();
+        guard.look_for(b"AXIO-2010");
+        assert_eq!(hear(&mut guard, "so AXIO-2010, and AX"), "so *********, and ");
+        guard.sent();
+        assert_eq!(hear(&mut guard, "io"), "AX**", "what was kept back comes first");
+        assert_eq!(hear(&mut guard, "-2010 ok"), "********");
+        assert_eq!(hear(&mut guard, "\rok"), "\rok");
+    }
+
+    #[test]
+    fn what_may_be_its_beginning_is_due_in_a_moment() {
+        let mut guard = PasswordGuard::default();
+        guard.look_for(b"AXIO-2010");
+        assert_eq!((hear(&mut guard, "no AXI").as_str(), guard.due()), ("no ", Some(Instant::ZERO + ECHO_QUIET)));
+        assert_eq!((shown(guard.hand_out()).as_str(), guard.due()), ("AXI", None));
+    }
+
+    #[test]
+    fn beyond_what_is_compared_all_is_secret_still_and_can_be_taken_back() {
+        let mut guard = PasswordGuard::default();
+        let long = "x".repeat(LONGEST + 900);
+        assert_eq!(type_in(&mut guard, &format!("l{long}")), format!("l{}", "*".repeat(long.len())));
+        let Typed::Secret(secret) = &guard.typed else { panic!("it goes on") };
+        assert_eq!((secret.kept.len(), secret.beyond), (LONGEST, 900));
+        // All but four are taken back, among them those that were only counted.
+        type_in(&mut guard, &format!("{}\r", "\x08".repeat(long.len() - 4)));
+        assert_eq!(hear(&mut guard, "\r\nwas xxxx?"), "\r\nwas ****?");
+        // Not taken back, it is found as far as it is compared.
+        let mut guard = PasswordGuard::default();
+        type_in(&mut guard, &format!("l{long}\r"));
+        assert_eq!(hear(&mut guard, &format!("\r\n{}!", "x".repeat(LONGEST))), format!("\r\n{}!", "*".repeat(LONGEST)));
+    }
+
+    #[test]
+    fn what_was_under_way_when_the_link_was_lost_is_no_part_of_the_next_password() {
+        let mut guard = PasswordGuard::default();
+        type_in(&mut guard, "lAXI");
+        guard.cut_off();
+        assert!(!guard.is_open());
+        assert_eq!(type_in(&mut guard, "mlAXIO-2010\r"), "ml*********/");
+        assert_eq!(hear(&mut guard, "\r\nAXIO-2010"), "\r\n*********", "and not AXIAXIO-2010");
+    }
+
+    #[test]
+    fn a_text_that_touches_an_echo_is_concealed() {
+        let mut guard = PasswordGuard::default();
+        guard.received(10..14);
+        guard.received(14..18);
+        for (start, end, expected) in [(0, 10, "a b"), (17, 30, "* *"), (18, 30, "a b"), (0, 40, "* *"), (9, 11, "* *")]
+        {
+            let mut text = Text { text: "a b".into(), span: Span { start, end } };
+            guard.conceal(&mut text);
+            assert_eq!(text.text, expected, "{start}..{end}");
+        }
+    }
+}

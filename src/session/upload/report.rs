@@ -1,0 +1,256 @@
+//! What an upload says of itself: where it stands, and how it has ended, with what is to be done then.
+//!
+//! The words of a report are for whoever has to act on it and cannot see the unit; the evidence for them is gathered in
+//! `telling.rs`. Nothing here decides anything.
+
+use crate::image::DefectId;
+use crate::time::Duration;
+use crate::version::Version;
+
+/// Where an upload stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// What is being done.
+    pub phase: Phase,
+    /// Records the unit must have taken, header and terminator included.
+    pub records: usize,
+    /// Records in all.
+    pub records_total: usize,
+    /// Characters the unit must have taken.
+    pub bytes: usize,
+    /// Characters in all.
+    pub bytes_total: usize,
+    /// Program address of the record last sent, in the image's unit.
+    pub address: u32,
+    /// Time since the first record left.
+    pub elapsed: Duration,
+    /// Time since the unit had taken the first data: behind the header a loader may erase for ten seconds, which says
+    /// nothing of how fast it takes data.
+    pub moving: Duration,
+    /// Characters it has taken since then.
+    pub moved: usize,
+    /// How long the unit has held us by XOFF, if it does.
+    pub held: Option<Duration>,
+    /// Everything is being sent once more: the loader has shown that it had lost something. The counts are those of this
+    /// time, and begin at 0.
+    pub again: bool,
+}
+
+impl Progress {
+    /// Characters a second since the first data; 0 before.
+    pub fn rate(&self) -> f64 {
+        let seconds = self.moving.as_secs_f64();
+        if seconds > 0.0 { self.moved as f64 / seconds } else { 0.0 }
+    }
+
+    /// Time until all characters have been taken, where that can be told.
+    pub fn eta(&self) -> Option<Duration> {
+        let rest = self.bytes_total.saturating_sub(self.bytes) as f64;
+        let rate = self.rate();
+        // Less than a character a second is a unit that holds us: nobody knows for how long.
+        (rate >= 1.0).then(|| Duration::from_secs_f64(rest / rate))
+    }
+}
+
+/// Steps of an upload, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Phase {
+    /// Finding out who is there and whether the image is for it.
+    Check,
+    /// Asking for the loader: L, password, reset.
+    EnterLoader,
+    /// The loader erases; only loaders that do so at once.
+    Erase,
+    /// Records are on their way.
+    Transfer,
+    /// The terminator is out, the loader has to say how it went.
+    Finish,
+    /// The unit restarts; its banner has to name the image's product and version.
+    Verify,
+}
+
+/// How an upload ended, what is true of the unit now, and on what evidence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadReport {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// How far it came.
+    pub phase: Phase,
+    /// What is at the other end now.
+    pub unit: UnitNow,
+    /// It was waiting in its loader when it was found: what software it has was not known before either.
+    pub found_in_loader: bool,
+    /// Product, as far as known.
+    pub product: Option<String>,
+    /// Version before, if the unit said it.
+    pub version_before: Option<Version>,
+    /// Version after, from the new banner only.
+    pub version_after: Option<Version>,
+    /// Records sent, header and terminator included.
+    pub records: usize,
+    /// Records in all.
+    pub records_total: usize,
+    /// Address of the data record last sent, in the image's unit.
+    pub address: Option<u32>,
+    /// From the first record to the end.
+    pub duration: Duration,
+    /// What happened, in one sentence.
+    pub what: String,
+    /// The text the verdict rests on, as printed (control characters made visible), shortened.
+    pub heard: String,
+    /// What speaks against the image for this unit, if that is why it was refused; it can be allowed by this name.
+    pub misfit: Option<DefectId>,
+    /// What the loader has shown to be otherwise than believed, in one sentence.
+    pub remark: Option<String>,
+}
+
+impl LoadReport {
+    /// What whoever started it should do now, by what is true of the unit; to follow other words.
+    pub fn advice(&self) -> &'static str {
+        match (self.verdict, self.unit) {
+            (Verdict::Done, _) => "nothing: the unit runs what was sent",
+            (Verdict::WrongApplication, _) => {
+                "do not put the unit into service: compare its version with the file's and send the right one; if it \
+                 comes out the same, keep the recording"
+            }
+            (Verdict::Refused, _) if self.product.is_none() => {
+                "look at the label of the unit and say which product it is"
+            }
+            (Verdict::Refused, _) if self.misfit == Some(DefectId::Downgrade) => {
+                "nothing was changed: take newer software, unless the old one is wanted"
+            }
+            (Verdict::Refused, _) => "nothing was changed: take the file that is made for this unit",
+            (Verdict::UnitRefused, UnitNow::Application) => {
+                "the unit runs what it ran: check the password, capital and small letters count, and try again"
+            }
+            (Verdict::NoAnswer, _) => "nothing was changed: look at power, cable and port, then try again",
+            (_, UnitNow::Loader) if self.records == 0 && self.found_in_loader => {
+                "nothing was sent: the unit waits in its loader, as it was found; send the file"
+            }
+            (_, UnitNow::Loader) if self.records == 0 => {
+                "nothing was sent: the unit waits in its loader with the software it had; send the file, or switch the \
+                 unit off and on"
+            }
+            (_, UnitNow::Loader) if self.phase == Phase::Finish && self.records == self.records_total => {
+                "the unit waits in its loader: send a file that is made for it; 'axcon image info' says what this one is"
+            }
+            (_, UnitNow::Loader) => {
+                "keep the unit powered and send the file again: it waits in its loader and has no complete software; a \
+                 power cycle does no harm, it comes back to the loader"
+            }
+            (_, UnitNow::Application) => "the unit runs its software: nothing was changed, try again",
+            (_, UnitNow::Unknown) => {
+                "switch the unit off and on, then send again: what it says at power-up tells whether software runs or a \
+                 loader waits"
+            }
+        }
+    }
+}
+
+/// Verdict on an upload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The unit runs the image: its new banner says so.
+    Done,
+    /// Refused before anything was changed: wrong product, or product unknown.
+    Refused,
+    /// The unit refused: wrong password, or it did not leave the menu.
+    UnitRefused,
+    /// Nobody answered; nothing was sent but the question.
+    NoAnswer,
+    /// The upload failed.
+    Failed,
+    /// The unit runs, but its banner names another product or version than the image.
+    WrongApplication,
+    /// Cancelled.
+    Interrupted,
+}
+
+/// What a unit is after an upload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnitNow {
+    /// The application runs.
+    Application,
+    /// It waits in its loader for a file.
+    Loader,
+    /// Nobody can say.
+    Unknown,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(verdict: Verdict, unit: UnitNow, records: usize) -> LoadReport {
+        LoadReport {
+            verdict,
+            phase: Phase::Transfer,
+            unit,
+            product: Some("AXTC4CO".into()),
+            version_before: None,
+            version_after: None,
+            records,
+            records_total: 3074,
+            address: None,
+            duration: Duration::ZERO,
+            what: String::new(),
+            heard: String::new(),
+            found_in_loader: false,
+            misfit: None,
+            remark: None,
+        }
+    }
+
+    #[test]
+    fn before_anything_was_sent_nobody_is_told_that_the_software_is_gone() {
+        let early = report(Verdict::Interrupted, UnitNow::Loader, 0).advice();
+        assert!(early.starts_with("nothing was sent") && !early.contains("no complete software"), "{early}");
+        let late = report(Verdict::Interrupted, UnitNow::Loader, 1).advice();
+        assert!(late.contains("no complete software"), "{late}");
+    }
+
+    #[test]
+    fn each_end_of_an_upload_has_advice_that_fits_it() {
+        let advice = |report: LoadReport| report.advice().split([':', ';']).next().unwrap_or_default().to_owned();
+        let refused = || report(Verdict::Refused, UnitNow::Application, 0);
+        assert_eq!(
+            advice(LoadReport { product: None, ..refused() }),
+            "look at the label of the unit and say which product it is"
+        );
+        let older = LoadReport { misfit: Some(DefectId::Downgrade), ..refused() };
+        assert!(older.advice().contains("take newer software"), "{}", older.advice());
+        assert!(refused().advice().contains("made for this unit"), "{}", refused().advice());
+        let waits = |records, phase, found_in_loader| {
+            LoadReport { phase, found_in_loader, ..report(Verdict::Failed, UnitNow::Loader, records) }.advice()
+        };
+        assert!(waits(0, Phase::Transfer, true).contains("as it was found"));
+        assert!(waits(0, Phase::Transfer, false).contains("with the software it had"));
+        assert!(waits(3074, Phase::Finish, false).contains("send a file that is made for it"));
+        for (records, phase, found) in
+            [(1, Phase::Transfer, true), (3073, Phase::Finish, false), (3074, Phase::Transfer, false)]
+        {
+            assert!(waits(records, phase, found).contains("no complete software"), "{records} {phase:?}");
+        }
+    }
+
+    #[test]
+    fn the_time_left_counts_from_the_first_data_and_not_from_the_erasing_before_it() {
+        let mut progress = Progress {
+            phase: Phase::Transfer,
+            records: 1,
+            records_total: 101,
+            bytes: 20,
+            bytes_total: 10_020,
+            address: 0,
+            elapsed: Duration::from_secs(10),
+            moving: Duration::ZERO,
+            moved: 0,
+            held: None,
+            again: false,
+        };
+        assert_eq!((progress.rate(), progress.eta()), (0.0, None));
+        progress = Progress { bytes: 5_020, elapsed: Duration::from_secs(15), ..progress };
+        progress = Progress { moving: Duration::from_secs(5), moved: 5_000, ..progress };
+        assert_eq!((progress.rate(), progress.eta()), (1000.0, Some(Duration::from_secs(5))));
+    }
+}
