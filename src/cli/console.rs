@@ -78,7 +78,7 @@ fn failure(error: &CliError) -> Failure {
 
 fn check(path: PathBuf, loader: Option<LoaderKind>, allow: &[DefectId]) -> Result<ImageFacts, String> {
     let report = image_cli::read_for(&path, &image_cli::targets_with(loader), None, allow);
-    report.map(|report| ImageFacts::of_report(path, &report, allow)).map_err(|error| error.to_string())
+    report.map(|report| ImageFacts::of_report(path, &report, loader, allow)).map_err(|error| error.to_string())
 }
 
 /// The console says what it notes; that a note could not be written costs a question later, no more.

@@ -361,14 +361,14 @@ pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Fac
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Span;
 
     #[test]
     fn what_is_measured_and_shown_as_nothing_is_no_reading() {
         let product = Product::named("AXTC4CO").expect("built in");
         let facts = Facts::default();
         let at = ObjectAddress::new(0x6100, 1);
-        let read = |value| ReadEntry { at, value, text: "TC1 0xFFFFFFFF".into(), span: Span::default(), known: true };
+        let read =
+            |value| ReadEntry { at, value, text: "TC1 0xFFFFFFFF".into(), span: Default::default(), known: true };
         let dump = |value| {
             let entries = vec![read(value)];
             Dump::of(&DictionaryReading { entries, complete: true, unrecognised_lines: 0 }, Some(product), &facts)

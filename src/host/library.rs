@@ -49,8 +49,9 @@ pub fn list(folder: &Path) -> io::Result<Vec<Listed>> {
 
 /// One recording, wherever it lies; `None` for what cannot be read as one.
 pub fn look(path: PathBuf) -> Option<Listed> {
+    // To open anything but a plain file, a pipe without a writer for example, may wait for ever.
+    let bytes = fs::metadata(&path).ok().filter(fs::Metadata::is_file)?.len();
     let header = Recording::open(&path).ok()?.header().clone();
-    let bytes = fs::metadata(&path).ok()?.len();
     let length = length(&path).ok().flatten();
     Some(Listed { path, header, length, bytes })
 }

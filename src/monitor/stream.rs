@@ -114,6 +114,11 @@ impl Stream {
         if !same {
             let marks = std::mem::take(&mut self.marks);
             *self = Stream { source: Some(row.source), marks, set: self.set, ..Stream::default() };
+            let is_gone = |fault: &&mut Fault| fault.until.is_none() && !names.contains(&fault.channel);
+            for fault in faults.iter_mut().filter(is_gone) {
+                // Nobody will say any more that it is over.
+                fault.until = Some(at);
+            }
             self.channels = names.into_iter().map(Channel::new).collect();
         }
         let interrupted = std::mem::take(&mut self.interrupted);
@@ -141,7 +146,7 @@ impl Stream {
     }
 
     /// The time between rows that was set, where that is known.
-    pub fn set_period_known(&self) -> Option<Duration> {
+    pub fn period_set(&self) -> Option<Duration> {
         self.set
     }
 
@@ -359,6 +364,18 @@ mod tests {
         let at = Instant::from_millis(millis);
         let row = Row { source: Source::FieldValue, readings: readings.to_vec() };
         monitor.fold(&Event::Row { at, span: Span::default(), row }, None);
+    }
+
+    #[test]
+    fn a_fault_of_a_channel_that_is_gone_is_not_there_for_ever() {
+        let mut monitor = Monitor::default();
+        row(&mut monitor, 1000, with_first(Reading::Open));
+        let fewer = Row { source: Source::FieldValue, readings: vec![Reading::Value(1.0)] };
+        let at = Instant::from_millis(2000);
+        monitor.fold(&Event::Row { at, span: Span::default(), row: fewer }, None);
+        let names: Vec<_> = monitor.stream.channels.iter().map(|channel| channel.name.clone()).collect();
+        let fault = &monitor.faults[0];
+        assert!(fault.until.is_some(), "{fault:?} beside {names:?}");
     }
 
     fn with_first(reading: Reading) -> [Reading; 5] {

@@ -307,6 +307,17 @@ pub enum FileKind {
     File,
 }
 
+/// What is to be sent of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Amount {
+    /// Records, header and terminator included.
+    pub records: usize,
+    /// Characters.
+    pub characters: usize,
+    /// What sending them takes, roughly.
+    pub time: Duration,
+}
+
 /// What reading and checking an image file brought.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageFacts {
@@ -318,27 +329,24 @@ pub struct ImageFacts {
     pub product: Option<String>,
     /// Version the image says it is.
     pub version: Option<Version>,
-    /// Records that will be sent, header and terminator included.
-    pub records: usize,
-    /// Characters that will be sent.
-    pub characters: usize,
-    /// What sending them takes, roughly.
-    pub time: Duration,
+    /// What is sent of the file as it is.
+    pub own: Amount,
+    /// What is sent if it is packed, as long as the loader keeps up with that.
+    pub packed: Amount,
     /// Every defect in one line each, errors first: `line 12, column 43: ...`.
     pub defects: Vec<String>,
     /// Which errors stand, each once.
     pub errors: Vec<DefectId>,
     /// Errors in spite of which it may be sent, because the user says so.
     pub allowed: Vec<DefectId>,
-    /// Records and characters that will be sent if they are packed, as long as the loader keeps up with them.
-    pub packed: (usize, usize),
     /// The image itself, if it may be sent.
     pub checked: Option<CheckedImage>,
 }
 
 impl ImageFacts {
-    /// What a check has found that allowed these errors; the others come first.
-    pub fn of_report(path: PathBuf, report: &Report, allow: &[DefectId]) -> Self {
+    /// What a check for units with this loader, or with the one their product has, has found that allowed these errors; the
+    /// others come first.
+    pub fn of_report(path: PathBuf, report: &Report, loader: Option<LoaderKind>, allow: &[DefectId]) -> Self {
         let identity = report.facts.identity.as_ref();
         let mut errors: Vec<DefectId> = Vec::new();
         for defect in report.defects.iter().filter(|defect| defect.severity == Severity::Error) {
@@ -370,23 +378,25 @@ impl ImageFacts {
             defects.push(format!("{} more defects are not listed", report.unlisted()));
         }
         let image = report.image().filter(|_| ok);
-        let packed = image.clone().map_or((0, 0), |image| {
-            let order = LoadOrder { packed: true, ..LoadOrder::new(image, None) };
+        let amount = |records, characters| {
+            let time = device::transfer_time(characters as u64, report.facts.data_bytes);
+            Amount { records, characters, time }
+        };
+        let packed = image.clone().map_or(Amount::default(), |image| {
+            let order = LoadOrder { packed: true, loader, ..LoadOrder::new(image, None) };
             let beginning = order.at_its_beginning();
-            (beginning.records_total, beginning.bytes_total)
+            amount(beginning.records_total, beginning.bytes_total)
         });
         ImageFacts {
             path,
             ok,
             product: identity.map(|identity| identity.product.clone()),
             version: identity.map(|identity| identity.version),
-            records: report.facts.records as usize,
-            characters: report.facts.characters as usize,
-            time: device::transfer_time(report.facts.characters, report.facts.data_bytes),
+            own: amount(report.facts.records as usize, report.facts.characters as usize),
+            packed,
             defects,
             errors,
             allowed: allow.to_vec(),
-            packed,
             checked: image,
         }
     }

@@ -129,7 +129,7 @@ impl Desk {
                     let targets: Vec<_> = Product::all().iter().map(target).collect();
                     let file = self.file(&path).unwrap_or_else(new_image);
                     let report = axcon::image::check(file.as_slice(), None, &targets, None, &allow).expect("a slice");
-                    self.input(Input::ImageChecked(Box::new(ImageFacts::of_report(path, &report, &allow))));
+                    self.input(Input::ImageChecked(Box::new(ImageFacts::of_report(path, &report, loader, &allow))));
                 }
                 Effect::Quit => self.over = true,
                 Effect::CreateFile { path, bytes } => {

@@ -24,7 +24,7 @@ fn a_newcomer_sees_the_scanner_talk_and_leaves_in_order() {
     let overview = screen.wait("1.1.0 (");
     assert!(overview.contains("AXTC4CO") && overview.contains("application runs"), "{overview}");
     assert!(overview.contains("M menu  V view  D defaults  T stream  S diagnostics  L load"), "{overview}");
-    screen.wait("Press T to switch it on.");
+    screen.wait("Press T to switch its stream on.");
     screen.keys("t");
     screen.wait("Switch the data stream on");
     screen.keys("\x7f\x7f\x7f\x7f200\r");

@@ -39,6 +39,7 @@ struct ProgressObject<'a> {
     rate: f64,
     eta_s: Option<f64>,
     held_s: Option<f64>,
+    again: bool,
 }
 
 /// Characters of the bar at most, and so few that it shows nothing.
@@ -102,6 +103,7 @@ impl Meter {
             rate: progress.rate().round(),
             eta_s: progress.eta().map(|eta| (eta.as_secs_f64() * 10.0).round() / 10.0),
             held_s: progress.held.map(|held| held.as_secs_f64()),
+            again: progress.again,
         }
     }
 }
@@ -127,7 +129,8 @@ fn text(progress: &Progress, columns: usize) -> String {
         None => {}
     }
     members.extend(progress.eta().map(|eta| format!("{:.0} s left", eta.as_secs_f64())));
-    let (phase, members) = (phase_name(progress.phase), members.join(" "));
+    let once_more = if progress.again { " again" } else { "" };
+    let (phase, members) = (format!("{}{once_more}", phase_name(progress.phase)), members.join(" "));
     let room = columns.saturating_sub(1);
     let bar = room.saturating_sub(phase.len() + members.len() + " [] ".len()).min(LONGEST_BAR);
     let line = if bar < SHORTEST_BAR {

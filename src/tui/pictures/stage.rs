@@ -344,7 +344,7 @@ pub(super) fn good_image() -> ImageFacts {
     let file = make::make(&recipe).expect("an image of the usual size");
     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
     let report = crate::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
-    ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report, &[])
+    ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report, None, &[])
 }
 
 /// What the checker says of a file that is sound but for not saying what it is; these errors are allowed.
@@ -354,7 +354,7 @@ pub(super) fn nameless_image(allow: &[DefectId]) -> ImageFacts {
     let file = make::make(&recipe).expect("a small image");
     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
     let report = crate::image::check(file.as_slice(), None, &targets, None, allow).expect("a slice");
-    ImageFacts::of_report("/home/service/images/no-identity.elf.S".into(), &report, allow)
+    ImageFacts::of_report("/home/service/images/no-identity.elf.S".into(), &report, None, allow)
 }
 
 /// A page of diagnostics of a unit with eight channels, the first of them shorted.
@@ -387,7 +387,7 @@ pub(super) fn bad_image() -> ImageFacts {
     let file: String = text.lines().take(2000).enumerate().map(spoil).collect();
     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
     let report = crate::image::check(file.as_bytes(), None, &targets, None, &[]).expect("a slice");
-    ImageFacts::of_report("/home/service/images/bad.S".into(), &report, &[])
+    ImageFacts::of_report("/home/service/images/bad.S".into(), &report, None, &[])
 }
 
 pub(super) fn progress() -> Progress {

@@ -309,7 +309,8 @@ impl Question {
     /// Asks what the stream shall send; what it has sent last is suggested.
     pub fn stream(view: &View) -> Question {
         let stream = &view.monitor.stream;
-        let millis = stream.set_period_known().map_or(USUAL_PERIOD_MS, |period| period.as_millis() as u64);
+        let millis =
+            stream.period_set().or(view.last_period).map_or(USUAL_PERIOD_MS, |period| period.as_millis() as u64);
         Question::Stream {
             source: stream.source.unwrap_or(Source::FieldValue),
             millis: TextField::new(millis.to_string()),

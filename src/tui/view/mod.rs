@@ -49,6 +49,8 @@ pub struct View {
     is_cut_off: bool,
     /// The repetition time that the stream was asked for and has not confirmed yet.
     pub wanted_period: Option<Duration>,
+    /// The repetition time that the stream was last switched on with, also once it is off.
+    pub last_period: Option<Duration>,
     /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
     pub viewing: bool,
     /// When the unit said last which CANopen state it is in: it says so on request, and changes it without a word.
@@ -283,7 +285,8 @@ impl View {
     pub fn begin_unit(&mut self) {
         self.monitor = Monitor::default();
         (self.dictionary, self.entries_read, self.serial) = (None, 0, None);
-        (self.wanted_period, self.viewing, self.stream_is_off) = (None, false, false);
+        (self.wanted_period, self.last_period) = (None, None);
+        (self.viewing, self.stream_is_off) = (false, false);
         self.load.product_unknown = false;
     }
 
@@ -421,13 +424,15 @@ impl View {
             Outcome::Identified => self.identified(),
             // The end of a recording is told by whoever has read it, with its reason.
             Outcome::Done(Job::Overhear) => {}
-            Outcome::StreamRuns { was_on: true } => {
-                self.monitor.stream.set_period(self.wanted_period.take());
-                self.tell(Tone::Good, "The stream was on already and now sends what you asked for.");
-            }
-            Outcome::StreamRuns { was_on: false } => {
-                self.monitor.stream.set_period(self.wanted_period.take());
-                self.tell(Tone::Good, done(Job::StreamOn));
+            Outcome::StreamRuns { was_on } => {
+                let period = self.wanted_period.take();
+                self.last_period = period.or(self.last_period);
+                self.monitor.stream.set_period(period);
+                let text = match was_on {
+                    true => "The stream was on already and now sends what you asked for.",
+                    false => done(Job::StreamOn),
+                };
+                self.tell(Tone::Good, text);
             }
             Outcome::Done(job) => {
                 if matches!(job, Job::StreamOff | Job::RestoreDefaults) {

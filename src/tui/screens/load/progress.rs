@@ -69,6 +69,7 @@ fn gauge_and_numbers(scene: Scene, progress: &Progress, columns: usize) -> Vec<L
         ),
         None => Span::raw("free"),
     };
+    let again = if progress.again { ": once more, the loader had lost something" } else { "" };
     let of = |part: usize, whole: usize| format!("{} of {}", format::grouped(part), format::grouped(whole));
     vec![
         Line::from(vec![
@@ -78,7 +79,7 @@ fn gauge_and_numbers(scene: Scene, progress: &Progress, columns: usize) -> Vec<L
             Span::styled(format!("  {:>3.0} %", (share * 100.0).floor()), theme.strong()),
         ]),
         Line::default(),
-        lines::labelled(theme, "Records", of(progress.records, progress.records_total)),
+        lines::labelled(theme, "Records", of(progress.records, progress.records_total) + again),
         lines::labelled(theme, "Characters", of(progress.bytes, progress.bytes_total)),
         lines::labelled(
             theme,

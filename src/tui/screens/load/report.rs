@@ -10,7 +10,7 @@ use crate::device::{LoaderKind, Product};
 use crate::image::{DefectId, Misfit};
 use crate::session::UnitState;
 use crate::time::Duration;
-use crate::tui::input::ImageFacts;
+use crate::tui::input::{Amount, ImageFacts};
 use crate::tui::screens::Scene;
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
@@ -97,12 +97,16 @@ pub(super) fn report(
     rows
 }
 
-/// What will be sent: the file's own records, or the same words in long ones.
+/// What will be sent: the file's own records, or the same words in others.
+fn amount(facts: &ImageFacts, packed: bool) -> Amount {
+    if packed && facts.ok { facts.packed } else { facts.own }
+}
+
 fn to_send(facts: &ImageFacts, packed: bool) -> String {
-    let (records, characters) = if packed && facts.ok { facts.packed } else { (facts.records, facts.characters) };
+    let Amount { records, characters, .. } = amount(facts, packed);
     let told = format!("{} records, {} characters", format::grouped(records), format::grouped(characters));
     match packed {
-        true if facts.ok => format!("{told}, packed from {}", format::grouped(facts.characters)),
+        true if facts.ok => format!("{told}, packed from {}", format::grouped(facts.own.characters)),
         _ => told,
     }
 }
@@ -176,8 +180,9 @@ fn plan(
     let mut rows = vec![lines::rule(theme, columns, "Plan", "")];
     let product =
         facts.product.as_deref().map_or("the right product".into(), |name| format!("an {}", visible::text(name)));
-    let time = format::minutes(Duration::from_secs_f64(facts.time.as_secs_f64().ceil()));
-    let sent = format::grouped(facts.characters);
+    let Amount { characters, time, .. } = amount(facts, packed);
+    let time = format::minutes(Duration::from_secs_f64(time.as_secs_f64().ceil()));
+    let records = if packed { ", in records of another length" } else { "" };
     let expected = match (&facts.product, facts.version) {
         (Some(product), Some(version)) => format!("name {} {version}", visible::text(product)),
         _ => "name what the file holds".into(),
@@ -189,12 +194,10 @@ fn plan(
                 UnitState::Loader => "Send neither L nor a password: the unit waits in its loader already.".into(),
                 _ => "Send L and the password; the unit resets into its loader.".into(),
             },
-            match packed {
-                false => format!("Send {sent} characters: some {time} with what the loader needs."),
-                true => {
-                    format!("Send {} characters, in long records: less than {time}.", format::grouped(facts.packed.1))
-                }
-            },
+            format!(
+                "Send {} characters{records}: some {time} with what the loader needs.",
+                format::grouped(characters)
+            ),
             format!("Wait for the banner of the new software: it must {expected}."),
         ];
         let numbered = steps.into_iter().enumerate();
