@@ -151,6 +151,8 @@ impl Pages {
             Message::Row(_) => return,
             Message::MenuKey(_) | Message::Prompt(_) => {
                 self.is_mixed |= self.block.due().is_some();
+                // The titles of a menu are taken back by whoever knows that it has come.
+                self.counted = 0;
                 return;
             }
             // No page says the name: the unit has started anew, and shows none any more.
@@ -178,7 +180,9 @@ impl Pages {
             self.begun_on = self.switched_on;
             (self.is_mixed, self.pressed, self.counted) = (false, self.is_soon_behind_switch(desk.now), 0);
         }
-        self.is_mixed |= self.other_key_at.is_some_and(|at| desk.now <= at + ANSWER);
+        // What answers a key before the S is out by the time the S is answered.
+        let is_newer = |at: Instant| self.switched_at.is_none_or(|switched| switched < at);
+        self.is_mixed |= self.other_key_at.is_some_and(|at| desk.now <= at + ANSWER && is_newer(at));
         self.counted += u64::from(desk.counted);
         self.block.line(text, desk.now);
         match diagnostics::switch(&text.text).filter(|_| self.is_soon_behind_switch(desk.now)) {

@@ -42,6 +42,8 @@ impl Session {
         let is_due = self.watching_due().is_some_and(|due| due <= self.now);
         match saw {
             Saw::Tick if !is_due => return,
+            // Of what a flood is made of nothing is on a page.
+            Saw::Heard(_, Message::Row(_)) => return,
             // An entry of the view is no line of a page.
             Saw::Heard(..) if self.job() == Some(Job::ReadDictionary) => return,
             _ => {}
