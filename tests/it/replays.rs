@@ -482,6 +482,8 @@ fn a_recording_of_an_upload_ends_with_what_the_unit_was_then() {
     bench.run_for(Duration::from_secs(4));
     bench.ask(Command::Identify);
     let read = dictionary(&mut bench);
+    // Nobody presses the next key while the menu is still coming.
+    bench.run_for(Duration::from_secs(1));
     typed(&mut bench, "s");
     bench.run_for(Duration::from_secs(3));
     bench.command(Command::Load(Box::new(order(small_image("AXTC4CO", "1.2.0")))));
