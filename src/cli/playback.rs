@@ -76,7 +76,8 @@ impl Playback {
                 (None, Some(Piece::Bytes { direction: Direction::ToUnit, bytes, .. })) => {
                     session.handle_sent(then, &bytes);
                 }
-                (None, Some(Piece::Header(_) | Piece::Mark { .. }) | None) => {}
+                (None, Some(Piece::Mark { text, .. })) => session.handle_mark(then, &text),
+                (None, Some(Piece::Header(_)) | None) => {}
             }
         }
     }

@@ -120,8 +120,11 @@ impl Findings {
     fn fold(&mut self, session: &Session, event: &Event) {
         let product = session.facts().product.as_ref().and_then(|known| Product::named(&known.value));
         self.monitor.fold(event, product);
-        if let Event::Overheard(reading) = event {
-            self.reading = Some((**reading).clone());
+        if let Event::Overheard { reading, .. } = event {
+            // What was broken off later does not undo what was read to its end.
+            if reading.complete || self.reading.as_ref().is_none_or(|before| !before.complete) {
+                self.reading = Some((**reading).clone());
+            }
         }
     }
 

@@ -34,7 +34,7 @@ impl Monitor {
             Event::Page { at, lines } => self.diagnostics.page(*at, lines),
             Event::Heard { .. }
             | Event::EntriesRead(_)
-            | Event::Overheard(_)
+            | Event::Overheard { .. }
             | Event::FactsChanged
             | Event::Held(_)
             | Event::Progress(_)

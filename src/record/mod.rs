@@ -69,6 +69,12 @@ pub struct Entry {
 /// What stands in the record for a secret byte.
 pub const REDACTED: u8 = b'*';
 
+/// What a recording notes when the link is lost.
+pub const LINK_LOST: &str = "link lost";
+
+/// How the note begins that it is back; the name of its port follows.
+pub const LINK_BACK: &str = "link back as ";
+
 /// Memory kept at most: hours of ordinary talk, seconds of a flood.
 pub const KEPT_BYTES: usize = 8 << 20;
 

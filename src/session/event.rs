@@ -45,6 +45,8 @@ pub enum Command {
         /// How many.
         pages: Option<u32>,
     },
+    /// Stop pages of diagnostics that come, whoever has asked for them.
+    DiagnosticsOff,
     /// In a recording: understand all that goes by, as it goes by. A dictionary that was walked through is told of by
     /// [`Event::Overheard`], as often as that happened.
     Overhear,
@@ -121,7 +123,7 @@ pub enum Job {
     RestoreDefaults,
     /// [`Command::ReadDictionary`].
     ReadDictionary,
-    /// [`Command::Diagnostics`].
+    /// [`Command::Diagnostics`], [`Command::DiagnosticsOff`].
     Diagnostics,
     /// [`Command::Overhear`].
     Overhear,
@@ -204,8 +206,13 @@ pub enum Event {
         /// Its lines, as printed.
         lines: Vec<Text>,
     },
-    /// In a recording: somebody has walked through the object dictionary.
-    Overheard(Box<DictionaryReading>),
+    /// In a recording: somebody has walked through the object dictionary, to its end or not.
+    Overheard {
+        /// When its last entry came.
+        at: Instant,
+        /// What was read.
+        reading: Box<DictionaryReading>,
+    },
     /// What is known of the unit has changed: see `Session::facts`.
     FactsChanged,
     /// The unit has stopped us (XOFF) or lets us go on (XON).
@@ -372,6 +379,8 @@ pub struct Facts {
     pub nmt_state: Option<Known<String>>,
     /// Whether the stream runs, and with what.
     pub stream: Option<Source>,
+    /// Whether pages of diagnostics come, whoever has asked for them, and where the first sign of that lies.
+    pub diagnostics: Option<Span>,
     /// Lines that no recogniser understood and that answer no key: titles of the menu, questions, pages and the view are
     /// none.
     pub unrecognised_lines: u64,

@@ -6,6 +6,7 @@ use super::Session;
 use super::event::{Event, Job, Known, Origin, UnitState};
 use super::job::Signal;
 use super::redactor::Piece;
+use super::watching::Saw;
 use crate::endpoint::Secrecy;
 use crate::record::Direction;
 use crate::time::{Duration, Instant};
@@ -19,7 +20,7 @@ const PROMPT_QUIET: Duration = Duration::from_millis(60);
 const LONGEST_PROMPT: usize = 200;
 
 /// How long behind the question for the menu what comes is its answer.
-const MENU_ANSWER: Duration = Duration::from_millis(1500);
+pub(super) const MENU_ANSWER: Duration = Duration::from_millis(1500);
 
 /// Watches for text without a line end behind which the unit falls silent.
 #[derive(Debug, Default)]
@@ -198,6 +199,7 @@ impl Session {
             _ => Event::Heard { at: self.dated, span: text.span, message: message.clone() },
         });
         self.signal(Signal::Heard(&text, &message));
+        self.watch(Saw::Heard(&text, &message));
     }
 
     /// Folds a message into the facts.
@@ -208,9 +210,11 @@ impl Session {
         // What comes in a dialogue is no banner, but for those that end with a reset.
         let talks = matches!(self.job(), Some(Job::Identify | Job::ReadDictionary | Job::StreamOn | Job::StreamOff));
         let asked = asked || talks;
-        let pages = self.job() == Some(Job::Diagnostics) || self.dialogue.shows_pages(self.dated);
+        let come = self.facts.diagnostics.is_some();
+        let pages = self.job() == Some(Job::Diagnostics) || self.dialogue.shows_pages(self.dated) || (come && !asked);
         let origin = if asked { Origin::Menu } else { Origin::Banner };
-        self.counted = *message == Message::Text && !self.dialogue.owns(self.dated, &text.text);
+        let is_page = come && self.pages.owns(&text.text);
+        self.counted = *message == Message::Text && !is_page && !self.dialogue.owns(self.dated, &text.text);
         let identifies = self.job() == Some(Job::Identify);
         let facts = &mut self.facts;
         // Who is asked for right now is decided when all of the answer has come.

@@ -43,6 +43,8 @@ pub(super) struct Desk<'a> {
     pub(super) cut: bool,
     /// Set when the job has read something from what it was told, and no recogniser had.
     pub(super) understood: bool,
+    /// What it is told of has been counted as a line that nobody understands.
+    pub(super) counted: bool,
     /// Bytes received so far: text that begins here or later is newer than this moment.
     pub(super) received: u64,
     /// Is told when secret bytes have been queued.

@@ -15,12 +15,14 @@ mod hearing;
 mod identify;
 mod job;
 mod overheard;
+mod pages;
 mod password;
 mod redactor;
 mod sending;
 mod toggled;
 mod transmitter;
 mod upload;
+mod watching;
 
 pub use event::*;
 pub use upload::{LoadReport, Phase, Progress, UnitNow, Verdict};
@@ -29,16 +31,18 @@ use std::collections::VecDeque;
 
 use crate::device::Product;
 use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
-use crate::record::{Direction, Record};
+use crate::record::{Direction, LINK_BACK, LINK_LOST, Record};
 use crate::time::{Duration, Instant, character_time};
 use crate::wire::stream::Source;
 use crate::wire::{Framer, Message, Vocabulary};
 use dialogue::Dialogue;
 use hearing::PromptWatch;
 use job::{Desk, Signal, Work};
+use pages::Pages;
 use password::PasswordGuard;
 use toggled::Toggled;
 use transmitter::Transmitter;
+use watching::Saw;
 
 /// A conversation with one unit.
 pub struct Session {
@@ -67,6 +71,8 @@ pub struct Session {
     dialogue: Dialogue,
     /// Whether the stream is still on.
     toggled: Toggled,
+    /// Pages of diagnostics, whoever has asked for them.
+    pages: Pages,
     /// The line at hand was counted as one that nobody understands.
     counted: bool,
     /// What the stream was asked to send, or was last seen to.
@@ -107,6 +113,7 @@ impl Session {
             menu_asked_at: None,
             dialogue: Dialogue::default(),
             toggled: Toggled::default(),
+            pages: Pages::default(),
             counted: false,
             source: None,
         }
@@ -156,6 +163,7 @@ impl Session {
             | Command::Identify
             | Command::StreamOn { .. }
             | Command::StreamOff
+            | Command::DiagnosticsOff
             | Command::RestoreDefaults
             | Command::Load(_)
                 if self.passive =>
@@ -180,6 +188,7 @@ impl Session {
             Command::RestoreDefaults => (Job::RestoreDefaults, Box::new(console::RestoreDefaults::default())),
             Command::ReadDictionary => (Job::ReadDictionary, Box::new(dictionary::ReadDictionary::new())),
             Command::Diagnostics { pages } => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::new(pages))),
+            Command::DiagnosticsOff => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::off())),
             Command::Load(order) => {
                 if let Some(password) = &order.password {
                     let password = password.reveal();
@@ -212,6 +221,7 @@ impl Session {
         self.now = self.now.max(now);
         self.transmitter.clear();
         self.signal(Signal::LinkLost);
+        self.watch(Saw::LinkLost);
         self.transmitter.clear();
         self.cut_line();
     }
@@ -239,6 +249,19 @@ impl Session {
         self.note_menu_key(bytes);
         self.signal(Signal::Typed(bytes));
         self.cut_line();
+    }
+
+    /// In a recording: a remark. Whoever recorded has noted there that the link was lost, and that it was back.
+    pub fn handle_mark(&mut self, now: Instant, text: &str) {
+        self.pass_to(now);
+        if text == LINK_LOST {
+            self.link_lost(now);
+            // It says again what it says, once it is back; until then nobody knows.
+            (self.facts.stream, self.toggled) = (None, Toggled::default());
+            self.events.push_back(Event::FactsChanged);
+        } else if text.starts_with(LINK_BACK) {
+            self.link_back(now);
+        }
     }
 
     /// In a recording: it has ended. The running job ends with what it has heard.
@@ -363,6 +386,7 @@ impl Session {
             pending: pending.as_ref(),
             cut: false,
             understood: false,
+            counted: self.counted,
             received: self.record.received(),
             password: &mut self.password,
             typed: Vec::new(),
@@ -402,6 +426,7 @@ impl Endpoint for Session {
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.pass_to(now);
         self.append(bytes);
+        self.watch(Saw::Tick);
         self.signal(Signal::Tick);
     }
 
@@ -411,6 +436,7 @@ impl Endpoint for Session {
             self.dated = piece.at.clamp(self.dated, self.now);
             self.append(&piece.bytes);
         }
+        self.watch(Saw::Tick);
         self.signal(Signal::Tick);
     }
 
@@ -423,6 +449,7 @@ impl Endpoint for Session {
             self.look_at_prompt();
         }
         self.look_at_stream();
+        self.watch(Saw::Tick);
         self.signal(Signal::Tick);
     }
 
@@ -433,6 +460,7 @@ impl Endpoint for Session {
         let transmit = self.transmitter.poll(self.now)?;
         if transmit.secrecy == Secrecy::Open {
             self.note_menu_key(&transmit.bytes);
+            self.watch(Saw::Typed(&transmit.bytes));
         }
         // The record keeps the order of time: nothing that is taken in behind this is dated before it.
         self.dated = self.now;
@@ -442,7 +470,13 @@ impl Endpoint for Session {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let job = self.running.as_ref().and_then(|running| running.work.deadline());
-        let ours = [self.prompt.due, self.password.due(), self.toggled.due(), self.transmitter.poll_timeout()];
+        let ours = [
+            self.prompt.due,
+            self.password.due(),
+            self.toggled.due(),
+            self.watching_due(),
+            self.transmitter.poll_timeout(),
+        ];
         ours.into_iter().chain([job]).flatten().min()
     }
 }

@@ -1,31 +1,102 @@
 //! Jobs on a recording: nobody can be asked, so they listen to what was said, and end when the recording does.
 
-use super::diagnostics::{Assembler, Page};
+use super::diagnostics::Page;
 use super::dictionary::Collector;
-use super::event::{Awaited, Event, Job, Outcome};
+use super::event::{Awaited, DictionaryReading, Event, Job, Outcome};
+use super::hearing::MENU_ANSWER;
 use super::job::{Desk, Signal, Work};
+use super::pages::Pages;
 use crate::device::Product;
 use crate::record::Span;
-use crate::time::Instant;
-use crate::wire::{Message, diagnostics};
+use crate::time::{Duration, Instant};
+use crate::wire::{LoaderText, Message};
+
+/// How soon behind a walk that has left the view another one begins that reads what was lost on the line.
+const ANOTHER_WALK: Duration = Duration::from_secs(2);
 
 /// Reads the entries of the object dictionary that somebody walked through.
 #[derive(Default)]
 pub(super) struct Dictionary {
     collector: Collector,
-    /// The menu came back behind entries: the walk was ended in order.
-    left: bool,
+    /// When the last entry came.
+    at: Instant,
+    /// The menu came back behind entries, and since when it has been there: the walk was ended in order.
+    left: Option<Instant>,
+    /// What was read before the unit started anew or its link was lost, and when its last entry came.
+    before: Option<(Instant, DictionaryReading)>,
     /// Whether the view is open, once a key has shown that the recording holds keys.
     viewing: Option<bool>,
+    /// A key that has the menu printed was sent then: what says the product's name is no banner.
+    asked_at: Option<Instant>,
     heard: Option<Span>,
+}
+
+impl Dictionary {
+    /// Ends the walk where it is: no entry that comes later belongs to it. Gives what was read of it.
+    fn break_off(&mut self) -> Option<(Instant, DictionaryReading)> {
+        self.viewing = self.viewing.map(|_| false);
+        if self.collector.count() == 0 {
+            return None;
+        }
+        let complete = self.is_complete();
+        let product = self.collector.product;
+        let reading = std::mem::take(&mut self.collector).take(complete);
+        self.collector.product = product;
+        self.left = None;
+        Some((self.at, reading))
+    }
+
+    fn is_complete(&self) -> bool {
+        self.collector.has_all() || (self.left.is_some() && self.collector.product.is_none())
+    }
+
+    /// The same where only the end of the recording tells. One that had everything goes before what has come of a later
+    /// one.
+    fn keep(&mut self) {
+        if let Some(ended) = self.break_off() {
+            let is_better = self.before.as_ref().is_none_or(|(_, before)| !before.complete || ended.1.complete);
+            self.before = if is_better { Some(ended) } else { self.before.take() };
+        }
+    }
+
+    /// Whether the unit shows by this that it has started anew. In the view an object may be called like the product.
+    fn is_start(&self, message: &Message, now: Instant) -> bool {
+        match message {
+            Message::Loader(LoaderText::Header | LoaderText::Waiting) | Message::FirstStart => true,
+            // Without keys a menu looks like a banner.
+            Message::Software(name) if self.viewing.is_some() => {
+                let asked = self.asked_at.is_some_and(|at| now <= at + MENU_ANSWER);
+                name.product.is_some() && name.version.is_some() && !asked
+            }
+            _ => false,
+        }
+    }
+
+    /// When nobody walks through the view once more for the lines that were lost: who does begins at once.
+    fn due(&self) -> Option<Instant> {
+        self.left.map(|left| left + ANOTHER_WALK)
+    }
+
+    /// Whether this ends the walk under way, so that what follows is none of it.
+    fn is_broken_by(&self, signal: Signal<'_>, now: Instant) -> bool {
+        match signal {
+            Signal::LinkLost => true,
+            Signal::Tick => self.due().is_some_and(|due| due <= now),
+            Signal::Heard(_, message) => self.is_start(message, now),
+            _ => false,
+        }
+    }
 }
 
 impl Work for Dictionary {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if self.is_broken_by(signal, desk.now) {
+            self.keep();
+        }
         match signal {
             Signal::Heard(_, Message::Row(_) | Message::Loader(_) | Message::Software(_) | Message::FirstStart) => None,
             Signal::Heard(_, Message::MenuKey(_)) => {
-                self.left = self.collector.count() > 0;
+                self.left = (self.collector.count() > 0).then_some(desk.now);
                 self.collector.interrupt();
                 None
             }
@@ -36,154 +107,103 @@ impl Work for Dictionary {
                 desk.understood = self.collector.line(text, message);
                 if desk.understood {
                     self.heard = Some(text.span);
-                    self.left = false;
+                    self.at = desk.now;
+                    self.left = None;
                 }
                 None
             }
-            Signal::Over if self.collector.count() == 0 => {
-                let awaited = Awaited::Entry;
-                Some(Outcome::NoAnswer { job: Job::ReadDictionary, awaited, heard: self.heard })
-            }
             Signal::Over => {
-                let complete = self.collector.has_all() || (self.left && self.collector.product.is_none());
-                Some(Outcome::DictionaryRead(Box::new(self.collector.take(complete))))
+                self.keep();
+                Some(match self.before.take() {
+                    Some((_, reading)) => Outcome::DictionaryRead(Box::new(reading)),
+                    None => {
+                        let awaited = Awaited::Entry;
+                        Outcome::NoAnswer { job: Job::ReadDictionary, awaited, heard: self.heard }
+                    }
+                })
             }
-            Signal::Cancel | Signal::LinkLost => Some(Outcome::Cancelled(Job::ReadDictionary)),
+            Signal::Cancel => Some(Outcome::Cancelled(Job::ReadDictionary)),
             Signal::Typed(keys) => {
                 for key in keys {
                     match key.to_ascii_lowercase() {
-                        b'v' => self.viewing = Some(true),
+                        b'v' => (self.viewing, self.left) = (Some(true), None),
                         b'x' | b'm' | b'd' | b't' | b's' | b'l' => self.viewing = Some(false),
                         _ => {}
+                    }
+                    if matches!(key.to_ascii_lowercase(), b'x' | b'm' | b'v' | b'\r') {
+                        self.asked_at = Some(desk.now);
                     }
                 }
                 None
             }
-            Signal::Begin | Signal::Hold(_) | Signal::Tick => None,
+            Signal::Begin | Signal::Hold(_) | Signal::Tick | Signal::LinkLost => None,
         }
     }
 
     fn deadline(&self) -> Option<Instant> {
-        None
+        self.due()
     }
 }
 
-/// Reads the pages of diagnostics that came. A page is what comes in one go behind an S. Where no key has shown what
-/// goes on it is what comes again with the same labels: menus and dictionaries have numbers in them as well.
+/// Reads the pages of diagnostics that came.
 pub(super) struct Diagnostics {
     wanted: Option<u32>,
     taken: u32,
-    page: Assembler,
-    /// S has been typed an odd number of times since the unit has started.
-    switched_on: bool,
-    /// They were switched on when the page under construction began: the key that stops them may come in its middle.
-    begun_on: bool,
-    /// What is typed is the answer to D's question, up to Enter: the `s` of `Yes` is no key.
-    answers: bool,
-    /// The recording holds keys.
-    has_keys: bool,
-    /// The labels of what was a page before there was a key.
-    known: Option<Vec<String>>,
-    /// The page before, and whether it has been given out.
-    before: Option<(Page, Vec<String>, bool)>,
+    pages: Pages,
     heard: Option<Span>,
 }
 
 impl Diagnostics {
     pub(super) fn new(wanted: Option<u32>) -> Self {
-        Diagnostics {
-            wanted,
-            taken: 0,
-            page: Assembler::default(),
-            switched_on: false,
-            begun_on: false,
-            answers: false,
-            has_keys: false,
-            known: None,
-            before: None,
-            heard: None,
-        }
+        Diagnostics { wanted, taken: 0, pages: Pages::default(), heard: None }
     }
 
-    fn page(&mut self, page: Page, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let quantities = page.lines.iter().flat_map(|line| diagnostics::quantities(&line.text));
-        let labels: Vec<String> = quantities.map(|quantity| quantity.label).collect();
-        let before = self.before.take();
-        let again = before.as_ref().is_some_and(|(_, others, _)| *others == labels)
-            && (!self.has_keys || self.known.as_ref() == Some(&labels));
-        if again && !self.has_keys {
-            self.known = Some(labels.clone());
+    fn give(&mut self, pages: Vec<Page>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        for page in pages {
+            if self.wanted.is_none_or(|wanted| self.taken < wanted) {
+                self.taken += 1;
+                desk.events.push_back(Event::Page { at: page.at, lines: page.lines });
+            }
         }
-        let given = self.begun_on || again;
-        if let Some((first, _, false)) = before.filter(|_| again) {
-            self.give(first, desk);
-        }
-        if given {
-            self.give(page.clone(), desk);
-        }
-        self.before = Some((page, labels, given));
         self.wanted.is_some_and(|wanted| self.taken >= wanted).then_some(Outcome::Done(Job::Diagnostics))
-    }
-
-    fn give(&mut self, page: Page, desk: &mut Desk<'_>) {
-        if self.wanted.is_none_or(|wanted| self.taken < wanted) {
-            self.taken += 1;
-            desk.events.push_back(Event::Page { at: page.at, lines: page.lines });
-        }
     }
 }
 
 impl Work for Diagnostics {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
-            Signal::Heard(_, Message::Row(_) | Message::MenuKey(_) | Message::Loader(_)) => None,
-            Signal::Heard(_, Message::Prompt(_)) => None,
-            // No page says the name: the unit has started anew, and shows none any more.
-            Signal::Heard(_, Message::Software(name)) if name.product.is_some() => {
-                (self.switched_on, self.begun_on, self.answers) = (false, false, false);
-                None
-            }
-            Signal::Heard(text, _) => {
-                self.heard = Some(text.span);
-                if self.page.due().is_none() {
-                    self.begun_on = self.switched_on;
+            Signal::Heard(text, message) => {
+                if !matches!(message, Message::Row(_) | Message::MenuKey(_) | Message::Loader(_) | Message::Prompt(_)) {
+                    self.heard = Some(text.span);
                 }
-                self.page.line(text, desk.now);
+                self.pages.heard(text, message, desk);
                 None
             }
             Signal::Typed(keys) => {
-                self.has_keys = true;
-                for key in keys {
-                    match key {
-                        b'\r' => self.answers = false,
-                        _ if self.answers => {}
-                        b'd' | b'D' => self.answers = true,
-                        b's' | b'S' => {
-                            self.switched_on = !self.switched_on;
-                            self.page.pressed();
-                        }
-                        b'v' | b'V' | b'm' | b'M' | b'l' | b'L' => self.switched_on = false,
-                        _ => {}
-                    }
-                }
+                self.pages.typed(keys, desk);
                 None
             }
-            Signal::Tick if self.page.due().is_some_and(|due| due <= desk.now) => {
-                let page = self.page.complete(desk)?;
-                self.page(page, desk)
+            Signal::Tick => {
+                let pages = self.pages.tick(desk);
+                if pages.is_empty() { None } else { self.give(pages, desk) }
+            }
+            Signal::LinkLost => {
+                self.pages.interrupt();
+                desk.facts.diagnostics = None;
+                None
             }
             Signal::Over if self.taken == 0 => {
                 let awaited = Awaited::Page;
                 Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
             }
             Signal::Over => Some(Outcome::Done(Job::Diagnostics)),
-            Signal::Cancel | Signal::LinkLost => Some(Outcome::Cancelled(Job::Diagnostics)),
-            Signal::Begin | Signal::Hold(_) | Signal::Tick => None,
+            Signal::Cancel => Some(Outcome::Cancelled(Job::Diagnostics)),
+            Signal::Begin | Signal::Hold(_) => None,
         }
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.page.due()
+        self.pages.due()
     }
 }
 
@@ -197,21 +217,28 @@ impl Everything {
     pub(super) fn new() -> Self {
         Everything { dictionary: Dictionary::default(), diagnostics: Diagnostics::new(None) }
     }
+
+    fn tell(ended: Option<(Instant, DictionaryReading)>, desk: &mut Desk<'_>) {
+        if let Some((at, reading)) = ended {
+            desk.events.push_back(Event::Overheard { at, reading: Box::new(reading) });
+        }
+    }
 }
 
 impl Work for Everything {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
-            Signal::Cancel | Signal::LinkLost => return Some(Outcome::Cancelled(Job::Overhear)),
+            Signal::Cancel => return Some(Outcome::Cancelled(Job::Overhear)),
             Signal::Over => {
-                let page = self.diagnostics.page.complete(desk);
-                page.map(|page| self.diagnostics.page(page, desk));
-                if let Some(Outcome::DictionaryRead(read)) = self.dictionary.handle(signal, desk) {
-                    desk.events.push_back(Event::Overheard(read));
-                }
+                let pages = self.diagnostics.pages.complete(desk);
+                self.diagnostics.give(pages, desk);
+                Self::tell(self.dictionary.break_off(), desk);
                 return Some(Outcome::Done(Job::Overhear));
             }
             _ => {}
+        }
+        if self.dictionary.is_broken_by(signal, desk.now) {
+            Self::tell(self.dictionary.break_off(), desk);
         }
         self.dictionary.handle(signal, desk);
         if !desk.understood {
@@ -219,14 +246,13 @@ impl Work for Everything {
         }
         // A walk that has seen everything need not wait for the recording's end.
         if matches!(signal, Signal::Heard(_, Message::MenuKey(_))) && self.dictionary.collector.has_all() {
-            let read = self.dictionary.collector.take(true);
-            desk.events.push_back(Event::Overheard(Box::new(read)));
+            Self::tell(self.dictionary.break_off(), desk);
         }
         None
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.diagnostics.deadline()
+        [self.dictionary.deadline(), self.diagnostics.deadline()].into_iter().flatten().min()
     }
 }
 

@@ -65,11 +65,18 @@ pub fn quantities(line: &str) -> Vec<Quantity> {
 /// Whether a line says that the pages have been switched on or off, as a unit may answer the key before its first page. A
 /// heading that tells of both has something else to say.
 pub fn is_switch(line: &str) -> bool {
+    switch(line).is_some()
+}
+
+/// Which of the two such a line says: that they are on, or off.
+pub fn switch(line: &str) -> Option<bool> {
     let words = Words::of(line);
     let on = ["on", "started", "enabled", "active", "running"];
     let off = ["off", "stopped", "disabled", "inactive"];
     let says = |states: &[&str]| words.iter().any(|word| states.contains(&word));
-    words.iter().any(|word| word.contains("diagnos")) && says(&on) != says(&off) && quantities(line).is_empty()
+    let (is_on, is_off) = (says(&on), says(&off));
+    let is_one = words.iter().any(|word| word.contains("diagnos")) && is_on != is_off && quantities(line).is_empty();
+    is_one.then_some(is_on)
 }
 
 /// A word without the signs around it.
@@ -148,6 +155,7 @@ mod tests {
             ["Diagnostics ON.", "DIAGNOSTICS STARTED", "sDiagnostics: on", "Diagnostics OFF.", "diagnosis enabled"]
         {
             assert!(is_switch(line), "{line:?}");
+            assert_eq!(switch(line), Some(!line.contains("OFF")), "{line:?}");
         }
         for line in
             ["--- Diagnostics ---", "Diagnostics (S: on/off)", "Diagnostics on: 12 s", "Supply on", "Diagnostics", ""]

@@ -1,5 +1,6 @@
 //! The console on the screen against an emulated unit, in virtual time: keys in, pictures out.
 
+mod listening;
 mod returning;
 mod sending;
 mod states;

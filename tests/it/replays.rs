@@ -6,10 +6,19 @@ use axcon::session::{Awaited, Command, DictionaryReading, Event, Job, Outcome, R
 use axcon::time::{Duration, Instant};
 use axcon::wire::stream::Source;
 
-use crate::support::bench::{Bench, axtc4co};
+use crate::support::bench::{Bench, axtc4co, flash_with, order, small_image};
 
 /// Plays a record to one job; what it has told, and how it ended.
 fn replayed(record: &[Entry], command: Command) -> (Session, Vec<Event>, Option<Outcome>) {
+    replayed_with(record, &[], command)
+}
+
+/// The same with remarks in the recording.
+fn replayed_with(
+    record: &[Entry],
+    marks: &[(Instant, &str)],
+    command: Command,
+) -> (Session, Vec<Event>, Option<Outcome>) {
     let mut session = Session::of_recording(115_200);
     session.command(Instant::ZERO, command).expect("it listens");
     let look_after = |session: &mut Session, until: Instant| {
@@ -17,12 +26,21 @@ fn replayed(record: &[Entry], command: Command) -> (Session, Vec<Event>, Option<
             session.handle_timeout(due);
         }
     };
+    let mut marks = marks.iter().peekable();
     for entry in record {
+        while let Some((at, text)) = marks.next_if(|(at, _)| *at <= entry.at) {
+            look_after(&mut session, *at);
+            session.handle_mark(*at, text);
+        }
         look_after(&mut session, entry.at);
         match entry.direction {
             Direction::ToUnit => session.handle_sent(entry.at, &entry.bytes),
             Direction::FromUnit => session.handle_bytes(entry.at, &entry.bytes),
         }
+    }
+    for (at, text) in marks {
+        look_after(&mut session, *at);
+        session.handle_mark(*at, text);
     }
     let end = record.last().map_or(Instant::ZERO, |entry| entry.at) + Duration::from_secs(5);
     look_after(&mut session, end);
@@ -107,8 +125,10 @@ fn whoever_listens_to_everything_hears_dictionary_and_pages() {
     bench.ask(Command::Diagnostics { pages: Some(2) });
     let (_, told, outcome) = replayed(&recorded(&bench), Command::Overhear);
     assert_eq!(outcome, Some(Outcome::Done(Job::Overhear)));
-    let read: Vec<&DictionaryReading> =
-        told.iter().filter_map(|event| if let Event::Overheard(read) = event { Some(&**read) } else { None }).collect();
+    let read: Vec<&DictionaryReading> = told
+        .iter()
+        .filter_map(|event| if let Event::Overheard { reading, .. } = event { Some(&**reading) } else { None })
+        .collect();
     assert_eq!(read.iter().map(|read| values(read)).collect::<Vec<_>>(), [values(&live)], "once");
     assert_eq!(pages(&told).len(), 2);
     assert!(!pages(&told)[0].iter().any(|line| line.contains("1018")), "an entry is no line of a page");
@@ -239,4 +259,242 @@ fn a_recording_of_noise_is_of_somebody_and_one_of_nothing_of_nobody() {
     let sent = session.command(Instant::ZERO, Command::Keys(b"m".to_vec()));
     assert_eq!(sent, Err(Refusal::ReadOnly));
     assert_eq!(Session::new(115_200).command(Instant::ZERO, Command::Overhear), Err(Refusal::Live));
+}
+
+fn readings(told: &[Event]) -> Vec<(Instant, &DictionaryReading)> {
+    let mut read = Vec::new();
+    for event in told {
+        if let Event::Overheard { at, reading } = event {
+            read.push((*at, &**reading));
+        }
+    }
+    read
+}
+
+#[test]
+fn a_reading_ends_where_its_link_was_lost_and_is_not_all_of_it() {
+    for dialect in 0..30 {
+        let mut bench = Bench::in_dialect(axtc4co(), dialect);
+        bench.run_for(Duration::from_secs(4));
+        bench.ask(Command::Identify);
+        bench.command(Command::ReadDictionary);
+        bench.run_for(Duration::from_millis(900));
+        let lost = bench.now;
+        bench.lose_link();
+        bench.run_for(Duration::from_secs(60));
+        let back = bench.now;
+        bench.session.link_back(back);
+        let marks = [(lost, "link lost"), (back, "link back as /dev/ttyUSB0")];
+        let (_, told, _) = replayed_with(&recorded(&bench), &marks, Command::Overhear);
+        let [(at, reading)] = readings(&told)[..] else { panic!("dialect {dialect}: {told:?}") };
+        assert!(!reading.complete && !reading.entries.is_empty(), "dialect {dialect}: {reading:?}");
+        assert!(at <= lost && lost <= at + Duration::from_secs(1), "dialect {dialect}: {at:?}, {lost:?}");
+        // The one behind it is its own.
+        bench.ask(Command::Identify);
+        let live = dictionary(&mut bench);
+        let record = recorded(&bench);
+        let (_, told, _) = replayed_with(&record, &marks, Command::Overhear);
+        let read = readings(&told);
+        assert_eq!(read.iter().map(|(_, read)| read.complete).collect::<Vec<_>>(), [false, true], "dialect {dialect}");
+        assert_eq!(values(read[1].1), values(&live), "dialect {dialect}");
+        assert!(read[1].0 > back, "dialect {dialect}");
+        let (_, _, outcome) = replayed_with(&record, &marks, Command::ReadDictionary);
+        let Some(Outcome::DictionaryRead(dumped)) = outcome else { panic!("{outcome:?}") };
+        assert_eq!((values(&dumped), dumped.complete), (values(&live), true), "dialect {dialect}");
+    }
+}
+
+#[test]
+fn a_reading_ends_where_its_unit_starts_anew() {
+    for dialect in 0..30 {
+        let mut bench = Bench::in_dialect(axtc4co(), dialect);
+        bench.run_for(Duration::from_secs(4));
+        bench.ask(Command::Identify);
+        bench.command(Command::ReadDictionary);
+        bench.run_for(Duration::from_millis(900));
+        let cut = bench.now;
+        bench.power_cycle(Duration::from_secs(1));
+        bench.run_for(Duration::from_secs(60));
+        let (_, told, _) = replayed(&recorded(&bench), Command::Overhear);
+        let (at, reading) = *readings(&told).first().expect("some of it");
+        assert!(!reading.complete && at <= cut, "dialect {dialect}: {at:?}, {}", bench.transcript());
+    }
+}
+
+/// Types with the pauses of a hand; the pages that the session has told of meanwhile.
+fn typed(bench: &mut Bench, keys: &str) -> Vec<Event> {
+    let mut told = Vec::new();
+    for key in keys.bytes() {
+        bench.command(Command::Keys(vec![key]));
+        told.extend(live_pages(bench, Duration::from_millis(230)));
+    }
+    told
+}
+
+/// The pages that a live session has told of so far.
+fn live_pages(bench: &mut Bench, time: Duration) -> Vec<Event> {
+    let (end, mut told) = (bench.now + time, Vec::new());
+    bench.run_until(end, |event| {
+        told.extend(matches!(event, Event::Page { .. }).then(|| event.clone()));
+        false
+    });
+    told
+}
+
+#[test]
+fn pages_that_a_hand_has_asked_for_are_known_live_and_in_the_recording_and_no_dialogue_is_one() {
+    for dialect in 0..60 {
+        let mut bench = Bench::in_dialect(axtc4co(), dialect);
+        bench.run_for(Duration::from_secs(6));
+        bench.ask(Command::Identify);
+        let before = bench.session.facts().unrecognised_lines;
+        bench.command(Command::Keys(b"s".to_vec()));
+        let mut live = live_pages(&mut bench, Duration::from_secs(5));
+        let heard = |bench: &Bench| format!("dialect {dialect}:\n{}", bench.transcript());
+        assert!((4..=5).contains(&live.len()), "{}, {}", live.len(), heard(&bench));
+        assert!(bench.session.facts().diagnostics.is_some(), "{}", heard(&bench));
+        // What somebody else has to say meanwhile is on no page.
+        live.extend(typed(&mut bench, "tp1000\r\r"));
+        live.extend(live_pages(&mut bench, Duration::from_secs(4)));
+        bench.command(Command::Keys(b"m".to_vec()));
+        live.extend(live_pages(&mut bench, Duration::from_secs(3)));
+        let shown = pages(&live);
+        let lengths: Vec<usize> = shown.iter().map(Vec::len).collect();
+        assert!(
+            shown.len() >= 10 && lengths.iter().all(|length| *length == lengths[0]),
+            "{shown:#?}, {}",
+            heard(&bench)
+        );
+        assert!(bench.session.facts().diagnostics.is_some(), "{}", heard(&bench));
+        assert_eq!(bench.session.facts().unrecognised_lines, before, "{}", heard(&bench));
+        let (session, told, _) = replayed(&recorded(&bench), Command::Overhear);
+        let told = pages(&told);
+        assert!(told.len().abs_diff(shown.len()) <= 1, "dialect {dialect}: {} and {}", told.len(), shown.len());
+        assert!(told.iter().all(|page| page.len() == lengths[0]), "dialect {dialect}: {told:#?}");
+        assert!(session.facts().diagnostics.is_none(), "behind the end of the recording none have come for long");
+        // And off again.
+        bench.command(Command::Keys(b"s".to_vec()));
+        bench.run_for(Duration::from_secs(3));
+        assert_eq!(bench.session.facts().diagnostics, None, "{}", heard(&bench));
+    }
+}
+
+#[test]
+fn pages_that_came_before_we_did_are_known_and_stopped() {
+    for dialect in 0..60 {
+        let mut bench = Bench::in_dialect(axtc4co(), dialect);
+        bench.run_for(Duration::from_secs(6));
+        typed(&mut bench, "s");
+        bench.run_for(Duration::from_millis(2_000 + dialect * 17));
+        bench.reconnect();
+        bench.ask(Command::Identify);
+        let told = live_pages(&mut bench, Duration::from_secs(5));
+        let heard = |bench: &Bench| format!("dialect {dialect}:\n{}", bench.transcript());
+        assert!(pages(&told).len() >= 4, "{}", heard(&bench));
+        assert!(bench.session.facts().diagnostics.is_some(), "{}", heard(&bench));
+        assert_eq!(bench.ask(Command::DiagnosticsOff), Outcome::Done(Job::Diagnostics), "{}", heard(&bench));
+        assert_eq!(bench.session.facts().diagnostics, None, "{}", heard(&bench));
+        assert!(live_pages(&mut bench, Duration::from_secs(4)).is_empty(), "{}", heard(&bench));
+        // Asked for while they come they are joined, and off behind it.
+        typed(&mut bench, "s");
+        bench.run_for(Duration::from_secs(3));
+        assert!(bench.session.facts().diagnostics.is_some(), "{}", heard(&bench));
+        let outcome = bench.ask(Command::Diagnostics { pages: Some(2) });
+        assert_eq!((outcome, bench.session.facts().diagnostics), (Outcome::Done(Job::Diagnostics), None));
+        assert!(live_pages(&mut bench, Duration::from_secs(4)).is_empty(), "{}", heard(&bench));
+    }
+}
+
+#[test]
+fn menus_views_and_streams_are_no_diagnostics() {
+    for dialect in 0..60 {
+        let mut bench = Bench::in_dialect(axtc4co(), dialect);
+        bench.run_for(Duration::from_secs(6));
+        for _ in 0..4 {
+            bench.ask(Command::Identify);
+        }
+        let mut told = typed(&mut bench, "v\r\r\r\r\r\r\rxmmmtp1000\r");
+        told.extend(live_pages(&mut bench, Duration::from_secs(5)));
+        told.extend(typed(&mut bench, "tmdm\rl\rtf500\rt"));
+        told.extend(live_pages(&mut bench, Duration::from_secs(5)));
+        bench.power_cycle(Duration::from_secs(1));
+        bench.run_for(Duration::from_secs(5));
+        dictionary(&mut bench);
+        assert!(pages(&told).is_empty(), "dialect {dialect}: {:#?}", pages(&told));
+        assert_eq!(bench.session.facts().diagnostics, None, "dialect {dialect}:\n{}", bench.transcript());
+        let (session, told, _) = replayed(&recorded(&bench), Command::Overhear);
+        assert!(pages(&told).is_empty(), "dialect {dialect}: {:#?}", pages(&told));
+        assert_eq!(session.facts().diagnostics, None);
+    }
+}
+
+#[test]
+fn pages_that_go_on_behind_a_lost_link_are_known_again_and_those_of_a_restarted_unit_are_over() {
+    for (dialect, restarts) in (0..40).map(|number| (number / 2, number % 2 == 1)) {
+        let mut bench = Bench::in_dialect(axtc4co(), dialect);
+        bench.run_for(Duration::from_secs(6));
+        bench.ask(Command::Identify);
+        bench.command(Command::Diagnostics { pages: None });
+        bench.run_for(Duration::from_secs(5));
+        let lost = bench.now;
+        bench.lose_link();
+        assert_eq!(bench.session.facts().diagnostics, None, "nobody knows");
+        if restarts {
+            bench.power_cycle(Duration::from_secs(1));
+        }
+        // What is said meanwhile nobody hears.
+        bench.disturb_answers(|_, _| Vec::new());
+        bench.run_for(Duration::from_secs(6));
+        bench.leave_in_peace();
+        let back = bench.now;
+        bench.session.link_back(back);
+        bench.session.forget_unit();
+        bench.ask(Command::Identify);
+        bench.run_for(Duration::from_millis(2500));
+        let comes = bench.session.facts().diagnostics.is_some();
+        assert_eq!(comes, !restarts, "dialect {dialect}:\n{}", bench.transcript());
+        let marks = [(lost, "link lost"), (back, "link back as /dev/ttyUSB0")];
+        let (_, told, _) = replayed_with(&recorded(&bench), &marks, Command::Overhear);
+        let times = told.iter().filter_map(|event| if let Event::Page { at, .. } = event { Some(*at) } else { None });
+        assert_eq!(times.max().is_some_and(|at| at > back), !restarts, "dialect {dialect}");
+    }
+}
+
+#[test]
+fn what_the_facts_say_of_a_link_that_was_lost_is_what_it_was_when_it_is_back() {
+    let mut bench = Bench::new();
+    bench.run_for(Duration::from_secs(4));
+    bench.ask(Command::Identify);
+    bench.ask(Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(500) });
+    let lost = bench.now;
+    let marks = [(lost, "link lost"), (lost + Duration::from_secs(2), "link back as /dev/ttyUSB0")];
+    let (session, ..) = replayed_with(&recorded(&bench), &marks, Command::Overhear);
+    assert_eq!(session.facts().stream, None, "nobody has heard a row since");
+    assert_eq!(session.facts().product, bench.session.facts().product);
+    bench.run_for(Duration::from_secs(4));
+    let (session, ..) = replayed_with(&recorded(&bench), &marks, Command::Overhear);
+    assert_eq!(session.facts().stream, Some(Source::FieldValue));
+}
+
+#[test]
+fn a_recording_of_an_upload_ends_with_what_the_unit_was_then() {
+    let mut bench = Bench::with(flash_with(&small_image("AXTC4CO", "1.1.0")), Duration::ZERO);
+    bench.run_for(Duration::from_secs(4));
+    bench.ask(Command::Identify);
+    let read = dictionary(&mut bench);
+    // Nobody presses the next key while the menu is still coming.
+    bench.run_for(Duration::from_secs(1));
+    typed(&mut bench, "s");
+    bench.run_for(Duration::from_secs(3));
+    bench.command(Command::Load(Box::new(order(small_image("AXTC4CO", "1.2.0")))));
+    bench.outcome();
+    bench.run_for(Duration::from_secs(5));
+    let (session, told, _) = replayed(&recorded(&bench), Command::Overhear);
+    let (live, then) = (bench.session.facts(), session.facts());
+    assert_eq!((&live.product, &live.version, live.state), (&then.product, &then.version, then.state));
+    assert_eq!(then.version.as_ref().map(|known| known.value.to_string()).as_deref(), Some("1.2.0"));
+    assert_eq!((live.diagnostics, then.diagnostics), (None, None), "no page survives a restart");
+    let complete: Vec<_> = readings(&told).iter().map(|(_, reading)| (values(reading), reading.complete)).collect();
+    assert_eq!(complete, [(values(&read), true)]);
+    assert!((3..=5).contains(&pages(&told).len()), "{:#?}", pages(&told));
 }

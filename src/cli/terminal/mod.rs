@@ -28,7 +28,7 @@ use crate::host::replay::Recording;
 use crate::host::signal::Signals;
 use crate::host::terminal::RawMode;
 use crate::host::{self, Input};
-use crate::record::{Direction, Ending, Piece};
+use crate::record::{Direction, Ending, LINK_LOST, Piece};
 use crate::session::{Command, Session};
 use crate::time::{Duration, Instant};
 use keys::{Deed, Keys};
@@ -431,7 +431,7 @@ impl Conversation {
             self.session.link_lost(now);
             self.sending = None;
             self.keys.set_sending(false);
-            self.recorder.mark(now, "link lost");
+            self.recorder.mark(now, LINK_LOST);
             self.retry = Some(now + Comeback::RETRY);
             self.say(&format!("{error}; waiting for it to come back, Ctrl-] leaves"), output)?;
         }

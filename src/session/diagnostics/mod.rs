@@ -18,13 +18,13 @@ use crate::wire::{Message, Prompt};
 const WATCH: Duration = Duration::from_millis(1300);
 /// How long the first page may take: a unit has no values for up to 5 s behind its power-up (AXRTD8CO manual,
 /// section 1.1).
-const FIRST_PAGE: Duration = Duration::from_millis(6500);
+pub(super) const FIRST_PAGE: Duration = Duration::from_millis(6500);
 /// How long the next page may take.
 const NEXT_PAGE: Duration = Duration::from_millis(2500);
 /// Time without a page behind the key that stops them.
-const STOPPED: Duration = Duration::from_millis(1500);
+pub(super) const STOPPED: Duration = Duration::from_millis(1500);
 /// A page that comes so soon behind that key was under way before it.
-const UNDER_WAY: Duration = Duration::from_millis(700);
+pub(super) const UNDER_WAY: Duration = Duration::from_millis(700);
 /// How long the rest of the menu may take.
 const MENU: Duration = Duration::from_millis(300);
 /// How often the key is pressed to stop them.
@@ -42,6 +42,8 @@ pub(super) struct Diagnostics {
     heard: Option<Span>,
     /// Something has come since the key was pressed last.
     answered: bool,
+    /// Pages that nobody here has asked for come, and all that is wanted is that they stop.
+    only_stops: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +70,13 @@ impl Diagnostics {
             deadline: None,
             heard: None,
             answered: false,
+            only_stops: false,
         }
+    }
+
+    /// The job that stops pages that come.
+    pub(super) fn off() -> Self {
+        Diagnostics { only_stops: true, ..Diagnostics::new(None) }
     }
 
     /// Nothing has followed for a while: what has come may be a page.
@@ -136,6 +144,7 @@ impl Diagnostics {
             }
             Stage::Reading => Some(Outcome::NoAnswer { job, awaited: Awaited::NextPage, heard: self.heard }),
             Stage::Stopping { cancelled, .. } | Stage::AskingForMenu { cancelled } if self.answered => {
+                desk.facts.diagnostics = None;
                 Some(if cancelled { Outcome::Cancelled(job) } else { Outcome::Done(job) })
             }
             // A unit without power prints no pages either.
@@ -154,7 +163,7 @@ impl Diagnostics {
 }
 
 /// Whether a line can be one of a page: it has a word, or is a rule of signs.
-fn has_words(line: &str) -> bool {
+pub(super) fn has_words(line: &str) -> bool {
     line.contains(char::is_alphabetic) || !line.contains(|sign: char| sign.is_ascii_digit())
 }
 
@@ -168,6 +177,10 @@ impl Work for Diagnostics {
             return None;
         }
         match signal {
+            Signal::Begin if self.only_stops => {
+                self.stop(desk, 1, false);
+                None
+            }
             Signal::Begin => {
                 self.deadline = Some(desk.now + WATCH);
                 None

@@ -384,6 +384,10 @@ impl App {
             MenuCmd::Diagnostics if self.view.job == Some(Job::Diagnostics) => {
                 self.perform(Action::Command(Command::Cancel), effects);
             }
+            // Whoever has asked for them: the key only toggles, and asking for more would be to stop them.
+            MenuCmd::Diagnostics if self.view.facts.diagnostics.is_some() => {
+                self.perform(Action::Command(Command::DiagnosticsOff), effects);
+            }
             MenuCmd::Diagnostics => {
                 self.front = ScreenId::Diagnostics;
                 self.perform(Action::Command(Command::Diagnostics { pages: None }), effects);

@@ -169,6 +169,9 @@ impl App {
                 }
             }
             Input::Mark(text) => {
+                if let Some(session) = &mut self.session {
+                    session.handle_mark(now, &text);
+                }
                 self.view.remarked(now, &text);
                 self.scrollback.note(now, super::visible::text(&text));
             }
@@ -499,7 +502,7 @@ impl App {
             Command::StreamOff => Some(Job::StreamOff),
             Command::RestoreDefaults => Some(Job::RestoreDefaults),
             Command::ReadDictionary => Some(Job::ReadDictionary),
-            Command::Diagnostics { .. } => Some(Job::Diagnostics),
+            Command::Diagnostics { .. } | Command::DiagnosticsOff => Some(Job::Diagnostics),
             Command::Overhear => Some(Job::Overhear),
             Command::Load(_) => Some(Job::Load),
             Command::SendFile(_) => Some(Job::SendFile),

@@ -9,6 +9,7 @@ use crate::host::link::{self, Connection, LinkError, LinkSpec};
 use crate::host::recorder::Recorder;
 use crate::host::replay::Recording;
 use crate::host::socket::Dialled;
+use crate::record::{LINK_BACK, LINK_LOST};
 use crate::time::Instant;
 use crate::tui::{Failure, Input, LinkInfo, Noted};
 
@@ -105,7 +106,7 @@ impl Console {
         if let Some(comeback) = &mut comeback {
             comeback.lost();
             self.recorder = recorder;
-            self.recorder.mark(self.now(), "link lost");
+            self.recorder.mark(self.now(), LINK_LOST);
             self.retry = Some(self.clock.now() + Comeback::RETRY);
         }
         self.comeback = comeback;
@@ -121,7 +122,7 @@ impl Console {
         };
         self.retry = None;
         let name = connection.port().to_owned();
-        self.recorder.mark(self.now(), &format!("link back as {name}"));
+        self.recorder.mark(self.now(), &format!("{LINK_BACK}{name}"));
         self.link = Some(connection);
         self.handle(Input::LinkBack(name));
     }

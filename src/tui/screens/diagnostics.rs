@@ -10,6 +10,7 @@ use crate::monitor::Tracked;
 use crate::session::Job;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::view::LinkState;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
@@ -69,10 +70,11 @@ impl Diagnostics {
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let (theme, view) = (scene.theme, scene.view);
         let diagnostics = &view.monitor.diagnostics;
-        let runs = view.job == Some(Job::Diagnostics);
+        let runs = view.job == Some(Job::Diagnostics) || view.facts.diagnostics.is_some();
         let Some(at) = diagnostics.at else {
             let mut rows = vec![lines::rule(theme, area.width, "Diagnostics", "")];
             let text = match (runs, &view.link.name) {
+                (true, Some(_)) if !view.can_send() => "Waiting for the unit's next page.",
                 (true, _) => "Waiting for the unit's first page: one comes every second.",
                 (false, None) => "Not connected. Press 1 to choose a port or an emulated unit.",
                 (false, Some(_)) if !view.can_send() => "No page of diagnostics in this recording.",
@@ -82,7 +84,14 @@ impl Diagnostics {
             return lines::draw(frame, area, rows);
         };
         let time = format::time_of_day(scene.start_of_day, at);
-        let state = if runs { "S stops" } else { "stopped" };
+        let state = match (runs, &view.link.state) {
+            // Nobody knows what the unit does meanwhile.
+            (_, LinkState::Lost(_)) => "link lost",
+            (true, _) if !view.can_send() => "running",
+            (true, _) if view.job.is_none() => "running, S stops them",
+            (true, _) => "S stops",
+            (false, _) => "stopped",
+        };
         let mut remark = format!("page {}, {time}, {state}", format::grouped(diagnostics.pages));
         let parts = Parts::of(scene, area);
         let (heading, body) = lines::split(parts.left, 1);

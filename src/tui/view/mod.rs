@@ -12,6 +12,7 @@ use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::monitor::{Mark, Monitor};
+use crate::record::LINK_LOST;
 use crate::session::{DictionaryReading, Event, Facts, FileEnd, Job, LoadReport, Origin, Outcome, Progress, UnitState};
 use crate::time::{Duration, Instant};
 
@@ -44,6 +45,8 @@ pub struct View {
     pub playing: Option<Playing>,
     /// The stream was seen to be switched off. Without that, silence may be a long repetition time.
     pub stream_is_off: bool,
+    /// In a recording: the link was lost, and no row has come since.
+    is_cut_off: bool,
     /// The repetition time that the stream was asked for and has not confirmed yet.
     pub wanted_period: Option<Duration>,
     /// The repetition time that the stream was last switched on with, also once it is off.
@@ -127,7 +130,7 @@ pub struct DictionaryRead {
     pub dump: Dump,
     /// What was read.
     pub reading: DictionaryReading,
-    /// When it was complete.
+    /// When it was complete, or its last entry came.
     pub at: Instant,
     /// The unit has started anew since, or is in its loader: it may have other values.
     pub is_outdated: bool,
@@ -190,7 +193,7 @@ impl View {
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         match event {
             Event::Heard { .. } => {}
-            Event::Overheard(reading) => self.dictionary_read(now, reading),
+            Event::Overheard { at, reading } => self.dictionary_overheard(*at, reading),
             Event::EntriesRead(count) => self.entries_read = *count,
             Event::Row { .. } | Event::Page { .. } if self.returning.is_some() => {
                 if let Some(returning) = &mut self.returning {
@@ -251,8 +254,12 @@ impl View {
         self.monitor.stream.restart_extremes();
     }
 
-    /// A remark in a recording: where it is a mark, it is one again.
+    /// A remark in a recording: where it is a mark, it is one again. A link that was lost then is lost.
     pub fn remarked(&mut self, at: Instant, text: &str) {
+        if text == LINK_LOST {
+            self.is_cut_off = true;
+            self.monitor.stream.interrupt();
+        }
         if let Some((number, before)) = read_mark(text) {
             let at = Instant::ZERO + at.since_start().saturating_sub(before);
             self.monitor.stream.set_mark(Mark { number, at });
@@ -371,11 +378,12 @@ impl View {
             // Who is away, or starts anew, has not been switched off by that.
             (Some(_), None) => {
                 let is_away = self.returning.is_some() || has_started || facts.state == UnitState::Loader;
+                let is_away = is_away || self.is_cut_off;
                 (self.stream_is_off, self.monitor.stream.late) = (!is_away, false);
             }
             (None, None) => {}
             (None, Some(_)) => {
-                self.stream_is_off = false;
+                (self.stream_is_off, self.is_cut_off) = (false, false);
                 self.monitor.stream.switched_on(now);
             }
             (Some(_), Some(_)) => {}
@@ -468,6 +476,16 @@ impl View {
                 let text = format!("The link was lost when about {sent} of the {total} bytes of {name} had left.");
                 self.tell(Tone::Bad, text);
             }
+        }
+    }
+
+    /// In a recording: what was broken off later does not undo what was read to its end.
+    fn dictionary_overheard(&mut self, at: Instant, reading: &DictionaryReading) {
+        match self.current_dictionary() {
+            Some(read) if read.reading.complete && !reading.complete => {
+                self.tell(Tone::Bad, "The object dictionary was read once more, not to its end.");
+            }
+            _ => self.dictionary_read(at, reading),
         }
     }
 

@@ -49,9 +49,12 @@ impl Row<'_> {
         match self.read {
             Some(read) if read.deviates => value.push_str("; not as the factory made it"),
             Some(_) => {}
-            None if scene.view.dictionary.is_some() => value = "not shown by the unit".into(),
-            None if scene.view.can_send() => value = "not read yet: V reads it".into(),
-            None => value = format!("not read. {}", without_unit(scene.view)),
+            None => match &scene.view.dictionary {
+                Some(read) if !read.reading.complete => value = "not read: the reading was not completed".into(),
+                Some(_) => value = "not shown by the unit".into(),
+                None if scene.view.can_send() => value = "not read yet: V reads it".into(),
+                None => value = format!("not read. {}", without_unit(scene.view)),
+            },
         }
         labelled("Value", value, 1);
         let Some((_, entry)) = self.known else {

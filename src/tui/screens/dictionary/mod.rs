@@ -341,7 +341,11 @@ impl Dictionary {
                     None => "compared with nothing".into(),
                 });
                 time = Some(format::time_of_day(scene.start_of_day, read.at));
-                Some(format!("{shown} of {total}"))
+                Some(match read.reading.complete {
+                    true => format!("{shown} of {total}"),
+                    false if shown == total => format!("incomplete: {} of {total} read", read.dump.entries.len()),
+                    false => format!("{shown} of {total}, incomplete"),
+                })
             }
         };
         // `only those` are those that are not as the factory made them, and what is old is never shown as if it were not.

@@ -1,0 +1,94 @@
+//! Pages of diagnostics that no job here has asked for, in a live session: somebody has pressed S by hand, or had before
+//! we came. What is known of them holds for the job as well.
+
+use super::Session;
+use super::event::{Event, Job};
+use super::job::Desk;
+use crate::time::Instant;
+use crate::wire::{Message, Text};
+
+/// What has happened.
+#[derive(Clone, Copy)]
+pub(super) enum Saw<'a> {
+    /// These keys have left, none of them secret.
+    Typed(&'a [u8]),
+    /// The unit has printed something.
+    Heard(&'a Text, &'a Message),
+    /// Time has passed.
+    Tick,
+    /// The link is gone.
+    LinkLost,
+}
+
+impl Session {
+    /// Whether pages are listened for: in a recording its jobs do that, and what a loader says is no page.
+    fn watches(&self) -> bool {
+        !self.passive && self.recognises && !matches!(self.job(), Some(Job::Load | Job::SendFile))
+    }
+
+    /// When [`Session::watch`] is wanted.
+    pub(super) fn watching_due(&self) -> Option<Instant> {
+        self.pages.due().filter(|_| self.watches())
+    }
+
+    /// Looks for pages in what has happened.
+    pub(super) fn watch(&mut self, saw: Saw<'_>) {
+        if !self.watches() || matches!(saw, Saw::LinkLost) {
+            if !self.passive && self.facts.diagnostics.take().is_some() {
+                self.events.push_back(Event::FactsChanged);
+            }
+            return self.pages.interrupt();
+        }
+        let is_due = self.watching_due().is_some_and(|due| due <= self.now);
+        match saw {
+            Saw::Tick if !is_due => return,
+            // Of what a flood is made of nothing is on a page.
+            Saw::Heard(_, Message::Row(_)) => return,
+            // An entry of the view is no line of a page.
+            Saw::Heard(..) if self.job() == Some(Job::ReadDictionary) => return,
+            _ => {}
+        }
+        let before = (self.facts.diagnostics, self.facts.unrecognised_lines);
+        let mut pages = std::mem::take(&mut self.pages);
+        let pending = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric));
+        let pending = pending.map(|mut text| {
+            self.password.conceal(&mut text);
+            text
+        });
+        let mut desk = Desk {
+            now: self.now,
+            transmitter: &mut self.transmitter,
+            facts: &mut self.facts,
+            events: &mut self.events,
+            pending: pending.as_ref(),
+            cut: false,
+            understood: false,
+            received: self.record.received(),
+            password: &mut self.password,
+            typed: Vec::new(),
+            counted: self.counted,
+        };
+        let mut given = Vec::new();
+        match saw {
+            Saw::Typed(keys) => pages.typed(keys, &mut desk),
+            Saw::Heard(text, message) => pages.heard(text, message, &mut desk),
+            Saw::Tick => given = pages.tick(&mut desk),
+            Saw::LinkLost => pages.interrupt(),
+        }
+        let cut = desk.cut;
+        self.pages = pages;
+        if (self.facts.diagnostics, self.facts.unrecognised_lines) != before {
+            self.events.push_back(Event::FactsChanged);
+        }
+        // The job has pages of its own, of which it reads each to its end.
+        if self.job() == Some(Job::Diagnostics) {
+            return;
+        }
+        for page in given {
+            self.events.push_back(Event::Page { at: page.at, lines: page.lines });
+        }
+        if cut {
+            self.cut_line();
+        }
+    }
+}
