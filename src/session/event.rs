@@ -21,8 +21,6 @@ pub enum Command {
     /// Keys for the unit as they are, from the raw terminal or the menu. Refused while a job other than
     /// [`Command::Identify`] runs.
     Keys(Vec<u8>),
-    /// Bytes of a file for the unit, as they are: no keys, among which a password may be.
-    Bytes(Vec<u8>),
     /// Send a file as it is, as if it were typed, with news of how far it has come: [`Event::FileProgress`].
     SendFile(Vec<u8>),
     /// Find out what is at the other end.

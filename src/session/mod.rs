@@ -34,7 +34,7 @@ use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
 use crate::record::{Direction, LINK_BACK, LINK_LOST, Record};
 use crate::time::{Duration, Instant, character_time};
 use crate::wire::stream::Source;
-use crate::wire::{Framer, Message, Vocabulary};
+use crate::wire::{Framer, Message, Text, Vocabulary};
 use dialogue::Dialogue;
 use hearing::PromptWatch;
 use job::{Desk, Signal, Work};
@@ -158,7 +158,6 @@ impl Session {
             Command::Overhear if self.passive => (Job::Overhear, Box::new(overheard::Everything::new())),
             Command::Overhear => return Err(Refusal::Live),
             Command::Keys(_)
-            | Command::Bytes(_)
             | Command::SendFile(_)
             | Command::Identify
             | Command::StreamOn { .. }
@@ -171,7 +170,6 @@ impl Session {
                 return Err(Refusal::ReadOnly);
             }
             Command::Keys(keys) => return self.keys(&keys),
-            Command::Bytes(bytes) => return self.bytes(&bytes),
             Command::SendFile(bytes) => {
                 self.may_send_file()?;
                 (Job::SendFile, Box::new(sending::SendFile::new(bytes)))
@@ -323,14 +321,6 @@ impl Session {
         }
     }
 
-    fn bytes(&mut self, bytes: &[u8]) -> Result<(), Refusal> {
-        if let Some(running) = &self.running {
-            return Err(Refusal::Busy(running.job));
-        }
-        let secrecy = if self.password_open() { Secrecy::Secret } else { Secrecy::Open };
-        if self.transmitter.push_text(bytes, secrecy) { Ok(()) } else { Err(Refusal::Held) }
-    }
-
     fn keys(&mut self, keys: &[u8]) -> Result<(), Refusal> {
         if let Some(running) = self.running.as_ref().filter(|running| running.job != Job::Identify) {
             return Err(Refusal::Busy(running.job));
@@ -340,13 +330,14 @@ impl Session {
 
     /// Queues keys; what is typed where the password is asked for is secret.
     fn type_in(&mut self, keys: &[u8]) -> Result<(), Refusal> {
+        // All of them or none: what is refused has not been sent.
+        if !self.transmitter.has_room(keys.len()) {
+            return Err(Refusal::Held);
+        }
         for stroke in password::strokes(keys) {
-            let secrecy = self.password.secrecy_of_keys();
-            let queued = self.transmitter.push_text(stroke.keys, secrecy)
-                && self.transmitter.push_text(stroke.enter, Secrecy::Open);
-            if !queued {
-                return Err(Refusal::Held);
-            }
+            let secrecy = self.password.secrecy_of(&stroke);
+            self.transmitter.push_text(stroke.keys, secrecy);
+            self.transmitter.push_text(stroke.enter, Secrecy::Open);
             self.password.typed(&stroke);
         }
         Ok(())
@@ -368,16 +359,19 @@ impl Session {
         }
     }
 
+    /// Words without a line end behind them, the last thing the unit has printed.
+    fn pending(&self) -> Option<Text> {
+        let mut text = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric))?;
+        self.password.conceal(&mut text);
+        Some(text)
+    }
+
     /// Tells the running job something, and ends it if it says so.
     fn signal(&mut self, signal: Signal<'_>) {
         let Some(mut running) = self.running.take() else { return };
         let lost = matches!(signal, Signal::LinkLost);
         let before = self.facts.clone();
-        let pending = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric));
-        let pending = pending.map(|mut text| {
-            self.password.conceal(&mut text);
-            text
-        });
+        let pending = self.pending();
         let mut desk = Desk {
             now: self.now,
             transmitter: &mut self.transmitter,

@@ -51,6 +51,14 @@ enum Typed {
     Text,
     /// What may be a password: it goes on up to Enter.
     Secret(TypedSecret),
+    /// Nothing behind an L and its Enter. The Enter may have come before the question, as from a script that sends
+    /// everything at once: the next line may be the password still.
+    Nothing,
+}
+
+/// Whether these can be keys of the menu, or of the view.
+fn are_menu_keys(keys: &[u8]) -> bool {
+    keys.iter().all(|key| b"mvdtslx".contains(&key.to_ascii_lowercase()))
 }
 
 /// A part of what was typed, which is secret or open as a whole.
@@ -63,8 +71,9 @@ pub(super) struct Stroke<'a> {
 
 /// What was typed in parts: Enter ends a password, and behind an L begins what may be one.
 pub(super) fn strokes(typed: &[u8]) -> impl Iterator<Item = Stroke<'_>> {
-    typed.split_inclusive(|key| matches!(key, b'\r' | b'l' | b'L')).map(|part| {
-        let (keys, enter) = part.split_at(part.len() - usize::from(part.ends_with(b"\r")));
+    // Enter is CR; a script may send the line feeds of its file.
+    typed.split_inclusive(|key| matches!(key, b'\r' | b'\n' | b'l' | b'L')).map(|part| {
+        let (keys, enter) = part.split_at(part.len() - usize::from(part.ends_with(b"\r") || part.ends_with(b"\n")));
         Stroke { keys, enter }
     })
 }
@@ -100,18 +109,27 @@ impl PasswordGuard {
         (self.asked, self.echoes, self.typed) = (false, false, Typed::MenuKeys);
     }
 
-    /// What the next keys are that are typed by hand.
-    pub(super) fn secrecy_of_keys(&self) -> Secrecy {
-        let is_secret = self.is_open() || matches!(self.typed, Typed::Secret(_));
+    /// What the next keys are, typed by hand or of a file that is sent as if typed.
+    pub(super) fn secrecy_of(&self, stroke: &Stroke<'_>) -> Secrecy {
+        let is_secret = match self.typed {
+            _ if self.is_open() => true,
+            Typed::Secret(_) => true,
+            Typed::Nothing => !are_menu_keys(stroke.keys),
+            Typed::MenuKeys | Typed::Text => false,
+        };
         if is_secret { Secrecy::Secret } else { Secrecy::Open }
     }
 
-    /// These keys have been typed; what they are was [asked](PasswordGuard::secrecy_of_keys) before.
+    /// These keys have been typed; what they are was [asked](PasswordGuard::secrecy_of) before.
     pub(super) fn typed(&mut self, stroke: &Stroke<'_>) {
-        let mut typed = std::mem::take(&mut self.typed);
-        if self.is_open() && !matches!(typed, Typed::Secret(_)) {
-            typed = Typed::Secret(TypedSecret::new());
-        }
+        let is_secret = self.secrecy_of(stroke) == Secrecy::Secret;
+        let typed = match std::mem::take(&mut self.typed) {
+            Typed::Secret(secret) => Typed::Secret(secret),
+            _ if is_secret => Typed::Secret(TypedSecret::new()),
+            Typed::Nothing if stroke.keys.is_empty() => return self.typed = Typed::Nothing,
+            Typed::Nothing => Typed::MenuKeys,
+            other => other,
+        };
         self.typed = match typed {
             Typed::Secret(mut secret) => {
                 secret.type_in(stroke.keys);
@@ -122,16 +140,17 @@ impl PasswordGuard {
                 Typed::Secret(secret)
             }
             // An `l` in a word is no key.
-            Typed::MenuKeys if stroke.keys.iter().all(|key| b"mvdtslx".contains(&key.to_ascii_lowercase())) => {
-                match stroke.keys.last() {
-                    Some(b'l' | b'L') => Typed::Secret(TypedSecret::new()),
-                    Some(_) | None => Typed::MenuKeys,
-                }
-            }
-            Typed::MenuKeys | Typed::Text => Typed::Text,
+            Typed::MenuKeys if are_menu_keys(stroke.keys) => match stroke.keys.last() {
+                Some(b'l' | b'L') => Typed::Secret(TypedSecret::new()),
+                Some(_) | None => Typed::MenuKeys,
+            },
+            Typed::MenuKeys | Typed::Text | Typed::Nothing => Typed::Text,
         };
         if !stroke.enter.is_empty() {
-            self.typed = Typed::MenuKeys;
+            self.typed = match &self.typed {
+                Typed::Secret(secret) if secret.is_empty() => Typed::Nothing,
+                _ => Typed::MenuKeys,
+            };
         }
     }
 
@@ -210,6 +229,10 @@ impl TypedSecret {
         TypedSecret { kept: Zeroizing::new(Vec::with_capacity(LONGEST)), beyond: 0 }
     }
 
+    fn is_empty(&self) -> bool {
+        self.kept.is_empty()
+    }
+
     fn type_in(&mut self, keys: &[u8]) {
         for &key in keys {
             match key {
@@ -233,7 +256,7 @@ mod tests {
     fn type_in(guard: &mut PasswordGuard, typed: &str) -> String {
         let mut shown = String::new();
         for stroke in strokes(typed.as_bytes()) {
-            let open = guard.secrecy_of_keys() == Secrecy::Open;
+            let open = guard.secrecy_of(&stroke) == Secrecy::Open;
             shown.extend(stroke.keys.iter().map(|&key| char::from(if open { key } else { REDACTED })));
             shown.extend(stroke.enter.iter().map(|_| '/'));
             guard.typed(&stroke);
@@ -268,6 +291,12 @@ mod tests {
             ("ml l\r", "ml**/"),
             ("vll\r", "vl*/"),
             ("all\rm", "all/m"),
+            // A script sends everything at once, and its Enter before the question has come.
+            ("l\rAXIO-2010\rm", "l/*********/*"),
+            ("T\rL\r\rAXIO-2010\r", "T/L//*********/"),
+            ("m\nL\n\nAXIO-2010\n", "m/L//*********/"),
+            ("L\r\nAXIO-2010\r\n", "L//*********//"),
+            ("L\rmt\rpx\r", "L/mt/px/"),
         ] {
             assert_eq!(type_in(&mut PasswordGuard::default(), typed), expected, "{typed:?}");
         }

@@ -41,9 +41,14 @@ impl Transmitter {
         }
     }
 
+    /// Whether so many bytes may be queued.
+    pub(super) fn has_room(&self, bytes: usize) -> bool {
+        self.waiting_bytes + bytes <= LIMIT
+    }
+
     /// Queues typed text. Gives `false`, and takes nothing, if too much waits already.
     pub(super) fn push_text(&mut self, bytes: &[u8], secrecy: Secrecy) -> bool {
-        if self.waiting_bytes + bytes.len() > LIMIT {
+        if !self.has_room(bytes.len()) {
             return false;
         }
         for piece in bytes.chunks(PIECE) {

@@ -50,11 +50,7 @@ impl Session {
         }
         let before = (self.facts.diagnostics, self.facts.unrecognised_lines);
         let mut pages = std::mem::take(&mut self.pages);
-        let pending = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric));
-        let pending = pending.map(|mut text| {
-            self.password.conceal(&mut text);
-            text
-        });
+        let pending = self.pending();
         let mut desk = Desk {
             now: self.now,
             transmitter: &mut self.transmitter,

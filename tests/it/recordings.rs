@@ -107,6 +107,25 @@ fn what_writes_to_a_unit_refuses_a_recording() {
 }
 
 #[test]
+fn a_password_that_a_script_sends_with_everything_else_is_in_no_recording() {
+    let world = World::new();
+    for (number, text) in ["lAXIO-2010\n", "l\nAXIO-2010\n", "m\nL\n\nAXIO-2010\n"].into_iter().enumerate() {
+        let record = format!("{number}.cast");
+        fs::write(world.path("keys"), text).expect("written");
+        let port = ["terminal", "--port", "emu:axtc4co", "--record", &record];
+        for (way, end, stdin) in [("file", vec!["--send", "keys"], ""), ("pipe", vec!["--yes"], text)] {
+            let ran = world.run(&[&port[..], &end[..]].concat(), stdin.as_bytes());
+            assert_eq!(ran.code, Some(0), "{way} {text:?}: {}", ran.err);
+            let recorded = fs::read_to_string(world.path(&record)).expect("recorded");
+            assert!(recorded.contains("*********"), "{way} {text:?}: {recorded}");
+            for said in [&recorded, &ran.out, &ran.err] {
+                assert!(!said.contains("AXIO-2010") && !said.contains("XIO-201"), "{way} {text:?}: {said}");
+            }
+        }
+    }
+}
+
+#[test]
 fn what_is_no_recording_is_said_with_its_place() {
     let world = World::new();
     let head = "{\"version\":2,\"axcon\":{\"schema\":\"axcon.recording/1\",\"encoding\":\"latin-1\"}}\n";

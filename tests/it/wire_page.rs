@@ -151,7 +151,7 @@ fn error(product: &'static Product, loader: LoaderKind) -> Vec<String> {
     talk.keys(b"AXIO-2010\r");
     talk.keys(b"\r");
     talk.forget();
-    let damaged = Command::Bytes(b"S00B0000000041584920312EFF\r".to_vec());
+    let damaged = Command::Keys(b"S00B0000000041584920312EFF\r".to_vec());
     talk.bench.command(damaged);
     talk.hear(500);
     talk.lines()

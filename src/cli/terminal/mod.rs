@@ -417,7 +417,7 @@ impl Conversation {
                 self.last = now;
                 return self.say(&text, output);
             }
-            self.session.command(now, Command::Bytes(piece)).map_err(|refusal| CliError::new(Kind::Failed, refusal))?;
+            self.session.command(now, Command::Keys(piece)).map_err(|refusal| CliError::new(Kind::Failed, refusal))?;
         }
         Ok(())
     }

@@ -496,7 +496,7 @@ impl App {
     fn command(&mut self, command: Command) -> bool {
         let Some(session) = &mut self.session else { return false };
         let job = match &command {
-            Command::Keys(_) | Command::Bytes(_) | Command::Cancel => None,
+            Command::Keys(_) | Command::Cancel => None,
             Command::Identify => Some(Job::Identify),
             Command::StreamOn { .. } => Some(Job::StreamOn),
             Command::StreamOff => Some(Job::StreamOff),
