@@ -32,7 +32,8 @@ pub struct Args {
     /// Check the image, find out who is there, show the plan, and stop.
     #[arg(long)]
     dry_run: bool,
-    /// The unit's product, where the unit itself cannot say it (it waits in its loader).
+    /// The unit's product, where the unit itself cannot say it (it waits in its loader). If the note of an upload that
+    /// was left on this port says another one, that counts, unless --allow wrong-product says that the note is wrong.
     #[arg(long, value_name = "NAME", value_parser = names::product)]
     product: Option<&'static Product>,
     /// Send long records instead of the file's own: the same words in fewer characters, a sixth less time.
@@ -124,6 +125,13 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     find_product(&mut talk, args, global, output)?;
     let facts = talk.session().facts().clone();
     plan(report, image, name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
+    if let Some(product) = args.product
+        && let Some(note) = journal.against(&facts, &product.name)
+        && !args.allow.contains(&DefectId::WrongProduct)
+    {
+        talk.close(output);
+        return Err(contradicted(note, product));
+    }
     if args.dry_run {
         let port = talk.port().to_owned();
         talk.close(output);
@@ -147,6 +155,8 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         None if needs_password => Some(password::ask(Some(&mut talk))?),
         password => password.clone(),
     };
+    // Whom nobody but the note has told of the product has to learn how a wrong note is corrected.
+    let doubt = journal.note.as_ref().filter(|_| args.product.is_none() && facts.product.is_none()).map(doubt);
     let mut note = journal.compose(&facts, product.as_deref(), name, &talk);
     let order = LoadOrder {
         product,
@@ -176,7 +186,12 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         return Err(CliError::message(Kind::Failed, "the upload ended without a report"));
     };
     journal.end(&result, output);
+    let is_wrong_product = result.misfit == Some(DefectId::WrongProduct);
     let result = conclude(&result, lost, report, talk.port(), output);
+    let result = match doubt.filter(|_| is_wrong_product) {
+        Some(doubt) => result.map_err(|error| error.hint(doubt)),
+        None => result,
+    };
     talk.close(output);
     result
 }
@@ -196,6 +211,24 @@ fn find_product(talk: &mut Talk, args: &Args, global: &Global, output: &mut Outp
     output.remark("axcon: the unit's menu does not name it; its object dictionary is asked");
     // What it showed is among the facts then; if it would not, the upload says what is missing.
     talk.ask(Command::ReadDictionary).map(|_| ())
+}
+
+/// The note of an upload that was left in the middle knows the unit as another product than the user says.
+fn contradicted(note: &Note, product: &Product) -> CliError {
+    let Note { product: noted, image, .. } = note;
+    let message = format!(
+        "the unit is an {noted}, not an {}: so says the note of the upload of '{image}' that was left on this port",
+        product.name
+    );
+    CliError::message(Kind::ImageRefused, message)
+        .hint("nothing was changed: take the file that is made for this unit, without --product")
+        .hint("if the note is wrong, since another unit is there now: the same command with --allow wrong-product")
+}
+
+/// How a note is corrected that is all there is to know the product by.
+fn doubt(note: &Note) -> String {
+    let Note { product, image, .. } = note;
+    format!("{product} is what the note of '{image}' says; if that is wrong: --product NAME --allow wrong-product")
 }
 
 /// What the upload itself would say of this image for this unit.
@@ -226,7 +259,9 @@ fn check_fit(
         None => Ok(product),
         Some(misfit) => {
             let allow = format!("if it is wanted all the same: --allow {}", misfit.id);
-            Err(refused(misfit.message).hint(allow))
+            let error = refused(misfit.message).hint(allow);
+            let is_noted_only = misfit.id == DefectId::WrongProduct && said.is_none() && args.product.is_none();
+            Err(note.filter(|_| is_noted_only).map(doubt).into_iter().fold(error, CliError::hint))
         }
     }
 }
