@@ -169,10 +169,8 @@ pub enum Effect {
     UploadBegins {
         /// The link.
         link: String,
-        /// The unit's product.
-        product: String,
-        /// The image's file.
-        image: String,
+        /// The unit and the image.
+        noted: Noted,
     },
     /// The unit on a link runs: forget the note.
     UploadEnds {
@@ -222,6 +220,8 @@ pub struct Noted {
     pub product: String,
     /// The image's file.
     pub image: String,
+    /// The software the unit ran before, where it said so.
+    pub ran: Option<Version>,
 }
 
 /// One recording.

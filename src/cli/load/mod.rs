@@ -15,7 +15,7 @@ use super::talk::{Ended, Talk, no_answer_hints};
 use super::{Global, ask, link, names, password};
 use crate::device::{self, LoaderKind, Product};
 use crate::host::journal::Note;
-use crate::image::{CheckedImage, DefectId, Report};
+use crate::image::{CheckedImage, DefectId, Report, Software};
 use crate::secret::Secret;
 use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, Phase, UnitNow, UnitState, Verdict};
 use meter::Meter;
@@ -132,14 +132,21 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         talk.close(output);
         return Err(contradicted(note, product));
     }
+    let noted = journal.note.as_ref().map(|note| note.product.clone());
+    let said = facts.product.as_ref().map(|known| known.value.clone());
+    let believed = said.or(args.product.map(|product| product.name.clone())).or_else(|| noted.clone());
+    let ran = believed.and_then(|product| journal.ran(&product));
+    let talks = matches!(facts.state, UnitState::Loader | UnitState::Application);
+    if talks && facts.version.is_none() && ran.is_none() && image.identity().is_some() {
+        output.remark("axcon: which version the unit ran is not known, so nobody can say whether the image is older");
+    }
     if args.dry_run {
         let port = talk.port().to_owned();
         talk.close(output);
-        let product = check_fit(image, &facts, journal.note.as_ref(), args)?;
+        let product = check_fit(image, &facts, &journal, args)?;
         return planned(report, Some((&facts, &port)), Some(&product.name), output);
     }
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
-    let noted = journal.note.as_ref().map(|note| note.product.clone());
     let product = args.product.map(|product| product.name.clone()).or(noted);
     let needs_password = facts.state != UnitState::Loader;
     if needs_password && password.is_none() && !ask::somebody() {
@@ -160,6 +167,7 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     let mut note = journal.compose(&facts, product.as_deref(), name, &talk);
     let order = LoadOrder {
         product,
+        ran,
         loader: args.loader,
         packed: args.pack,
         allowed: args.allow.clone(),
@@ -232,12 +240,7 @@ fn doubt(note: &Note) -> String {
 }
 
 /// What the upload itself would say of this image for this unit.
-fn check_fit(
-    image: &CheckedImage,
-    facts: &Facts,
-    note: Option<&Note>,
-    args: &Args,
-) -> Result<&'static Product, CliError> {
+fn check_fit(image: &CheckedImage, facts: &Facts, journal: &Desk, args: &Args) -> Result<&'static Product, CliError> {
     let refused = |message: String| CliError::message(Kind::ImageRefused, message + ": it would be refused");
     let said = facts.product.as_ref().and_then(|known| Product::named(&known.value));
     if let (Some(said), Some(ordered)) = (said, args.product)
@@ -245,6 +248,7 @@ fn check_fit(
     {
         return Err(refused(format!("the unit is an {}, not an {}", said.name, ordered.name)));
     }
+    let note = journal.note.as_ref();
     let noted = note.and_then(|note| Product::named(&note.product));
     if matches!(facts.state, UnitState::Silent | UnitState::Unknown) {
         return Err(no_answer_hints(CliError::message(Kind::NoAnswer, "no unit answers on this port")));
@@ -254,7 +258,8 @@ fn check_fit(
         return Err(CliError::message(Kind::Usage, message).hint("look at its label and say it: --product NAME"));
     };
     let unit = product.target_with(args.loader.unwrap_or(product.loader.kind));
-    let misfits = image.misfits(&unit, facts.version.as_ref().map(|known| known.value));
+    let runs = facts.version.as_ref().map(|known| Software::Runs(known.value));
+    let misfits = image.misfits(&unit, runs.or_else(|| journal.ran(&product.name).map(Software::Ran)));
     match misfits.into_iter().find(|misfit| !args.allow.contains(&misfit.id)) {
         None => Ok(product),
         Some(misfit) => {

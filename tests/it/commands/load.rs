@@ -183,6 +183,25 @@ fn a_product_that_contradicts_the_note_is_refused_and_no_failure_rewrites_the_no
 }
 
 #[test]
+fn older_software_than_what_ran_before_an_interrupted_upload_is_sent_only_if_it_is_wanted() {
+    let bench = Bench::left_in_loader();
+    let older = ["image", "make", "--product", "axtc4co", "--version", "1.0.9", "--words", "600", "--out", "old.S"];
+    assert_eq!(bench.world.run(&older, b"").code, Some(0));
+    for more in [&[][..], &["--dry-run"], &["--product", "axtc4co"]] {
+        let refused = bench.load("old.S", more);
+        assert_eq!(refused.code, Some(5), "{}", refused.err);
+        assert!(refused.err.contains("older than the V1.1.0 that the unit ran before"), "{}", refused.err);
+        assert!(refused.err.contains("--allow downgrade"), "{}", refused.err);
+    }
+    // Where nobody knows what it ran, that is said.
+    let journal = bench.world.path("state/axcon/uploads.json");
+    fs::remove_file(journal).expect("the note");
+    let planned = bench.load("old.S", &["--dry-run", "--product", "axtc4co"]);
+    assert_eq!(planned.code, Some(0), "{}", planned.err);
+    assert!(planned.err.contains("which version the unit ran is not known"), "{}", planned.err);
+}
+
+#[test]
 fn a_note_that_is_wrong_is_overridden_by_whoever_says_so() {
     let bench = Bench::left_in_loader();
     let journal = bench.world.path("state/axcon/uploads.json");
