@@ -83,7 +83,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     }
     let password = if args.dry_run { None } else { password::find(args.password_file.as_deref())? };
     if args.dry_run && global.ports.is_empty() {
-        plan(&report, &image, &name, None, output)?;
+        plan(&report, &image, &name, args.loader, None, output)?;
         return planned(&report, None, image.identity().map(|identity| identity.product.as_str()), output);
     }
     let mut prepared = Prepared { args, name, report, image, password };
@@ -124,7 +124,7 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     let journal = Desk::of(&talk);
     find_product(&mut talk, args, global, output)?;
     let facts = talk.session().facts().clone();
-    plan(report, image, name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
+    plan(report, image, name, args.loader, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
     if let Some(product) = args.product
         && let Some(note) = journal.against(&facts, &product.name)
         && !args.allow.contains(&DefectId::WrongProduct)
@@ -346,6 +346,7 @@ fn plan(
     report: &Report,
     image: &CheckedImage,
     name: &str,
+    loader: Option<LoaderKind>,
     unit: Option<(&Facts, &str, Option<&Note>)>,
     output: &mut Output,
 ) -> Result<(), CliError> {
@@ -375,7 +376,13 @@ fn plan(
         };
         output.remark(&format!("unit   {port}: {unit}"));
     }
-    let seconds = device::transfer_time(report.facts.characters, report.facts.data_bytes).as_secs_f64();
+    let said = unit.and_then(|(facts, ..)| Some(facts.product.as_ref()?.value.as_str()));
+    let noted = || unit.and_then(|(_, _, note)| Some(note?.product.as_str()));
+    let named = || image.identity().map(|identity| identity.product.as_str());
+    let product = said.or_else(noted).or_else(named).and_then(Product::named);
+    let pace = product.map(|product| (loader.unwrap_or(product.loader.kind), &product.flash));
+    let (characters, data_bytes) = (report.facts.characters, report.facts.data_bytes);
+    let seconds = device::transfer_time(characters, data_bytes, pace).as_secs_f64();
     let enter = match unit {
         Some((facts, ..)) if facts.state == UnitState::Loader => "",
         Some(_) | None => "enter the loader, ",
