@@ -281,6 +281,16 @@ fn bad_images_of_every_kind_give_one_message_and_5() {
 }
 
 #[test]
+fn a_large_file_that_is_no_image_is_told_with_its_whole_size() {
+    let world = World::new();
+    fs::write(world.path("zeros"), vec![0; 3_000_000]).expect("written");
+    let ran = world.run(&["image", "info", "zeros"], b"");
+    assert!(ran.out.contains("3,000,000 bytes"), "{}{}", ran.out, ran.err);
+    let ran = world.run(&["image", "check", "zeros", "--json"], b"");
+    assert_eq!(json(&ran.out)["size"], 3_000_000, "{}", ran.err);
+}
+
+#[test]
 fn a_client_nobody_here_wrote_uploads_into_the_emulator() {
     let Some(python) = std::env::var_os("AXCON_TEST_PYTHON") else {
         // Straight to the stream: what the test harness captures of a test that passes is never seen.
