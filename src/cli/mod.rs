@@ -216,6 +216,10 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
     {
         return Err(CliError::message(error::Kind::Usage, format!("'{twice}' is named twice")));
     }
+    if let Some((one, other)) = link::same_device(&global.ports) {
+        let message = format!("'{one}' and '{other}' are the same port");
+        return Err(CliError::message(error::Kind::Usage, message).hint("name each unit once"));
+    }
     match cli.command {
         None => console::run(global),
         Some(Command::Ports(args)) => ports::run(args, global, output),

@@ -375,6 +375,15 @@ fn several_units_are_uploaded_to_at_once_and_one_that_fails_disturbs_none() {
 }
 
 #[test]
+fn a_port_and_a_link_to_it_are_one_port_named_twice() {
+    let bench = Bench::new();
+    let device = fs::canonicalize(bench.world.path("u0")).expect("a device").display().to_string();
+    let ran = bench.load("new.S", &["--port", &device]);
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("are the same port") && !ran.err.contains("in use"), "{}", ran.err);
+}
+
+#[test]
 fn an_upload_whose_reader_has_gone_is_finished_all_the_same() {
     let world = World::new();
     let args = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "1500", "--out", "new.S"];
