@@ -67,7 +67,8 @@ const EXIT_CODES: &str = "Exit codes:
   7    the upload failed and the unit waits in its loader: send again
   8    the upload failed and nobody can say what the unit is now
   9    the unit runs, but not what was sent
-  130  interrupted";
+  130  interrupted, by a key or a signal (SIGINT, SIGTERM, SIGHUP)
+If `load` to several ports fails: the code that all failures share, else 1.";
 
 /// What every command understands.
 #[derive(Debug, Clone, Args)]

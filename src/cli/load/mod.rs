@@ -26,7 +26,7 @@ use meter::Meter;
 /// is the product the image is for. A failed upload leaves a unit that waits in its loader: run the same command again.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The S-record file.
+    /// The image: a file of S-records or Intel HEX.
     #[arg(value_name = "IMAGE")]
     image: PathBuf,
     /// Check the image, find out who is there, show the plan, and stop.
