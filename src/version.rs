@@ -3,11 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A software version: major, minor, patch. Ordered, so that a downgrade can be told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
-#[serde(try_from = "String")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Version {
     /// First number.
     pub major: u16,
@@ -49,6 +49,12 @@ impl FromStr for Version {
         let mut next = || numbers.next().flatten().ok_or_else(complaint);
         let version = Version::new(next()?, next()?, next()?);
         if numbers.next().is_some() { Err(complaint()) } else { Ok(version) }
+    }
+}
+
+impl From<Version> for String {
+    fn from(version: Version) -> String {
+        version.to_string()
     }
 }
 

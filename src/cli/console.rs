@@ -15,7 +15,7 @@ use crate::host::ports;
 use crate::image::DefectId;
 use crate::time::Instant;
 use crate::tui::run::{End, World};
-use crate::tui::{self, Failure, ImageFacts, Palette};
+use crate::tui::{self, Failure, ImageFacts, Noted, Palette};
 
 /// Runs the console until the user leaves it.
 ///
@@ -29,7 +29,8 @@ pub fn run(global: &Global) -> Result<(), CliError> {
         baud: global.baud,
         recording: link::recording(global)?,
         noted: |link| {
-            journal(link).and_then(|(journal, key)| journal.note(&key)).map(|note| (note.product, note.image))
+            let note = journal(link).and_then(|(journal, key)| journal.note(&key));
+            note.map(|Note { product, image, ran, .. }| Noted { product, image, ran })
         },
         palette: palette(|name| std::env::var_os(name))?,
         resolve,
@@ -82,12 +83,12 @@ fn check(path: PathBuf, loader: Option<LoaderKind>, allow: &[DefectId]) -> Resul
 }
 
 /// The console says what it notes; that a note could not be written costs a question later, no more.
-fn note(link: &str, upload: Option<(&str, &str)>) {
+fn note(link: &str, upload: Option<Noted>) {
     let Some((journal, key)) = journal(link) else { return };
     let _ = match upload {
-        Some((product, image)) => {
+        Some(Noted { product, image, ran }) => {
             let unix_seconds = Clock::start().wall(Instant::ZERO).as_second();
-            journal.begin(&key, Note { product: product.to_owned(), image: image.to_owned(), unix_seconds })
+            journal.begin(&key, Note { product, image, unix_seconds, ran })
         }
         None => journal.end(&key),
     };

@@ -311,8 +311,8 @@ mod hosting {
                     match Order::read(&line, &products) {
                         Ok(None) => {}
                         Ok(Some(Order::Quit)) => return Ok(()),
-                        Ok(Some(Order::Help)) => tell_help(&help(), output)?,
-                        Ok(Some(Order::HelpFaults)) => tell_help(fault::HELP, output)?,
+                        Ok(Some(Order::Help)) => tell_help(line.trim(), &help(), output)?,
+                        Ok(Some(Order::HelpFaults)) => tell_help(line.trim(), fault::HELP, output)?,
                         Ok(Some(Order::Tell(verbs))) => {
                             for (place, verb) in verbs {
                                 if !tell(&units[place], place, verb, line.trim(), news) {
@@ -345,13 +345,14 @@ mod hosting {
         }
     }
 
-    /// For a person, whom a stream of objects is not for.
-    fn tell_help(text: &str, output: &mut Output) -> Result<(), CliError> {
+    /// An answer like any other: whoever waits for an object behind each verb gets one.
+    fn tell_help(verb: &str, text: &str, output: &mut Output) -> Result<(), CliError> {
+        let text = text.trim_end();
         if output.json {
-            output.remark(text);
-            return Ok(());
+            let schema = "axcon.emulate-answer/1";
+            return output.object(&Answered { schema, unit: None, verb, ok: true, said: Some(text) });
         }
-        output.data(format!("{}\n", text.trim_end()).as_bytes())
+        output.data(format!("{text}\n").as_bytes())
     }
 
     /// Has a unit do something; `false` if it takes no order.

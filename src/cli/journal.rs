@@ -5,6 +5,7 @@ use super::output::Output;
 use super::talk::Talk;
 use crate::host::journal::{Journal, Note};
 use crate::session::{Facts, LoadReport, UnitNow, UnitState};
+use crate::version::Version;
 
 /// The journal's part in what is done on one port.
 pub struct Desk {
@@ -23,12 +24,28 @@ impl Desk {
         Desk { journal, note }
     }
 
-    /// What is to be noted of this upload, if anything can be.
+    /// The note, if it knows the unit as another product than the user says and the unit itself does not say.
+    pub fn against(&self, facts: &Facts, product: &str) -> Option<&Note> {
+        self.note.as_ref().filter(|note| facts.product.is_none() && !note.product.eq_ignore_ascii_case(product))
+    }
+
+    /// The software that ran before the noted upload, if that was to this product.
+    pub fn ran(&self, product: &str) -> Option<Version> {
+        self.note.as_ref().filter(|note| note.product.eq_ignore_ascii_case(product))?.ran
+    }
+
+    /// What is to be noted of this upload, if anything can be. A note that knows the unit as another product stays what
+    /// it is until the unit runs: an attempt that fails proves nothing against it.
     pub fn compose(&self, facts: &Facts, product: Option<&str>, image: &str, talk: &Talk) -> Option<Note> {
         let said = facts.product.as_ref().map(|known| known.value.as_str());
         let product = said.or(product)?.to_owned();
         let unix_seconds = talk.calendar().at(talk.now()).as_second();
-        Some(Note { product, image: image.to_owned(), unix_seconds })
+        if let Some(note) = self.against(facts, &product) {
+            return Some(Note { unix_seconds, ..note.clone() });
+        }
+        // A loader does not say what ran before it was entered.
+        let ran = facts.version.as_ref().map(|known| known.value).or_else(|| self.ran(&product));
+        Some(Note { product, image: image.to_owned(), unix_seconds, ran })
     }
 
     /// Notes that an upload begins.

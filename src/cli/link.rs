@@ -48,6 +48,22 @@ pub fn named(text: &str, found: impl FnOnce() -> Vec<Port>) -> Result<LinkSpec, 
     }
 }
 
+/// Two of these names that mean the same device, a link to it or its adapter's serial number perhaps: the second would be
+/// told that the first is in its way, by this program's own process number.
+pub fn same_device(names: &[String]) -> Option<(&str, &str)> {
+    let [_, _, ..] = names else { return None };
+    let device = |name: &String| match named(name, || ports::list().unwrap_or_default()) {
+        Ok(LinkSpec::Serial(path)) => std::fs::canonicalize(path).ok(),
+        // What makes no sense is said when it is opened.
+        Ok(_) | Err(_) => None,
+    };
+    let devices: Vec<_> = names.iter().map(device).collect();
+    devices.iter().enumerate().find_map(|(at, device)| {
+        let before = devices[..at].iter().position(|before| before.is_some() && before == device)?;
+        Some((names[before].as_str(), names[at].as_str()))
+    })
+}
+
 /// What a name that is no link means to the user.
 pub fn spec_error(error: LinkSpecError) -> CliError {
     CliError::new(Kind::Usage, anyhow::Error::new(error).context("--port"))

@@ -67,7 +67,8 @@ const EXIT_CODES: &str = "Exit codes:
   7    the upload failed and the unit waits in its loader: send again
   8    the upload failed and nobody can say what the unit is now
   9    the unit runs, but not what was sent
-  130  interrupted";
+  130  interrupted, by a key or a signal (SIGINT, SIGTERM, SIGHUP)
+If `load` to several ports fails: the code that all failures share, else 1.";
 
 /// What every command understands.
 #[derive(Debug, Clone, Args)]
@@ -215,6 +216,10 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         global.ports.iter().enumerate().find_map(|(at, port)| global.ports[..at].contains(port).then_some(port))
     {
         return Err(CliError::message(error::Kind::Usage, format!("'{twice}' is named twice")));
+    }
+    if let Some((one, other)) = link::same_device(&global.ports) {
+        let message = format!("'{one}' and '{other}' are the same port");
+        return Err(CliError::message(error::Kind::Usage, message).hint("name each unit once"));
     }
     match cli.command {
         None => console::run(global),

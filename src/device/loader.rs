@@ -74,16 +74,27 @@ pub const RING: usize = 550;
 /// Erasing one page or sector (public data sheet of the 56F83xx, likely the part).
 pub const ERASE_TIME: Duration = Duration::from_millis(20);
 
+/// Words a G3 loader erases together: a sector of the 56F8367's interleaved program flash (likely). 512 KByte take 10.2 s.
+pub const SECTOR_WORDS: u32 = 512;
+
 /// Programming one word (public data sheet of the 56F83xx, likely the part).
 pub const PROGRAM_TIME: Duration = Duration::from_micros(20);
 
 /// How long an image of so many characters with so many bytes of data takes, from its first record to its last: the line
-/// at 115200 baud with ten bits a character, and what erasing and programming a page after the other takes besides. An
-/// estimate, for plans only.
-pub fn transfer_time(characters: u64, data_bytes: u64) -> Duration {
+/// at 115200 baud with ten bits a character, and what the loader of the unit does besides. One that stops for pages
+/// erases and programs one after the other while the line stands still; one that stops for records erases all of the
+/// flash behind the header, whatever the image's size, and programs while characters come. An estimate, for plans only.
+pub fn transfer_time(characters: u64, data_bytes: u64, unit: Option<(LoaderKind, &FlashMap)>) -> Duration {
     let line = Duration::from_secs_f64(characters as f64 / CHARACTERS_PER_SECOND);
-    let pages = u32::try_from(data_bytes.div_ceil(2 * PAGE_WORDS)).unwrap_or(u32::MAX);
-    line + (ERASE_TIME + PROGRAM_TIME * PAGE_WORDS as u32) * pages
+    match unit {
+        Some((loader, flash)) if loader.pacing() == Pacing::Records => {
+            line + ERASE_TIME * flash.program_words.div_ceil(SECTOR_WORDS)
+        }
+        _ => {
+            let pages = u32::try_from(data_bytes.div_ceil(2 * PAGE_WORDS)).unwrap_or(u32::MAX);
+            line + (ERASE_TIME + PROGRAM_TIME * PAGE_WORDS as u32) * pages
+        }
+    }
 }
 
 /// What the units' line carries at 115200 baud, 8N1.
@@ -101,6 +112,20 @@ pub fn longest_erase(flash: &FlashMap) -> Duration {
 mod tests {
     use super::*;
     use crate::image::AddressUnit;
+
+    #[test]
+    fn a_plan_counts_what_each_loader_does_besides_the_line() {
+        let flash = FlashMap { address_unit: AddressUnit::Word, program_words: 0x40000, page_words: 256 };
+        let seconds = |unit| transfer_time(11_520, 5_120, unit).as_secs_f64();
+        let of = |kind| seconds(Some((kind, &flash)));
+        // Ten pages, each erased and programmed; or 512 sectors, however small the image is.
+        for paged in [seconds(None), of(LoaderKind::G1), of(LoaderKind::G2)] {
+            assert!((paged - 1.2512).abs() < 1e-6, "{paged}");
+        }
+        for whole in [of(LoaderKind::G3), of(LoaderKind::G3Early)] {
+            assert!((whole - 11.24).abs() < 1e-6, "{whole}");
+        }
+    }
 
     #[test]
     fn erasing_half_a_megabyte_page_by_page_takes_twenty_seconds() {

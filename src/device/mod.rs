@@ -12,7 +12,7 @@ pub mod schema;
 
 pub use complaint::{Complaint, Complaints};
 pub use dictionary::Dictionary;
-pub use loader::{ERASE_TIME, LoaderKind, PROGRAM_TIME, Pacing, RING, longest_erase, transfer_time};
+pub use loader::{ERASE_TIME, LoaderKind, PROGRAM_TIME, Pacing, RING, SECTOR_WORDS, longest_erase, transfer_time};
 
 use std::sync::OnceLock;
 

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::save::{SaveError, save};
+use crate::version::Version;
 
 /// The notes.
 #[derive(Clone, Debug)]
@@ -29,6 +30,9 @@ pub struct Note {
     pub image: String,
     /// When, in seconds since 1970.
     pub unix_seconds: i64,
+    /// The software the unit ran before, where it said so: older software should not take its place unasked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ran: Option<Version>,
 }
 
 #[derive(Default, Serialize, Deserialize)]
@@ -134,7 +138,7 @@ mod tests {
     use super::*;
 
     fn note(unix_seconds: i64) -> Note {
-        Note { product: "AXTC4CO".into(), image: "a.S".into(), unix_seconds }
+        Note { product: "AXTC4CO".into(), image: "a.S".into(), unix_seconds, ran: None }
     }
 
     #[test]
@@ -177,6 +181,19 @@ mod tests {
         for number in 0..8 {
             assert!((0..10).all(|round| journal.note(&format!("u{number}-{round}")).is_some()), "{number}");
         }
+    }
+
+    #[test]
+    fn what_ran_before_is_noted_and_missing_in_notes_of_older_programs() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let journal = Journal::at(folder.path().join("uploads.json"));
+        let old =
+            r#"{"schema":"axcon.journal/1","uploads":{"u0":{"product":"AXTC4CO","image":"a.S","unix_seconds":1}}}"#;
+        fs::write(folder.path().join("uploads.json"), old).expect("written");
+        assert_eq!(journal.note("u0"), Some(note(1)));
+        let ran = Note { ran: Some(Version::new(1, 2, 0)), ..note(2) };
+        journal.begin("u0", ran.clone()).expect("written");
+        assert_eq!(journal.note("u0"), Some(ran));
     }
 
     #[test]

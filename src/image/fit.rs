@@ -18,10 +18,19 @@ pub struct Misfit {
     pub message: String,
 }
 
+/// The unit's software, as far as anybody knows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Software {
+    /// It runs now.
+    Runs(Version),
+    /// It ran before an upload that has not ended well.
+    Ran(Version),
+}
+
 impl CheckedImage {
-    /// What speaks against sending this image to such a unit, which runs `version` now if that is known. Each kind of
+    /// What speaks against sending this image to such a unit, whose software is this if that is known. Each kind of
     /// misfit once; those that were allowed when the file was checked are none.
-    pub fn misfits(&self, unit: &Target, version: Option<Version>) -> Vec<Misfit> {
+    pub fn misfits(&self, unit: &Target, software: Option<Software>) -> Vec<Misfit> {
         let mut misfits: Vec<Misfit> = Vec::new();
         let mut note = |id: DefectId, message: &dyn Fn() -> String| {
             if !self.overridden().contains(&id) && misfits.iter().all(|misfit| misfit.id != id) {
@@ -36,9 +45,13 @@ impl CheckedImage {
                     format!("the image is for {}, the unit is an {product}", identity.product)
                 });
             }
-            if let Some(runs) = version.filter(|&runs| identity.version < runs) {
+            let newer = software.map(|software| match software {
+                Software::Runs(version) => (version, "runs"),
+                Software::Ran(version) => (version, "ran before"),
+            });
+            if let Some((newer, runs)) = newer.filter(|&(newer, _)| identity.version < newer) {
                 note(DefectId::Downgrade, &|| {
-                    format!("the image is V{}, older than the V{runs} that the unit runs", identity.version)
+                    format!("the image is V{}, older than the V{newer} that the unit {runs}", identity.version)
                 });
             }
         }
@@ -179,7 +192,11 @@ mod tests {
             [(1, 1, 9, &[][..]), (1, 2, 0, &[]), (1, 2, 1, &["downgrade"]), (2, 0, 0, &["downgrade"])]
         {
             let runs = Version::new(major, minor, patch);
-            assert_eq!(ids(&image.misfits(&small(), Some(runs))), expected, "{runs}");
+            for software in [Software::Runs(runs), Software::Ran(runs)] {
+                assert_eq!(ids(&image.misfits(&small(), Some(software))), expected, "{software:?}");
+            }
         }
+        let before = image.misfits(&small(), Some(Software::Ran(Version::new(1, 2, 1))));
+        assert_eq!(before[0].message, "the image is V1.2.0, older than the V1.2.1 that the unit ran before");
     }
 }

@@ -31,7 +31,7 @@ pub use check::check;
 pub use convert::{ConvertError, Shape, convert};
 pub use defect::{Defect, DefectId, Severity, UnknownDefect};
 pub use diff::{Change, Difference, Differing, count_words, diff};
-pub use fit::Misfit;
+pub use fit::{Misfit, Software};
 pub use identity::{Identity, IdentityError};
 pub use lines::LineEnd;
 pub use report::{AddressRange, CheckedImage, Facts, Format, Report};

@@ -63,6 +63,8 @@ pub struct LoadOrder {
     pub password: Option<Secret>,
     /// The product, where the user says it or a journal knows it; otherwise the unit is asked.
     pub product: Option<String>,
+    /// The software it ran before, where a journal knows it: a loader does not say.
+    pub ran: Option<Version>,
     /// The loader it has, where the user knows better than the product's file. How it really paces its sender shows
     /// behind the header in any case.
     pub loader: Option<LoaderKind>,
@@ -82,6 +84,7 @@ impl LoadOrder {
             image,
             password: password.into(),
             product: None,
+            ran: None,
             loader: None,
             packed: false,
             allowed: Vec::new(),

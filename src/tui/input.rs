@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use ratatui::crossterm::event::Event as TerminalEvent;
 
-use crate::device::{self, LoaderKind};
+use crate::device::{self, LoaderKind, Product};
 use crate::endpoint::{Arrived, Transmit};
 use crate::image::{CheckedImage, DefectId, Report, Severity};
 use crate::session::LoadOrder;
@@ -169,10 +169,8 @@ pub enum Effect {
     UploadBegins {
         /// The link.
         link: String,
-        /// The unit's product.
-        product: String,
-        /// The image's file.
-        image: String,
+        /// The unit and the image.
+        noted: Noted,
     },
     /// The unit on a link runs: forget the note.
     UploadEnds {
@@ -222,6 +220,8 @@ pub struct Noted {
     pub product: String,
     /// The image's file.
     pub image: String,
+    /// The software the unit ran before, where it said so.
+    pub ran: Option<Version>,
 }
 
 /// One recording.
@@ -378,8 +378,10 @@ impl ImageFacts {
             defects.push(format!("{} more defects are not listed", report.unlisted()));
         }
         let image = report.image().filter(|_| ok);
+        let product = identity.and_then(|identity| Product::named(&identity.product));
+        let unit = product.map(|product| (loader.unwrap_or(product.loader.kind), &product.flash));
         let amount = |records, characters| {
-            let time = device::transfer_time(characters as u64, report.facts.data_bytes);
+            let time = device::transfer_time(characters as u64, report.facts.data_bytes, unit);
             Amount { records, characters, time }
         };
         let packed = image.clone().map_or(Amount::default(), |image| {

@@ -99,7 +99,7 @@ impl Desk {
                     self.sent.extend(&transmit.bytes);
                     self.unit.send(self.now, &transmit.bytes);
                 }
-                Effect::UploadBegins { product, image, .. } => self.noted = Some(Noted { product, image }),
+                Effect::UploadBegins { noted, .. } => self.noted = Some(noted),
                 Effect::UploadEnds { .. } => self.noted = None,
                 Effect::ListRecordings => self.input(Input::RecordingsListed(Ok(vec![RecordingEntry {
                     link: "replay:/home/service/.local/state/axcon/recordings/20260131T120000Z-ttyUSB0-1.cast".into(),

@@ -164,16 +164,19 @@ pub fn read_for(
     if path == Path::new("-") {
         return checked(io::stdin().lock(), path, targets, expected, allow);
     }
-    match std::fs::metadata(path) {
+    let size = match std::fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => {
             let message = format!("{} is a directory, not an image file", shown(path));
             return Err(CliError::message(Kind::ImageRefused, message).hint("Name the .S file itself."));
         }
-        Ok(_) => {}
+        Ok(metadata) => metadata.is_file().then_some(metadata.len()),
         Err(error) => return Err(unreadable(path, error)),
-    }
+    };
     let file = File::open(path).map_err(|error| unreadable(path, error))?;
-    checked(file, path, targets, expected, allow)
+    let mut report = checked(file, path, targets, expected, allow)?;
+    // What is no image is not read to its end, and has its size all the same.
+    report.facts.size = size.map_or(report.facts.size, |size| size.max(report.facts.size));
+    Ok(report)
 }
 
 fn checked(

@@ -15,7 +15,7 @@ use super::talk::{Ended, Talk, no_answer_hints};
 use super::{Global, ask, link, names, password};
 use crate::device::{self, LoaderKind, Product};
 use crate::host::journal::Note;
-use crate::image::{CheckedImage, DefectId, Report};
+use crate::image::{CheckedImage, DefectId, Report, Software};
 use crate::secret::Secret;
 use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, Phase, UnitNow, UnitState, Verdict};
 use meter::Meter;
@@ -26,13 +26,14 @@ use meter::Meter;
 /// is the product the image is for. A failed upload leaves a unit that waits in its loader: run the same command again.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The S-record file.
+    /// The image: a file of S-records or Intel HEX.
     #[arg(value_name = "IMAGE")]
     image: PathBuf,
     /// Check the image, find out who is there, show the plan, and stop.
     #[arg(long)]
     dry_run: bool,
-    /// The unit's product, where the unit itself cannot say it (it waits in its loader).
+    /// The unit's product, where the unit itself cannot say it (it waits in its loader). If the note of an upload that
+    /// was left on this port says another one, that counts, unless --allow wrong-product says that the note is wrong.
     #[arg(long, value_name = "NAME", value_parser = names::product)]
     product: Option<&'static Product>,
     /// Send long records instead of the file's own: the same words in fewer characters, a sixth less time.
@@ -82,7 +83,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     }
     let password = if args.dry_run { None } else { password::find(args.password_file.as_deref())? };
     if args.dry_run && global.ports.is_empty() {
-        plan(&report, &image, &name, None, output)?;
+        plan(&report, &image, &name, args.loader, None, output)?;
         return planned(&report, None, image.identity().map(|identity| identity.product.as_str()), output);
     }
     let mut prepared = Prepared { args, name, report, image, password };
@@ -123,15 +124,29 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
     let journal = Desk::of(&talk);
     find_product(&mut talk, args, global, output)?;
     let facts = talk.session().facts().clone();
-    plan(report, image, name, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
+    plan(report, image, name, args.loader, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
+    if let Some(product) = args.product
+        && let Some(note) = journal.against(&facts, &product.name)
+        && !args.allow.contains(&DefectId::WrongProduct)
+    {
+        talk.close(output);
+        return Err(contradicted(note, product));
+    }
+    let noted = journal.note.as_ref().map(|note| note.product.clone());
+    let said = facts.product.as_ref().map(|known| known.value.clone());
+    let believed = said.or(args.product.map(|product| product.name.clone())).or_else(|| noted.clone());
+    let ran = believed.and_then(|product| journal.ran(&product));
+    let talks = matches!(facts.state, UnitState::Loader | UnitState::Application);
+    if talks && facts.version.is_none() && ran.is_none() && image.identity().is_some() {
+        output.remark("axcon: which version the unit ran is not known, so nobody can say whether the image is older");
+    }
     if args.dry_run {
         let port = talk.port().to_owned();
         talk.close(output);
-        let product = check_fit(image, &facts, journal.note.as_ref(), args)?;
+        let product = check_fit(image, &facts, &journal, args)?;
         return planned(report, Some((&facts, &port)), Some(&product.name), output);
     }
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
-    let noted = journal.note.as_ref().map(|note| note.product.clone());
     let product = args.product.map(|product| product.name.clone()).or(noted);
     let needs_password = facts.state != UnitState::Loader;
     if needs_password && password.is_none() && !ask::somebody() {
@@ -147,9 +162,12 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         None if needs_password => Some(password::ask(Some(&mut talk))?),
         password => password.clone(),
     };
+    // Whom nobody but the note has told of the product has to learn how a wrong note is corrected.
+    let doubt = journal.note.as_ref().filter(|_| args.product.is_none() && facts.product.is_none()).map(doubt);
     let mut note = journal.compose(&facts, product.as_deref(), name, &talk);
     let order = LoadOrder {
         product,
+        ran,
         loader: args.loader,
         packed: args.pack,
         allowed: args.allow.clone(),
@@ -176,7 +194,12 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         return Err(CliError::message(Kind::Failed, "the upload ended without a report"));
     };
     journal.end(&result, output);
+    let is_wrong_product = result.misfit == Some(DefectId::WrongProduct);
     let result = conclude(&result, lost, report, talk.port(), output);
+    let result = match doubt.filter(|_| is_wrong_product) {
+        Some(doubt) => result.map_err(|error| error.hint(doubt)),
+        None => result,
+    };
     talk.close(output);
     result
 }
@@ -198,13 +221,26 @@ fn find_product(talk: &mut Talk, args: &Args, global: &Global, output: &mut Outp
     talk.ask(Command::ReadDictionary).map(|_| ())
 }
 
+/// The note of an upload that was left in the middle knows the unit as another product than the user says.
+fn contradicted(note: &Note, product: &Product) -> CliError {
+    let Note { product: noted, image, .. } = note;
+    let message = format!(
+        "the unit is an {noted}, not an {}: so says the note of the upload of '{image}' that was left on this port",
+        product.name
+    );
+    CliError::message(Kind::ImageRefused, message)
+        .hint("nothing was changed: take the file that is made for this unit, without --product")
+        .hint("if the note is wrong, since another unit is there now: the same command with --allow wrong-product")
+}
+
+/// How a note is corrected that is all there is to know the product by.
+fn doubt(note: &Note) -> String {
+    let Note { product, image, .. } = note;
+    format!("{product} is what the note of '{image}' says; if that is wrong: --product NAME --allow wrong-product")
+}
+
 /// What the upload itself would say of this image for this unit.
-fn check_fit(
-    image: &CheckedImage,
-    facts: &Facts,
-    note: Option<&Note>,
-    args: &Args,
-) -> Result<&'static Product, CliError> {
+fn check_fit(image: &CheckedImage, facts: &Facts, journal: &Desk, args: &Args) -> Result<&'static Product, CliError> {
     let refused = |message: String| CliError::message(Kind::ImageRefused, message + ": it would be refused");
     let said = facts.product.as_ref().and_then(|known| Product::named(&known.value));
     if let (Some(said), Some(ordered)) = (said, args.product)
@@ -212,6 +248,7 @@ fn check_fit(
     {
         return Err(refused(format!("the unit is an {}, not an {}", said.name, ordered.name)));
     }
+    let note = journal.note.as_ref();
     let noted = note.and_then(|note| Product::named(&note.product));
     if matches!(facts.state, UnitState::Silent | UnitState::Unknown) {
         return Err(no_answer_hints(CliError::message(Kind::NoAnswer, "no unit answers on this port")));
@@ -221,12 +258,15 @@ fn check_fit(
         return Err(CliError::message(Kind::Usage, message).hint("look at its label and say it: --product NAME"));
     };
     let unit = product.target_with(args.loader.unwrap_or(product.loader.kind));
-    let misfits = image.misfits(&unit, facts.version.as_ref().map(|known| known.value));
+    let runs = facts.version.as_ref().map(|known| Software::Runs(known.value));
+    let misfits = image.misfits(&unit, runs.or_else(|| journal.ran(&product.name).map(Software::Ran)));
     match misfits.into_iter().find(|misfit| !args.allow.contains(&misfit.id)) {
         None => Ok(product),
         Some(misfit) => {
             let allow = format!("if it is wanted all the same: --allow {}", misfit.id);
-            Err(refused(misfit.message).hint(allow))
+            let error = refused(misfit.message).hint(allow);
+            let is_noted_only = misfit.id == DefectId::WrongProduct && said.is_none() && args.product.is_none();
+            Err(note.filter(|_| is_noted_only).map(doubt).into_iter().fold(error, CliError::hint))
         }
     }
 }
@@ -306,6 +346,7 @@ fn plan(
     report: &Report,
     image: &CheckedImage,
     name: &str,
+    loader: Option<LoaderKind>,
     unit: Option<(&Facts, &str, Option<&Note>)>,
     output: &mut Output,
 ) -> Result<(), CliError> {
@@ -335,7 +376,13 @@ fn plan(
         };
         output.remark(&format!("unit   {port}: {unit}"));
     }
-    let seconds = device::transfer_time(report.facts.characters, report.facts.data_bytes).as_secs_f64();
+    let said = unit.and_then(|(facts, ..)| Some(facts.product.as_ref()?.value.as_str()));
+    let noted = || unit.and_then(|(_, _, note)| Some(note?.product.as_str()));
+    let named = || image.identity().map(|identity| identity.product.as_str());
+    let product = said.or_else(noted).or_else(named).and_then(Product::named);
+    let pace = product.map(|product| (loader.unwrap_or(product.loader.kind), &product.flash));
+    let (characters, data_bytes) = (report.facts.characters, report.facts.data_bytes);
+    let seconds = device::transfer_time(characters, data_bytes, pace).as_secs_f64();
     let enter = match unit {
         Some((facts, ..)) if facts.state == UnitState::Loader => "",
         Some(_) | None => "enter the loader, ",

@@ -5,6 +5,7 @@ use super::super::identify::Identify;
 use super::super::job::{Desk, Signal, Work};
 use super::{FILLER, Stage, Transfer, Unheard, UnitNow, Upload, Verdict, shows_application};
 use crate::device::{Product, longest_erase};
+use crate::image::Software;
 use crate::time::{Duration, Instant};
 use crate::wire::{LoaderText, Message, Prompt};
 
@@ -72,7 +73,9 @@ impl Upload {
         };
         self.product = Some(known.name.clone());
         let loader = self.order.loader.unwrap_or(known.loader.kind);
-        let misfits = self.order.image.misfits(&known.target_with(loader), self.version_before);
+        let ran = self.order.ran.map(Software::Ran);
+        let software = self.version_before.map(Software::Runs).or(ran);
+        let misfits = self.order.image.misfits(&known.target_with(loader), software);
         if let Some(misfit) = misfits.into_iter().find(|misfit| !self.order.allowed.contains(&misfit.id)) {
             self.misfit = Some(misfit.id);
             return self.end(desk, Verdict::Refused, unit, misfit.message);

@@ -447,15 +447,17 @@ impl App {
                 let said = self.view.facts.product.as_ref().map(|known| known.value.clone());
                 let product = product.or_else(|| self.view.noted().map(|noted| noted.product.clone()));
                 let known = said.or(product.clone());
+                let ran = self.view.ran();
                 let packed = self.load.is_packed();
                 let (loader, allowed) = (self.load.loader(), self.load.allowed().to_vec());
-                let order = LoadOrder { product, packed, loader, allowed, ..LoadOrder::new(image, password) };
+                let order = LoadOrder { product, ran, packed, loader, allowed, ..LoadOrder::new(image, password) };
                 if self.command(Command::Load(Box::new(order)))
                     && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
                 {
                     // Noted before the first byte leaves: what the session sends is drained behind this.
-                    self.view.link.noted = Some(Noted { product: product.clone(), image: file.clone() });
-                    effects.push(Effect::UploadBegins { link, product, image: file });
+                    let noted = Noted { product, image: file, ran };
+                    self.view.link.noted = Some(noted.clone());
+                    effects.push(Effect::UploadBegins { link, noted });
                 }
             }
             Action::DismissReport => self.view.load.report = None,

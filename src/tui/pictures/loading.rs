@@ -31,7 +31,7 @@ fn an_upload_is_noted_once_it_is_taken_and_before_its_first_byte() {
     let effects = stage.asked();
     let note = effects
         .iter()
-        .position(|effect| matches!(effect, Effect::UploadBegins { product, .. } if product == "AXTC4CO"));
+        .position(|effect| matches!(effect, Effect::UploadBegins { noted, .. } if noted.product == "AXTC4CO"));
     let first = effects.iter().position(|effect| matches!(effect, Effect::Transmit(_)));
     assert!(note.is_some() && (first.is_none() || note < first), "{effects:?}");
 }

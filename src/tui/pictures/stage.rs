@@ -331,7 +331,7 @@ pub(super) fn link_info(link: &str) -> LinkInfo {
 }
 
 pub(super) fn noted(product: &str) -> Option<Noted> {
-    Some(Noted { product: product.into(), image: "/home/service/images/AXTC4CO_V1.2.0.elf.S".into() })
+    Some(Noted { product: product.into(), image: "/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), ran: None })
 }
 
 pub(super) fn axtc4co() -> &'static Product {

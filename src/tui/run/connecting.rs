@@ -11,7 +11,7 @@ use crate::host::replay::Recording;
 use crate::host::socket::Dialled;
 use crate::record::{LINK_BACK, LINK_LOST};
 use crate::time::Instant;
-use crate::tui::{Failure, Input, LinkInfo, Noted};
+use crate::tui::{Failure, Input, LinkInfo};
 
 /// Which dial, of what, and what came of it.
 pub(super) type DialResult = (u64, String, LinkSpec, Result<Dialled, LinkError>);
@@ -85,7 +85,7 @@ impl Console {
             baud: self.world.baud,
             read_only: false,
             recording,
-            noted: (self.world.noted)(name).map(|(product, image)| Noted { product, image }),
+            noted: (self.world.noted)(name),
             start_of_day,
             start_millis: self.clock.wall(Instant::ZERO).as_millisecond()
                 - i64::try_from(self.skew.as_millis()).unwrap_or_default(),

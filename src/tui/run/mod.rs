@@ -22,7 +22,7 @@ use ratatui::crossterm::event::Event as TerminalEvent;
 use connecting::DialResult;
 use player::{Player, Step};
 
-use super::{App, Effect, Failure, ImageFacts, Input, LARGEST_SENT, Options, Palette, Playback};
+use super::{App, Effect, Failure, ImageFacts, Input, LARGEST_SENT, Noted, Options, Palette, Playback};
 use crate::device::LoaderKind;
 use crate::endpoint::Arrived;
 use crate::host;
@@ -66,9 +66,9 @@ pub struct World {
     /// Reads and checks an image file.
     pub check: Check,
     /// Notes that an upload of this product begins on this link, or (`None`) that the unit on it runs.
-    pub note: fn(&str, Option<(&str, &str)>),
-    /// What is noted of an upload on this link that has not ended well: the unit's product, and the image's file.
-    pub noted: fn(&str) -> Option<(String, String)>,
+    pub note: fn(&str, Option<Noted>),
+    /// What is noted of an upload on this link that has not ended well.
+    pub noted: fn(&str) -> Option<Noted>,
 }
 
 /// Reads and checks an image file for a loader, if not each product's own, and allows these errors; or says why it cannot
@@ -403,7 +403,7 @@ impl Console {
                         }
                     });
                 }
-                Effect::UploadBegins { link, product, image } => (self.world.note)(&link, Some((&product, &image))),
+                Effect::UploadBegins { link, noted } => (self.world.note)(&link, Some(noted)),
                 Effect::UploadEnds { link } => (self.world.note)(&link, None),
                 Effect::Suspend => self.suspends = true,
                 Effect::Quit => {

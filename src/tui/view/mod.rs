@@ -15,6 +15,7 @@ use crate::monitor::{Mark, Monitor};
 use crate::record::LINK_LOST;
 use crate::session::{DictionaryReading, Event, Facts, FileEnd, Job, LoadReport, Origin, Outcome, Progress, UnitState};
 use crate::time::{Duration, Instant};
+use crate::version::Version;
 
 /// Everything a screen may read.
 #[derive(Debug, Default)]
@@ -345,6 +346,15 @@ impl View {
     pub fn noted(&self) -> Option<&Noted> {
         let is_mute = self.facts.product.is_none() && self.facts.state != UnitState::Application;
         self.link.noted.as_ref().filter(|_| is_mute)
+    }
+
+    /// The software the unit runs, or ran before the upload that was left in the middle.
+    pub fn ran(&self) -> Option<Version> {
+        let said = self.facts.version.as_ref().map(|known| known.value);
+        let product = self.facts.product.as_ref().map(|known| known.value.as_str());
+        let is_of_unit = |noted: &&Noted| product.is_none_or(|product| noted.product.eq_ignore_ascii_case(product));
+        let noted = self.link.noted.as_ref().filter(|_| self.facts.state != UnitState::Application);
+        said.or_else(|| noted.filter(is_of_unit)?.ran)
     }
 
     /// Says something to the user.

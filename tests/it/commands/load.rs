@@ -140,14 +140,7 @@ fn a_unit_that_dies_in_the_middle_is_saved_by_the_same_command() {
 
 #[test]
 fn a_unit_found_in_its_loader_is_not_sent_anything_before_somebody_says_what_it_is() {
-    let mut bench = Bench::with_image("12000");
-    let mut command = vec!["load", "new.S", "--yes", "--password-file", "pw", "--json", "--port", "u0"];
-    command.extend(FAST);
-    let loading = bench.world.start(&command);
-    loading.wait_out(r#""phase":"transfer","record":1"#);
-    bench.unit = None;
-    loading.wait();
-    bench.power_up();
+    let bench = Bench::left_in_loader();
     // Another computer, where nobody knows of the first attempt.
     fs::remove_file(bench.world.path("state/axcon/uploads.json")).expect("the note");
     let ran = bench.load("new.S", &[]);
@@ -155,6 +148,70 @@ fn a_unit_found_in_its_loader_is_not_sent_anything_before_somebody_says_what_it_
     assert!(ran.err.contains("--product"), "{}", ran.err);
     let ran = bench.load("new.S", &["--product", "axtc4co"]);
     assert_eq!(ran.code, Some(0), "{}", ran.err);
+}
+
+/// What the unit said of itself before it was left in its loader counts more than what somebody says of it afterwards.
+#[test]
+fn a_product_that_contradicts_the_note_is_refused_and_no_failure_rewrites_the_note() {
+    let bench = Bench::left_in_loader();
+    let other =
+        ["image", "make", "--product", "axrtd8co", "--version", "1.2.0", "--words", "12000", "--out", "other.S"];
+    assert_eq!(bench.world.run(&other, b"").code, Some(0));
+    let journal = bench.world.path("state/axcon/uploads.json");
+    let before = fs::read_to_string(&journal).expect("the note");
+    for more in [&["--product", "axrtd8co"][..], &["--product", "axrtd8co", "--dry-run"]] {
+        let refused = bench.load("other.S", more);
+        assert_eq!(refused.code, Some(5), "{}", refused.err);
+        let said = "the unit is an AXTC4CO, not an AXRTD8CO: so says the note of the upload of 'new.S'";
+        assert!(refused.err.contains(said) && refused.err.contains("--allow wrong-product"), "{}", refused.err);
+    }
+    for more in [&[][..], &["--dry-run"]] {
+        let refused = bench.load("other.S", more);
+        assert_eq!(refused.code, Some(5), "{}", refused.err);
+        assert!(refused.err.contains("--product NAME --allow wrong-product"), "{}", refused.err);
+    }
+    assert_eq!(fs::read_to_string(&journal).expect("the note"), before);
+
+    // Somebody is sure that the note is wrong, and is not right.
+    let failed = bench.load("other.S", &["--product", "axrtd8co", "--allow", "wrong-product"]);
+    assert_ne!(failed.code, Some(0), "{}", failed.err);
+    let after = fs::read_to_string(&journal).expect("the note");
+    assert!(after.contains("AXTC4CO") && after.contains("new.S") && !after.contains("AXRTD8CO"), "{after}");
+    let saved = bench.load("new.S", &[]);
+    assert_eq!(saved.code, Some(0), "{}", saved.err);
+    assert_eq!(bench.version(), "1.2.0");
+}
+
+#[test]
+fn older_software_than_what_ran_before_an_interrupted_upload_is_sent_only_if_it_is_wanted() {
+    let bench = Bench::left_in_loader();
+    let older = ["image", "make", "--product", "axtc4co", "--version", "1.0.9", "--words", "600", "--out", "old.S"];
+    assert_eq!(bench.world.run(&older, b"").code, Some(0));
+    for more in [&[][..], &["--dry-run"], &["--product", "axtc4co"]] {
+        let refused = bench.load("old.S", more);
+        assert_eq!(refused.code, Some(5), "{}", refused.err);
+        assert!(refused.err.contains("older than the V1.1.0 that the unit ran before"), "{}", refused.err);
+        assert!(refused.err.contains("--allow downgrade"), "{}", refused.err);
+    }
+    // Where nobody knows what it ran, that is said.
+    let journal = bench.world.path("state/axcon/uploads.json");
+    fs::remove_file(journal).expect("the note");
+    let planned = bench.load("old.S", &["--dry-run", "--product", "axtc4co"]);
+    assert_eq!(planned.code, Some(0), "{}", planned.err);
+    assert!(planned.err.contains("which version the unit ran is not known"), "{}", planned.err);
+}
+
+#[test]
+fn a_note_that_is_wrong_is_overridden_by_whoever_says_so() {
+    let bench = Bench::left_in_loader();
+    let journal = bench.world.path("state/axcon/uploads.json");
+    let note = fs::read_to_string(&journal).expect("the note").replace("AXTC4CO", "AXRTD8CO");
+    fs::write(&journal, note).expect("written");
+    assert_eq!(bench.load("new.S", &["--product", "axtc4co"]).code, Some(5));
+    let sent = bench.load("new.S", &["--product", "axtc4co", "--allow", "wrong-product"]);
+    assert_eq!(sent.code, Some(0), "{}", sent.err);
+    let notes = fs::read_to_string(&journal).expect("the journal");
+    assert!(!notes.contains("AXRTD8CO"), "{notes}");
 }
 
 #[test]
@@ -221,6 +278,16 @@ fn bad_images_of_every_kind_give_one_message_and_5() {
         assert!(said.lines().count() <= 5, "one message: {said}");
         assert!(begun.elapsed() < PATIENCE);
     }
+}
+
+#[test]
+fn a_large_file_that_is_no_image_is_told_with_its_whole_size() {
+    let world = World::new();
+    fs::write(world.path("zeros"), vec![0; 3_000_000]).expect("written");
+    let ran = world.run(&["image", "info", "zeros"], b"");
+    assert!(ran.out.contains("3,000,000 bytes"), "{}{}", ran.out, ran.err);
+    let ran = world.run(&["image", "check", "zeros", "--json"], b"");
+    assert_eq!(json(&ran.out)["size"], 3_000_000, "{}", ran.err);
 }
 
 #[test]
@@ -305,6 +372,15 @@ fn several_units_are_uploaded_to_at_once_and_one_that_fails_disturbs_none() {
     assert_eq!(schemas, ["axcon.load/1", "axcon.load/1", "axcon.loads/1"], "{}", ran.out);
     assert_eq!(objects[2]["units"][1], serde_json::json!({"port": "missing", "exit_code": 3}));
     drop(emulators);
+}
+
+#[test]
+fn a_port_and_a_link_to_it_are_one_port_named_twice() {
+    let bench = Bench::new();
+    let device = fs::canonicalize(bench.world.path("u0")).expect("a device").display().to_string();
+    let ran = bench.load("new.S", &["--port", &device]);
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("are the same port") && !ran.err.contains("in use"), "{}", ran.err);
 }
 
 #[test]

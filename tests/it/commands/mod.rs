@@ -38,6 +38,19 @@ impl Bench {
         bench
     }
 
+    /// With a unit that ran 1.1.0 and has lost its power in the middle of an upload of `new.S`.
+    fn left_in_loader() -> Self {
+        let mut bench = Bench::with_image("12000");
+        let mut command = vec!["load", "new.S", "--yes", "--password-file", "pw", "--json", "--port", "u0"];
+        command.extend(FAST);
+        let loading = bench.world.start(&command);
+        loading.wait_out(r#""phase":"transfer","record":1"#);
+        bench.unit = None;
+        loading.wait();
+        bench.power_up();
+        bench
+    }
+
     /// Starts the emulator, or starts it again.
     fn power_up(&mut self) {
         self.power_up_as("axtc4co", &["--state", "s0"]);

@@ -52,6 +52,19 @@ fn an_emulator_goes_on_when_its_input_ends_and_answers_what_it_does_not_know() {
 }
 
 #[test]
+fn help_is_an_object_too_where_objects_are_wanted() {
+    let world = World::new();
+    let mut emulator = world.start(&["emulate", "axtc4co", "--json"]);
+    emulator.wait_out("axcon.emulate/1");
+    emulator.input(b"help\nhelp faults\n");
+    emulator.wait_out(r#""verb":"help","ok":true,"said":"set N temperature C"#);
+    emulator.wait_out(r#""verb":"help faults","ok":true,"said":""#);
+    emulator.input(b"quit\n");
+    let ran = emulator.wait();
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+}
+
+#[test]
 fn verbs_and_scenarios_do_to_a_unit_what_they_say() {
     let world = World::new();
     fs::write(

@@ -15,6 +15,7 @@ mod ring;
 use super::super::memory::{Flash, StartDelay, Written};
 use super::super::{Board, Reset};
 use super::voice::Voice;
+pub use crate::device::SECTOR_WORDS;
 use crate::time::{Duration, Instant};
 pub use reader::Version;
 use reader::{Fault, Kind, Read, Reader};
@@ -22,8 +23,6 @@ use ring::Ring;
 
 /// Without a key for this long the application starts, if there is one (errata E-I12).
 pub const KEY_TIME: Duration = Duration::from_secs(10);
-/// Words erased together: a sector of the 56F8367's interleaved program flash (likely). 512 KByte take 10.2 s.
-pub const SECTOR_WORDS: u32 = 512;
 
 /// What it asks before it wants the file. The manual does not print it.
 const ANY_KEY: &str = "Hit any key to continue ";

@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 
 use super::file_name;
 use crate::device::{LoaderKind, Product};
-use crate::image::{DefectId, Misfit};
+use crate::image::{DefectId, Misfit, Software};
 use crate::session::UnitState;
 use crate::time::Duration;
 use crate::tui::input::{Amount, ImageFacts};
@@ -29,9 +29,10 @@ pub(super) fn misfits(facts: &ImageFacts, view: &View, loader: Option<LoaderKind
     let noted = || view.noted().and_then(|noted| Product::named(&noted.product));
     let Some((image, product)) = facts.checked.as_ref().zip(view.product().or_else(noted)) else { return Vec::new() };
     let target = product.target_with(loader.unwrap_or(product.loader.kind));
-    let runs = view.facts.version.as_ref().map(|known| known.value);
+    let is_said = view.facts.version.is_some();
+    let software = view.ran().map(if is_said { Software::Runs } else { Software::Ran });
     let stands = |misfit: &Misfit| misfit.id != DefectId::WrongProduct && !facts.allowed.contains(&misfit.id);
-    image.misfits(&target, runs).into_iter().filter(stands).collect()
+    image.misfits(&target, software).into_iter().filter(stands).collect()
 }
 
 /// What stands against sending this image now, one sentence each.
