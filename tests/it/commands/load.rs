@@ -226,7 +226,8 @@ fn an_interrupt_in_the_middle_says_what_the_unit_is_now() {
     assert_eq!(ran.code, Some(130), "{}", ran.err);
     let verdict = json(ran.out.lines().last().expect("a verdict"));
     assert_eq!((&verdict["verdict"], &verdict["unit"]), (&"interrupted".into(), &"loader".into()), "{verdict}");
-    assert_eq!(bench.load("new.S", &[]).code, Some(0));
+    let again = bench.load("new.S", &[]);
+    assert_eq!(again.code, Some(0), "{}{}", again.out, again.err);
 }
 
 #[test]
