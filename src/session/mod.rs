@@ -366,28 +366,33 @@ impl Session {
         Some(text)
     }
 
-    /// Tells the running job something, and ends it if it says so.
-    fn signal(&mut self, signal: Signal<'_>) {
-        let Some(mut running) = self.running.take() else { return };
-        let lost = matches!(signal, Signal::LinkLost);
-        let before = self.facts.clone();
-        let pending = self.pending();
-        let mut desk = Desk {
+    /// What a job, or whoever listens beside it, can see and do at this moment.
+    fn desk<'a>(&'a mut self, pending: Option<&'a Text>) -> Desk<'a> {
+        Desk {
             now: self.now,
             transmitter: &mut self.transmitter,
             facts: &mut self.facts,
             events: &mut self.events,
-            pending: pending.as_ref(),
+            pending,
             cut: false,
             understood: false,
             counted: self.counted,
             received: self.record.received(),
             password: &mut self.password,
             typed: Vec::new(),
-        };
+        }
+    }
+
+    /// Tells the running job something, and ends it if it says so.
+    fn signal(&mut self, signal: Signal<'_>) {
+        let Some(mut running) = self.running.take() else { return };
+        let lost = matches!(signal, Signal::LinkLost);
+        let before = self.facts.clone();
+        let pending = self.pending();
+        let mut desk = self.desk(pending.as_ref());
         let outcome = running.work.handle(signal, &mut desk);
-        let (cut, typed) = (desk.cut, std::mem::take(&mut desk.typed));
-        if desk.understood && self.counted && matches!(signal, Signal::Heard(_, Message::Text)) {
+        let Desk { cut, typed, understood, .. } = desk;
+        if understood && self.counted && matches!(signal, Signal::Heard(_, Message::Text)) {
             self.counted = false;
             self.facts.unrecognised_lines = self.facts.unrecognised_lines.saturating_sub(1);
         }

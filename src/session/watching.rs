@@ -3,7 +3,6 @@
 
 use super::Session;
 use super::event::{Event, Job};
-use super::job::Desk;
 use crate::time::Instant;
 use crate::wire::{Message, Text};
 
@@ -51,19 +50,7 @@ impl Session {
         let before = (self.facts.diagnostics, self.facts.unrecognised_lines);
         let mut pages = std::mem::take(&mut self.pages);
         let pending = self.pending();
-        let mut desk = Desk {
-            now: self.now,
-            transmitter: &mut self.transmitter,
-            facts: &mut self.facts,
-            events: &mut self.events,
-            pending: pending.as_ref(),
-            cut: false,
-            understood: false,
-            received: self.record.received(),
-            password: &mut self.password,
-            typed: Vec::new(),
-            counted: self.counted,
-        };
+        let mut desk = self.desk(pending.as_ref());
         let mut given = Vec::new();
         match saw {
             Saw::Typed(keys) => pages.typed(keys, &mut desk),
