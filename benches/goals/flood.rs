@@ -81,7 +81,7 @@ fn cat(port: &Path, log: &Path) -> Command {
 
 fn axcon(port: &Path, log: &Path) -> Command {
     let mut axcon = of(env!("CARGO_BIN_EXE_axcon"), &["terminal".as_ref(), "--port".as_ref(), port]);
-    axcon.arg("--log").arg(log).arg("--record").arg(log.with_extension("cast"));
+    axcon.arg("--log").arg(log).arg("--record").arg(log.with_extension("cast")).arg("--yes");
     axcon.stdout(Stdio::null()).stdin(Stdio::piped());
     axcon
 }
