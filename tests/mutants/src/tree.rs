@@ -14,6 +14,9 @@ use crate::schema::{self, Schema};
 /// Checks after which something else must be wrong than mutants that do not compile.
 const ROUNDS: usize = 20;
 
+/// The module that knows which mutant is on.
+const SWITCH: &str = "src/mutant.rs";
+
 /// A mutant with its place in the tree.
 #[derive(Clone, Debug)]
 pub struct Candidate {
@@ -62,8 +65,13 @@ impl Tree {
         ensure!(listed.status.success(), "git ls-files failed");
         let mut tree =
             Tree { folder: folder.into(), sources: Vec::new(), candidates: Vec::new(), dropped: BTreeSet::new() };
-        for path in String::from_utf8(listed.stdout)?.split_terminator('\0') {
-            if path.starts_with("tests/mutants/") || !Path::new(path).is_file() {
+        let listed = String::from_utf8(listed.stdout)?;
+        let known: BTreeSet<&str> = listed.split_terminator('\0').filter(|path| Path::new(path).is_file()).collect();
+        for sources in ["src", "tests"] {
+            remove_unknown(folder, Path::new(sources), &known)?;
+        }
+        for path in known {
+            if path.starts_with("tests/mutants/") {
                 continue;
             }
             let is_chosen = chosen.iter().any(|chosen| Path::new(path).starts_with(chosen));
@@ -89,7 +97,7 @@ impl Tree {
                 }
             }
         }
-        write_if_new(&folder.join("src/mutant.rs"), include_bytes!("switch.rs"))?;
+        write_if_new(&folder.join(SWITCH), include_bytes!("switch.rs"))?;
         Ok(tree)
     }
 
@@ -200,6 +208,21 @@ fn culprits(error: &Value, schemas: &BTreeMap<String, Schema>) -> BTreeSet<u32> 
         eprintln!("{}", error["rendered"].as_str().unwrap_or("an error without words"));
     }
     around.iter().filter(|branch| Some(branch.whole.len()) == smallest).map(|branch| branch.number).collect()
+}
+
+/// A file that has been moved since the last time would be there twice.
+fn remove_unknown(tree: &Path, below: &Path, known: &BTreeSet<&str>) -> Result<()> {
+    let Ok(entries) = fs::read_dir(tree.join(below)) else { return Ok(()) };
+    for entry in entries {
+        let entry = entry?;
+        let path = below.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            remove_unknown(tree, &path, known)?;
+        } else if path.to_str().is_some_and(|path| path != SWITCH && !known.contains(path)) {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
 }
 
 /// So that cargo builds only what has changed.
