@@ -123,12 +123,28 @@ impl Inbox {
     /// open, ask for the bytes of one ([`rest`](Inbox::rest)).
     pub fn arrived(&mut self) -> Vec<Arrived> {
         self.collect();
-        let mut arrived = Vec::new();
+        self.part_of_arrived(usize::MAX).0
+    }
+
+    /// Takes what waits on the channel, so that [`part_of_arrived`](Inbox::part_of_arrived) gives all that has come so
+    /// far, and comes to an end in a flood.
+    pub fn collect(&mut self) {
+        self.take(INPUTS.saturating_sub(self.waiting.len()));
+    }
+
+    /// The same as [`arrived`](Inbox::arrived), of what has been collected, and no more pieces than hold this many bytes;
+    /// and whether there are more of them.
+    pub fn part_of_arrived(&mut self, most: usize) -> (Vec<Arrived>, bool) {
+        let (mut arrived, mut taken, mut more) = (Vec::new(), 0, false);
         let mut others = VecDeque::new();
         while let Some(input) = self.waiting.pop_front() {
             match input {
-                Input::Bytes { at, bytes, .. } => arrived.push(Arrived { at, bytes }),
-                Input::Gone { .. } => {
+                Input::Bytes { at, bytes, .. } if taken < most => {
+                    taken += bytes.len();
+                    arrived.push(Arrived { at, bytes });
+                }
+                Input::Bytes { .. } | Input::Gone { .. } => {
+                    more = matches!(input, Input::Bytes { .. });
                     self.waiting.push_front(input);
                     break;
                 }
@@ -137,7 +153,7 @@ impl Inbox {
         }
         others.append(&mut self.waiting);
         self.waiting = others;
-        arrived
+        (arrived, more)
     }
 
     /// The next input that is not bytes. `None` if the time is over, or bytes come first.
@@ -180,10 +196,6 @@ impl Inbox {
         self.closed = self.closed.max(Some(link));
         let closed = self.closed;
         self.waiting.retain(|input| is_wanted(input, closed));
-    }
-
-    fn collect(&mut self) {
-        self.take(INPUTS.saturating_sub(self.waiting.len()));
     }
 
     fn take(&mut self, most: usize) {
@@ -244,6 +256,25 @@ mod tests {
         assert!(matches!(inbox.next(Duration::ZERO), Ok(None)));
         drop(sender);
         assert_eq!(inbox.next(Duration::ZERO).err(), Some(Closed));
+    }
+
+    #[test]
+    fn a_backlog_is_had_in_parts_and_ends_while_more_comes() {
+        let (sender, inputs) = channel();
+        let mut inbox = Inbox::new(inputs);
+        let send = |input| sender.send(input).expect("there is room");
+        for input in [bytes(1, "abc"), Input::Wake, bytes(2, "d"), bytes(3, "ef"), gone(FIRST), bytes(4, "g")] {
+            send(input);
+        }
+        inbox.collect();
+        send(bytes(5, "later"));
+        let mut part = || {
+            let (arrived, more) = inbox.part_of_arrived(4);
+            (texts(arrived).concat(), more)
+        };
+        assert_eq!(part(), ("abcd".into(), true));
+        assert_eq!(part(), ("ef".into(), false), "the loss of the port comes next");
+        assert_eq!(part(), (String::new(), false));
     }
 
     #[test]

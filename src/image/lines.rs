@@ -103,8 +103,7 @@ impl<R: Read> Lines<R> {
     pub(super) fn next(&mut self) -> io::Result<Option<RawLine<'_>>> {
         let mut searched = 0;
         loop {
-            let found =
-                self.buffer[self.from + searched..self.to].iter().position(|&byte| byte == b'\r' || byte == b'\n');
+            let found = line_end(&self.buffer[self.from + searched..self.to]);
             let Some(length) = found.map(|at| searched + at) else {
                 searched = self.to - self.from;
                 if self.at_end {
@@ -152,12 +151,10 @@ impl<R: Read> Lines<R> {
         self.buffer.copy_within(self.from..self.from + LONGEST, 0);
         self.from += LONGEST;
         let end = loop {
-            let rest = &self.buffer[self.from..self.to];
-            let found = rest.iter().position(|&byte| byte == b'\r' || byte == b'\n').map(|at| self.from + at);
-            let end = match found {
+            let end = match line_end(&self.buffer[self.from..self.to]) {
                 Some(at) => {
-                    self.from = at;
-                    self.end_at(at)
+                    self.from += at;
+                    self.end_at(self.from)
                 }
                 None => {
                     self.from = self.to;
@@ -192,6 +189,11 @@ impl<R: Read> Lines<R> {
         }
         Ok(())
     }
+}
+
+/// Where the first line end begins.
+fn line_end(bytes: &[u8]) -> Option<usize> {
+    memchr::memchr2(b'\r', b'\n', bytes)
 }
 
 /// The longest line that is handed out whole; the longest record has 514 characters.

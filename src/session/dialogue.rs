@@ -5,14 +5,13 @@
 //! of the object dictionary has titles and hints. What matters of them their jobs read. Who counts what the console does
 //! not understand wants to know of the rest. Keys tell, whoever has pressed them, so a recording gives the same.
 
+use super::keys::{Key, Typed};
 use crate::time::{Duration, Instant};
-use crate::wire::diagnostics;
+use crate::wire::{MenuKey, diagnostics};
 
 /// How long behind a key, or behind the last page, what comes is its answer: pages come every second, and a unit that
 /// computes needs a moment.
 const ANSWER: Duration = Duration::from_secs(3);
-/// Bytes of a piece that somebody may have typed: anything longer is a record of a file, and its letters are no keys.
-pub(super) const LONGEST_TYPED: usize = 16;
 
 /// The dialogue that is open, as far as keys tell.
 #[derive(Debug, Default)]
@@ -34,19 +33,18 @@ enum Asked {
 }
 
 impl Dialogue {
-    /// These bytes have been sent.
-    pub(super) fn sent(&mut self, now: Instant, bytes: &[u8]) {
-        if bytes.len() > LONGEST_TYPED {
+    /// This has been sent.
+    pub(super) fn sent(&mut self, now: Instant, typed: &Typed) {
+        if *typed == Typed::File {
             self.asked = None;
             return;
         }
-        // A letter in "Yes" looks like a key as well; what comes soon behind it is an answer either way.
-        for key in bytes {
-            match key.to_ascii_lowercase() {
-                b'm' | b'x' => (self.asked, self.before_menu) = (Some(Asked::Menu), 0),
-                b'v' | b'd' | b't' | b'l' => self.asked = Some(Asked::Answer),
-                b's' => self.asked = Some(Asked::Pages),
-                _ => {}
+        for key in typed.keys() {
+            match key {
+                Key::Menu(MenuKey::Menu) | Key::Leave => (self.asked, self.before_menu) = (Some(Asked::Menu), 0),
+                Key::Menu(MenuKey::Diagnostics) => self.asked = Some(Asked::Pages),
+                Key::Menu(_) => self.asked = Some(Asked::Answer),
+                Key::Enter | Key::Other => {}
             }
         }
         self.until = now + ANSWER;
@@ -93,18 +91,23 @@ impl Dialogue {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::keys::KeyReader;
 
     fn at(millis: u64) -> Instant {
         Instant::from_millis(millis)
+    }
+
+    fn sent(dialogue: &mut Dialogue, now: Instant, bytes: &[u8]) {
+        dialogue.sent(now, &KeyReader::default().read(bytes));
     }
 
     #[test]
     fn what_answers_a_key_belongs_to_it_and_what_comes_later_does_not() {
         let mut dialogue = Dialogue::default();
         assert!(!dialogue.owns(at(0), "nobody has asked"));
-        dialogue.sent(at(1000), b"t");
+        sent(&mut dialogue, at(1000), b"t");
         assert!(dialogue.owns(at(1500), "Field or process value?"));
-        dialogue.sent(at(60_000), b"1000\r");
+        sent(&mut dialogue, at(60_000), b"1000\r");
         assert!(dialogue.owns(at(60_100), "Now every 1000 ms."));
         assert!(!dialogue.owns(at(63_001), "something else"));
     }
@@ -112,7 +115,7 @@ mod tests {
     #[test]
     fn pages_go_on_as_long_as_they_have_numbers() {
         let mut dialogue = Dialogue::default();
-        dialogue.sent(at(0), b"s");
+        sent(&mut dialogue, at(0), b"s");
         for second in 1..100 {
             assert!(dialogue.owns(at(second * 1000), "--- Diagnostics ---"), "{second}");
             assert!(dialogue.owns(at(second * 1000), "Supply 24.0 V"), "{second}");
@@ -120,7 +123,7 @@ mod tests {
         }
         dialogue.named();
         assert!(!dialogue.shows_pages(at(99_500)), "the unit has started anew");
-        dialogue.sent(at(100_000), b"s");
+        sent(&mut dialogue, at(100_000), b"s");
         assert!(dialogue.shows_pages(at(102_000)));
         assert!(!dialogue.owns(at(103_001), "noise") && !dialogue.shows_pages(at(103_001)));
     }
@@ -128,7 +131,7 @@ mod tests {
     #[test]
     fn titles_belong_to_a_menu_once_it_has_shown_itself() {
         let mut dialogue = Dialogue::default();
-        dialogue.sent(at(0), b"\x11m");
+        sent(&mut dialogue, at(0), b"\x11m");
         assert!(!dialogue.owns(at(100), "Some Corporation"), "a modem may say so too");
         assert!(!dialogue.owns(at(101), "=========="));
         assert_eq!(dialogue.menu(), 2);
@@ -139,7 +142,7 @@ mod tests {
     #[test]
     fn a_record_of_a_file_is_no_key() {
         let mut dialogue = Dialogue::default();
-        dialogue.sent(at(0), b"S315000000000D0D0D0D0D0D0D0D0D0D0D\r");
+        sent(&mut dialogue, at(0), b"S315000000000D0D0D0D0D0D0D0D0D0D0D\r");
         assert!(!dialogue.owns(at(1), "strange"));
     }
 }

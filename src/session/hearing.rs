@@ -190,6 +190,9 @@ impl Session {
                 | Message::Loader(LoaderText::Header | LoaderText::Waiting)
                 | Message::Prompt(Prompt::WaitingForFile)
         );
+        if starts || matches!(message, Message::MenuKey(_)) {
+            self.keys.question_over();
+        }
         if starts && self.transmitter.held_since().is_some() {
             self.transmitter.hold(self.now, false);
             self.events.push_back(Event::Held(false));

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::event::{Event, Facts, Outcome};
+use super::keys::Typed;
 use super::password::PasswordGuard;
 use super::transmitter::Transmitter;
 use crate::endpoint::{Secrecy, Transmit};
@@ -24,8 +25,8 @@ pub(super) enum Signal<'a> {
     Cancel,
     /// The port is gone: nothing can be sent or heard any more.
     LinkLost,
-    /// In a recording: these keys were sent then.
-    Typed(&'a [u8]),
+    /// In a recording: this was sent then.
+    Typed(&'a Typed),
     /// In a recording: it has ended.
     Over,
 }

@@ -14,6 +14,7 @@ pub mod flaw;
 mod hearing;
 mod identify;
 mod job;
+mod keys;
 mod overheard;
 mod pages;
 mod password;
@@ -38,6 +39,7 @@ use crate::wire::{Framer, Message, Text, Vocabulary};
 use dialogue::Dialogue;
 use hearing::PromptWatch;
 use job::{Desk, Signal, Work};
+use keys::{KeyReader, Typed};
 use pages::Pages;
 use password::PasswordGuard;
 use toggled::Toggled;
@@ -68,6 +70,7 @@ pub struct Session {
     /// When the menu was asked for last.
     menu_asked_at: Option<Instant>,
     /// Which lines answer a key.
+    keys: KeyReader,
     dialogue: Dialogue,
     /// Whether the stream is still on.
     toggled: Toggled,
@@ -111,6 +114,7 @@ impl Session {
             passive: false,
             recognises: true,
             menu_asked_at: None,
+            keys: KeyReader::default(),
             dialogue: Dialogue::default(),
             toggled: Toggled::default(),
             pages: Pages::default(),
@@ -244,8 +248,8 @@ impl Session {
     pub fn handle_sent(&mut self, now: Instant, bytes: &[u8]) {
         self.pass_to(now);
         self.record.push(self.now, Direction::ToUnit, Secrecy::Open, bytes);
-        self.note_menu_key(bytes);
-        self.signal(Signal::Typed(bytes));
+        let typed = self.note_typed(bytes);
+        self.signal(Signal::Typed(&typed));
         self.cut_line();
     }
 
@@ -343,20 +347,31 @@ impl Session {
         Ok(())
     }
 
+    /// Takes the beginning of a backlog whose rest comes before anything that is due: see
+    /// [`handle_backlog`](Endpoint::handle_backlog), which takes the rest. So a key need not wait for all of a flood.
+    pub fn begin_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
+        self.now = self.now.max(now);
+        for piece in backlog {
+            self.dated = piece.at.clamp(self.dated, self.now);
+            self.append(&piece.bytes);
+        }
+    }
+
     /// The time is `now`, also for what has been heard.
     fn pass_to(&mut self, now: Instant) {
         self.now = self.now.max(now);
         self.dated = self.now;
     }
 
-    /// What is printed soon is the menu that was asked for, and no banner.
-    fn note_menu_key(&mut self, sent: &[u8]) {
-        // X leaves the view, behind which the menu stands.
-        self.menu_asked_at = sent.iter().any(|key| matches!(key.to_ascii_lowercase(), b'm' | b'x')).then_some(self.now);
-        self.dialogue.sent(self.now, sent);
+    /// What is printed soon may answer what has been sent: the menu that was asked for is no banner.
+    fn note_typed(&mut self, sent: &[u8]) -> Typed {
+        let typed = self.keys.read(sent);
+        self.menu_asked_at = typed.asks_menu().then_some(self.now);
+        self.dialogue.sent(self.now, &typed);
         if self.facts.stream.is_some() {
-            self.toggled.sent(self.now, sent);
+            self.toggled.sent(self.now, &typed);
         }
+        typed
     }
 
     /// Words without a line end behind them, the last thing the unit has printed.
@@ -430,11 +445,7 @@ impl Endpoint for Session {
     }
 
     fn handle_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
-        self.now = self.now.max(now);
-        for piece in backlog {
-            self.dated = piece.at.clamp(self.dated, self.now);
-            self.append(&piece.bytes);
-        }
+        self.begin_backlog(now, backlog);
         self.watch(Saw::Tick);
         self.signal(Signal::Tick);
     }
@@ -458,8 +469,8 @@ impl Endpoint for Session {
         }
         let transmit = self.transmitter.poll(self.now)?;
         if transmit.secrecy == Secrecy::Open {
-            self.note_menu_key(&transmit.bytes);
-            self.watch(Saw::Typed(&transmit.bytes));
+            let typed = self.note_typed(&transmit.bytes);
+            self.watch(Saw::Typed(&typed));
         }
         // The record keeps the order of time: nothing that is taken in behind this is dated before it.
         self.dated = self.now;

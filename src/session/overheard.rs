@@ -5,11 +5,12 @@ use super::dictionary::Collector;
 use super::event::{Awaited, DictionaryReading, Event, Job, Outcome};
 use super::hearing::MENU_ANSWER;
 use super::job::{Desk, Signal, Work};
+use super::keys::Key;
 use super::pages::Pages;
 use crate::device::Product;
 use crate::record::Span;
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderText, Message};
+use crate::wire::{LoaderText, MenuKey, Message};
 
 /// How soon behind a walk that has left the view another one begins that reads what was lost on the line.
 const ANOTHER_WALK: Duration = Duration::from_secs(2);
@@ -123,14 +124,14 @@ impl Work for Dictionary {
                 })
             }
             Signal::Cancel => Some(Outcome::Cancelled(Job::ReadDictionary)),
-            Signal::Typed(keys) => {
-                for key in keys {
-                    match key.to_ascii_lowercase() {
-                        b'v' => (self.viewing, self.left) = (Some(true), None),
-                        b'x' | b'm' | b'd' | b't' | b's' | b'l' => self.viewing = Some(false),
-                        _ => {}
+            Signal::Typed(typed) => {
+                for key in typed.keys() {
+                    match key {
+                        Key::Menu(MenuKey::View) => (self.viewing, self.left) = (Some(true), None),
+                        Key::Menu(_) | Key::Leave => self.viewing = Some(false),
+                        Key::Enter | Key::Other => {}
                     }
-                    if matches!(key.to_ascii_lowercase(), b'x' | b'm' | b'v' | b'\r') {
+                    if matches!(key, Key::Menu(MenuKey::Menu | MenuKey::View) | Key::Leave | Key::Enter) {
                         self.asked_at = Some(desk.now);
                     }
                 }
@@ -179,8 +180,8 @@ impl Work for Diagnostics {
                 self.pages.heard(text, message, desk);
                 None
             }
-            Signal::Typed(keys) => {
-                self.pages.typed(keys, desk);
+            Signal::Typed(typed) => {
+                self.pages.typed(typed, desk);
                 None
             }
             Signal::Tick => {
@@ -258,73 +259,138 @@ impl Work for Everything {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::endpoint::Endpoint;
-    use crate::session::{Command, Event, Session};
-    use crate::time::Instant;
+    use crate::session::{Command, Session};
 
-    /// What a recording has to tell: what was sent (`>`) and what came, each so many milliseconds behind the one before.
-    fn pages(story: &[(u64, &str)]) -> Vec<Vec<String>> {
+    /// What a recording has to tell: what was sent (`>`), remarks (`!`) and what came, each so many milliseconds behind the
+    /// one before.
+    type Story<'a> = &'a [(u64, &'a str)];
+
+    fn played(story: Story<'_>, command: Command) -> (Vec<Event>, Session) {
         let mut session = Session::of_recording(115_200);
-        session.command(Instant::ZERO, Command::Diagnostics { pages: None }).expect("it is free");
+        session.command(Instant::ZERO, command).expect("it is free");
         let mut millis = 0;
         for (behind, text) in story {
-            // Whatever falls due on the way is looked after when it does.
             let until = Instant::from_millis(millis + behind);
             while let Some(due) = session.poll_timeout().filter(|due| *due <= until) {
                 session.handle_timeout(due);
             }
             millis += behind;
-            match text.strip_prefix('>') {
-                Some(keys) => session.handle_sent(until, keys.as_bytes()),
-                None => session.handle_bytes(until, text.as_bytes()),
+            match text.as_bytes() {
+                [b'>', keys @ ..] => session.handle_sent(until, keys),
+                [b'!', ..] => session.handle_mark(until, &text[1..]),
+                bytes => session.handle_bytes(until, bytes),
             }
         }
-        let end = Instant::from_millis(millis + 5_000);
-        while let Some(due) = session.poll_timeout().filter(|due| *due <= end) {
-            session.handle_timeout(due);
-        }
-        session.recording_over(end);
-        let mut pages = Vec::new();
-        while let Some(event) = session.poll_event() {
-            if let Event::Page { lines, .. } = event {
-                pages.push(lines.into_iter().map(|line| line.text).collect());
+        session.recording_over(Instant::from_millis(millis + 50));
+        (std::iter::from_fn(|| session.poll_event()).collect(), session)
+    }
+
+    fn told(reading: &DictionaryReading) -> String {
+        let entries: Vec<String> = reading.entries.iter().map(|entry| entry.at.to_string()).collect();
+        format!("{}{}", entries.join(" "), if reading.complete { "" } else { " ..." })
+    }
+
+    /// The dictionaries that were walked through, to whoever listens to everything: when the last entry came, which ones,
+    /// and whether that is all; and the one that the job for it gives.
+    fn readings(story: Story<'_>) -> (Vec<(u64, String)>, Option<String>) {
+        let (events, _) = played(story, Command::Overhear);
+        let overheard = events.iter().filter_map(|event| match event {
+            Event::Overheard { at, reading } => {
+                Some(((at.since(Instant::ZERO).as_nanos() / 1_000_000) as u64, told(reading)))
             }
+            _ => None,
+        });
+        let (events, _) = played(story, Command::ReadDictionary);
+        let read = events.iter().find_map(|event| match event {
+            Event::Finished(Outcome::DictionaryRead(reading)) => Some(told(reading)),
+            _ => None,
+        });
+        (overheard.collect(), read)
+    }
+
+    const FIRST: &str = "6126h:01 TC1 = 16.000\r\n";
+    const SECOND: &str = "6126h:02 TC2 = 17.000\r\n";
+    const THIRD: &str = "6126h:03 TC3 = 18.000\r\n";
+    const MENU: &str = "V - View Object Dictionary\r\nD - Default Object Dictionary\r\n";
+    const BANNER: &str = "AXTC4CO V1.1.0\r\n";
+
+    #[test]
+    fn a_walk_is_over_when_its_menu_is_back_and_one_behind_it_at_once_belongs_to_it() {
+        let walk = [(0, ">v"), (50, FIRST), (400, ">\r"), (50, SECOND), (400, ">x"), (50, MENU)];
+        assert_eq!(readings(&walk), (vec![(500, "6126:01 6126:02".into())], Some("6126:01 6126:02".into())));
+        let again = [&walk[..], &[(1_900, ">v"), (50, THIRD), (400, ">x"), (50, MENU)]].concat();
+        assert_eq!(readings(&again).0, [(2_900, "6126:01 6126:02 6126:03".into())]);
+        let later =
+            [&walk[..], &[(2_100, ">m"), (50, MENU), (5_000, ">v"), (50, THIRD), (400, ">x"), (50, MENU)]].concat();
+        assert_eq!(readings(&later).0, [(500, "6126:01 6126:02".into()), (8_150, "6126:03".into())]);
+    }
+
+    #[test]
+    fn what_ends_a_walk_in_its_middle_leaves_it_incomplete() {
+        let begun = [(0, ">v"), (50, FIRST), (400, ">\r"), (50, SECOND)];
+        for end in [
+            &[(400, "!link lost")][..],
+            &[(400, "S-Record loader. Version 1.3\r\n")],
+            &[(400, "Waiting for application S-Record\r\n")],
+            &[(400, "Performing First Start Initialization of the controller program\r\n")],
+            &[(1_600, BANNER), (5, MENU)],
+        ] {
+            let story = [&begun[..], end, &[(100, THIRD)]].concat();
+            let expected = (vec![(500, "6126:01 6126:02 ...".into())], Some("6126:01 6126:02 ...".into()));
+            assert_eq!(readings(&story), expected, "{end:?}");
         }
-        pages
-    }
-
-    const PAGE: &str = "Supply 24.1 V\r\nTC1 100.0 C\r\n";
-    const SWITCH: [(u64, &str); 3] = [(1_000, ">t"), (10, "F - field value, P - process value: "), (500, ">f")];
-    const SWITCHED: [(u64, &str); 3] = [
-        (10, "\r\nRepetition rate in ms (1-60000) [1000]: "),
-        (500, ">30000\r"),
-        (10, "30000\r\nStream is now ON: every 30000 ms.\r\n"),
-    ];
-
-    #[test]
-    fn pages_are_what_comes_behind_the_key_for_them_and_no_dialogue_is_one() {
-        let twice = [SWITCH, SWITCHED, SWITCH, SWITCHED].concat();
-        assert!(pages(&twice).is_empty(), "{:?}", pages(&twice));
-        let story =
-            [&twice[..], &[(1_000, ">s"), (800, PAGE), (1_000, PAGE), (100, ">s"), (900, "Off 1.\r\n")]].concat();
-        assert_eq!(pages(&story).len(), 2, "{:?}", pages(&story));
+        assert_eq!(readings(&begun).0, [(500, "6126:01 6126:02 ...".into())], "the recording's end");
     }
 
     #[test]
-    fn a_unit_that_starts_anew_shows_no_pages_any_more() {
-        let banner = "Some Corporation 1\r\nAXTC4CO V1.1.0\r\nNode-ID: 127\r\n";
-        let defaults =
-            [(0, ">d"), (10, "Enter Yes to restore the defaults: "), (900, ">Yes\r"), (10, "Yes\r\n"), (10, banner)];
-        assert!(pages(&defaults).is_empty(), "{:?}", pages(&defaults));
-        let story = [(0, ">s"), (500, PAGE), (1_000, PAGE), (5_000, banner), (5_000, "Node-ID: 127\r\n")];
-        assert_eq!(pages(&story).len(), 2, "{:?}", pages(&story));
+    fn an_entry_that_is_called_like_the_product_is_no_banner() {
+        let story = [
+            (0, ">v"),
+            (50, FIRST),
+            (400, ">\r"),
+            (50, "1008h Device Name AXTC4CO V1.1.0\r\n"),
+            (50, SECOND),
+            (400, ">x"),
+            (50, MENU),
+        ];
+        assert_eq!(readings(&story).0.len(), 1, "{:?}", readings(&story));
+        assert!(readings(&story).1.is_some_and(|read| read.contains("6126:01") && read.contains("6126:02")));
     }
 
     #[test]
-    fn without_keys_pages_are_what_comes_again_and_they_stay_pages_when_a_key_is_pressed() {
-        let story = [(0, PAGE), (1_000, PAGE), (1_000, "Something 1 else\r\n"), (1_000, PAGE)];
-        assert_eq!(pages(&story).len(), 2, "{:?}", pages(&story));
-        let story = [(0, PAGE), (1_000, PAGE), (500, ">m"), (500, PAGE), (1_000, PAGE), (1_000, PAGE)];
-        assert_eq!(pages(&story).len(), 5, "{:?}", pages(&story));
+    fn with_the_view_left_numbers_are_no_entries_and_without_keys_everything_may_be_one() {
+        for key in [">x", ">m", ">d", ">t", ">s", ">l"] {
+            let story = [(0, ">v"), (50, FIRST), (400, key), (100, SECOND)];
+            assert_eq!(readings(&story).1.as_deref(), Some("6126:01 ..."), "{key}");
+        }
+        assert_eq!(readings(&[(0, FIRST), (400, SECOND), (50, MENU)]).1.as_deref(), Some("6126:01 6126:02"));
+        assert_eq!(readings(&[(0, "hello\r\n"), (50, MENU)]), (vec![], None));
+    }
+
+    #[test]
+    fn the_walk_that_was_complete_goes_before_one_that_was_broken_off() {
+        let walk = [(0, ">v"), (50, FIRST), (400, ">\r"), (50, SECOND), (400, ">x"), (50, MENU)];
+        let broken = [(9_000, ">v"), (50, THIRD), (400, "!link lost")];
+        assert_eq!(readings(&[&walk[..], &broken].concat()).1.as_deref(), Some("6126:01 6126:02"));
+        assert_eq!(readings(&[&broken[..], &walk].concat()).1.as_deref(), Some("6126:01 6126:02"));
+        let later = [(9_000, ">v"), (50, THIRD), (400, ">x"), (50, MENU)];
+        assert_eq!(readings(&[&walk[..], &later].concat()).1.as_deref(), Some("6126:03"), "the last one");
+    }
+
+    #[test]
+    fn whoever_looks_for_what_is_not_there_is_told_what_was_there_last() {
+        let (events, _) =
+            played(&[(0, "hello 5\r\n"), (50, "AXTC4CO V1.1.0\r\n")], Command::Diagnostics { pages: None });
+        let Some(Event::Finished(Outcome::NoAnswer { awaited: Awaited::Page, heard, .. })) = events.last() else {
+            panic!("{events:?}")
+        };
+        assert_eq!(heard.map(Span::len), Some(14));
+        let (_, session) = played(
+            &[(0, "Supply 24.1 V\r\n"), (1_000, "Supply 24.1 V\r\n"), (900, "!link lost")],
+            Command::Diagnostics { pages: None },
+        );
+        assert_eq!(session.facts().diagnostics, None);
     }
 }

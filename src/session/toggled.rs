@@ -7,9 +7,9 @@
 //! the same.
 
 use super::console::{ANSWER, FIRST_VALUES, NO_QUESTION, ROWS_ON_THEIR_WAY};
-use super::dialogue::LONGEST_TYPED;
+use super::keys::{Key, Typed};
 use crate::time::{Duration, Instant};
-use crate::wire::{Message, Prompt};
+use crate::wire::{MenuKey, Message, Prompt};
 
 /// The longest repetition time (errata E-105): rows that lie farther apart are of two streams.
 const LONGEST_PERIOD: Duration = Duration::from_secs(60);
@@ -38,9 +38,9 @@ enum Behind {
 }
 
 impl Toggled {
-    /// These bytes have been sent to a unit whose stream is on.
-    pub(super) fn sent(&mut self, now: Instant, bytes: &[u8]) {
-        if bytes.len() <= LONGEST_TYPED && bytes.iter().any(|key| key.eq_ignore_ascii_case(&b't')) {
+    /// This has been sent to a unit whose stream is on.
+    pub(super) fn sent(&mut self, now: Instant, typed: &Typed) {
+        if typed.keys().contains(&Key::Menu(MenuKey::Stream)) {
             let due = now + ANSWER.max(self.apart * 2);
             self.wait = Some(Wait { behind: Behind::Key, since: now, due });
         }
@@ -82,5 +82,87 @@ impl Toggled {
     /// Whether the time for a sign of the stream is over: it has stopped.
     pub(super) fn is_over(&mut self, now: Instant) -> bool {
         self.wait.take_if(|wait| wait.due <= now).is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::SourceKeys;
+    use crate::wire::stream::{Row, Source};
+
+    const KEYS: SourceKeys = SourceKeys { field_value: 'f', process_value: 'p' };
+
+    fn at(millis: u64) -> Instant {
+        Instant::from_millis(millis)
+    }
+
+    fn row() -> Message {
+        Message::Row(Row { source: Source::FieldValue, readings: Vec::new() })
+    }
+
+    /// A stream with a row each second, the last one at 1000 ms, and T at 1500 ms.
+    fn toggled() -> Toggled {
+        let mut toggled = Toggled::default();
+        assert!(!toggled.heard(at(0), &row()) && !toggled.heard(at(1_000), &row()));
+        toggled.sent(at(1_500), &Typed::Keys(vec![Key::Menu(MenuKey::Stream)]));
+        toggled
+    }
+
+    #[test]
+    fn silence_for_two_rows_is_the_end_of_a_stream() {
+        let mut toggled = toggled();
+        // On its way when the key was pressed.
+        assert!(!toggled.heard(at(1_799), &row()));
+        assert_eq!(toggled.due(), Some(at(3_500)));
+        assert!(!toggled.is_over(at(3_499)));
+        assert!(toggled.is_over(at(3_500)));
+        assert!(!toggled.is_over(at(9_000)) && toggled.due().is_none(), "that is told once");
+    }
+
+    #[test]
+    fn rows_that_go_on_show_that_the_key_was_lost_and_a_question_that_it_was_not() {
+        let mut lost = toggled();
+        assert!(!lost.heard(at(1_800), &row()));
+        assert_eq!(lost.due(), None);
+        for question in [Prompt::Source(KEYS), Prompt::Period] {
+            let mut heard = toggled();
+            assert!(heard.heard(at(1_600), &Message::Prompt(question)), "{question:?}");
+            assert_eq!(heard.due(), None);
+        }
+    }
+
+    #[test]
+    fn words_behind_the_key_shorten_the_wait_and_never_lengthen_it() {
+        let mut toggled = toggled();
+        assert!(!toggled.heard(at(1_600), &Message::Text));
+        assert_eq!(toggled.due(), Some(at(2_000)));
+        assert!(!toggled.heard(at(1_900), &Message::Text));
+        assert_eq!(toggled.due(), Some(at(2_000)));
+    }
+
+    #[test]
+    fn behind_a_restart_only_rows_say_that_a_stream_is_on() {
+        let mut toggled = toggled();
+        toggled.restarted(at(5_000));
+        let due = at(5_000) + FIRST_VALUES + Duration::from_secs(2);
+        for words in [Message::Text, Message::Prompt(Prompt::Period)] {
+            assert!(!toggled.heard(at(5_100), &words));
+            assert_eq!(toggled.due(), Some(due));
+        }
+        assert!(!toggled.heard(at(5_200), &row()));
+        assert_eq!(toggled.due(), None);
+    }
+
+    #[test]
+    fn only_the_key_matters_and_rows_of_two_streams_say_nothing_of_their_time() {
+        let mut toggled = Toggled::default();
+        toggled.sent(at(0), &Typed::Keys(vec![Key::Other, Key::Enter, Key::Menu(MenuKey::Menu)]));
+        toggled.sent(at(0), &Typed::File);
+        assert_eq!(toggled.due(), None);
+        toggled.heard(at(0), &row());
+        toggled.heard(at(60_001), &row());
+        toggled.sent(at(61_000), &Typed::Keys(vec![Key::Menu(MenuKey::Stream)]));
+        assert_eq!(toggled.due(), Some(at(61_000) + ANSWER));
     }
 }

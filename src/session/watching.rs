@@ -3,14 +3,15 @@
 
 use super::Session;
 use super::event::{Event, Job};
+use super::keys::Typed;
 use crate::time::Instant;
 use crate::wire::{Message, Text};
 
 /// What has happened.
 #[derive(Clone, Copy)]
 pub(super) enum Saw<'a> {
-    /// These keys have left, none of them secret.
-    Typed(&'a [u8]),
+    /// This has left, and none of it is secret.
+    Typed(&'a Typed),
     /// The unit has printed something.
     Heard(&'a Text, &'a Message),
     /// Time has passed.
@@ -53,7 +54,7 @@ impl Session {
         let mut desk = self.desk(pending.as_ref());
         let mut given = Vec::new();
         match saw {
-            Saw::Typed(keys) => pages.typed(keys, &mut desk),
+            Saw::Typed(typed) => pages.typed(typed, &mut desk),
             Saw::Heard(text, message) => pages.heard(text, message, &mut desk),
             Saw::Tick => given = pages.tick(&mut desk),
             Saw::LinkLost => pages.interrupt(),

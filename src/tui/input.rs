@@ -31,6 +31,8 @@ pub enum Input {
     Bytes(Vec<u8>),
     /// The unit has sent bytes in these pieces, which had to wait for the console: before anything that was due.
     Arrived(Vec<Arrived>),
+    /// The beginning of such bytes: the rest comes before anything that was due. Keys may come in between.
+    ArrivedSoFar(Vec<Arrived>),
     /// The moment [`App::poll_timeout`](super::App::poll_timeout) named has come. Early is harmless.
     Timeout,
     /// Answer to [`Effect::ListPorts`]; an error in one sentence.

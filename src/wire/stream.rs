@@ -124,18 +124,15 @@ impl Layout {
 
     /// Reads a line as a row of this source, if it is exactly one.
     pub(super) fn parse_as(&self, source: Source, line: &str) -> Option<Row> {
-        let format = self.format(source);
-        let fields: Vec<&str> = line.split(';').collect();
-        if fields.len() != self.channels.len() {
+        let last = self.channels.len().checked_sub(1)?;
+        // Most lines are no row, or one of another layout.
+        if line.bytes().filter(|&byte| byte == b';').count() != last {
             return None;
         }
-        let last = fields.len() - 1;
+        let format = self.format(source);
         let readings = format.widths.iter().find_map(|&width| {
-            fields
-                .iter()
-                .enumerate()
-                .map(|(position, field)| format.reading(field, width, position == last))
-                .collect::<Option<Vec<_>>>()
+            let fields = line.split(';').enumerate();
+            fields.map(|(position, field)| format.reading(field, width, position == last)).collect::<Option<Vec<_>>>()
         })?;
         Some(Row { source, readings })
     }

@@ -192,3 +192,108 @@ impl Collector {
 fn may_be_an_entry(line: &str) -> bool {
     line.bytes().any(|byte| byte.is_ascii_digit())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Takes lines one behind the other; `>` before one says that it means something that is no entry.
+    fn take(collector: &mut Collector, lines: &[&str]) {
+        for line in lines {
+            let (text, otherwise) = line.strip_prefix('>').map_or((*line, false), |text| (text, true));
+            collector.take_line(&at(text), otherwise);
+        }
+    }
+
+    /// A line with a place of its own.
+    fn at(line: &str) -> Text {
+        let start = line.bytes().fold(0u64, |place, byte| (place * 31 + u64::from(byte)) % 100_000);
+        Text { span: Span { start, end: start + line.len() as u64 }, text: line.to_owned() }
+    }
+
+    fn of(product: &str) -> Collector {
+        Collector { product: Product::named(product), ..Collector::default() }
+    }
+
+    /// Addresses and values of what has been read, and the lines that nobody understands.
+    fn taken(mut collector: Collector) -> (String, u64) {
+        let reading = collector.take(true);
+        let shown = |entry: &ReadEntry| match &entry.value {
+            Some(value) => format!("{}={value:?}", entry.at),
+            None => format!("{}?{}", entry.at, entry.text),
+        };
+        (reading.entries.iter().map(shown).collect::<Vec<_>>().join(" "), reading.unrecognised_lines)
+    }
+
+    #[test]
+    fn entries_below_a_heading_belong_to_it_until_the_view_is_left() {
+        let lines = ["6126h Scaling Factor", "  01h TC1 = 16.000", "  02h TC2 = 17.000"];
+        let mut collector = of("AXTC4CO");
+        take(&mut collector, &lines);
+        assert_eq!(taken(collector.clone()), ("6126:01=Real32(16.0) 6126:02=Real32(17.0)".into(), 0));
+        collector.interrupt();
+        take(&mut collector, &["  03h TC3 = 18.000"]);
+        assert_eq!(taken(collector), ("6126:01=Real32(16.0) 6126:02=Real32(17.0)".into(), 1));
+    }
+
+    #[test]
+    fn what_has_a_number_and_is_no_entry_is_counted_and_titles_are_not() {
+        let mut collector = of("AXTC4CO");
+        take(
+            &mut collector,
+            &["Object dictionary", "press Enter", "something 5", ">S - Diagnostics 7", "6126h:09 16.0"],
+        );
+        assert_eq!(taken(collector), ("6126:09?16.0".into(), 1));
+    }
+
+    #[test]
+    fn an_object_without_sub_indices_is_read_from_its_line_or_the_one_below() {
+        let mut collector = of("AXTC4CO");
+        take(&mut collector, &["1017h Producer Heartbeat Time = 500"]);
+        assert_eq!(taken(collector), ("1017:00=Unsigned16(500)".into(), 0));
+        // The heading of an array names a number of its own; that is no value.
+        let mut collector = of("AXTC4CO");
+        take(&mut collector, &["6126h Scaling Factor 4"]);
+        assert_eq!(taken(collector), (String::new(), 0));
+    }
+
+    #[test]
+    fn lines_say_more_once_it_is_known_whose_they_are() {
+        let lines = ["6126h Scaling Factor", "  01h TC1 = 16.000", "something 5", ">S - Diagnostics 7"];
+        let mut collector = Collector::default();
+        take(&mut collector, &lines);
+        let (unknown, _) = taken(collector.clone());
+        assert_eq!(unknown, "6126:01?TC1 = 16.000");
+        take(&mut collector, &["1018h:02 Product Code = 0x00010114"]);
+        assert_eq!(collector.product_shown().map(|(product, _)| product.name.as_str()), Some("AXTC4CO"));
+        let (read, unrecognised) = taken(collector);
+        assert_eq!((read.as_str(), unrecognised), ("1018:02=Unsigned32(65812) 6126:01=Real32(16.0)", 1));
+    }
+
+    #[test]
+    fn half_a_line_is_taken_back_and_what_would_be_read_is_not_taken() {
+        let mut collector = of("AXTC4CO");
+        let (whole, half) = ("6126h:01 TC1 = 16.000", "6126h:02 TC2 = 1");
+        take(&mut collector, &[whole, half]);
+        collector.forget(at(half).span);
+        assert!(collector.reads(&at(half)) && !collector.reads(&at("press Enter 5")));
+        assert_eq!(taken(collector), ("6126:01=Real32(16.0)".into(), 0));
+    }
+
+    #[test]
+    fn more_entries_than_any_unit_has_are_not_kept_and_known_ones_are_still_read() {
+        let mut collector = of("AXTC4CO");
+        let entry = |number: usize| ReadEntry {
+            at: ObjectAddress::new((0x2000 + number / 256) as u16, (number % 256) as u8),
+            value: None,
+            text: number.to_string(),
+            span: Span::default(),
+            known: false,
+        };
+        (0..=MOST_ENTRIES).for_each(|number| collector.keep(entry(number)));
+        assert_eq!(collector.count(), MOST_ENTRIES);
+        collector.keep(ReadEntry { text: "again".into(), ..entry(7) });
+        assert_eq!(collector.entries[&entry(7).at].text, "again");
+        assert_eq!(collector.count(), MOST_ENTRIES);
+    }
+}

@@ -154,6 +154,11 @@ impl App {
                     session.handle_backlog(now, &backlog);
                 }
             }
+            Input::ArrivedSoFar(backlog) => {
+                if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
+                    session.begin_backlog(now, &backlog);
+                }
+            }
             Input::Timeout => self.timeout(now),
             Input::PortsListed(ports) => {
                 self.connect.listed(ports);

@@ -148,6 +148,6 @@ impl Console {
     /// end.
     fn take_rest(&mut self) -> bool {
         let rest = self.link.as_ref().map(|link| self.inbox.rest(link.id()));
-        self.hand_in(rest.unwrap_or_default())
+        self.hand_in(rest.unwrap_or_default(), Input::Arrived)
     }
 }

@@ -42,6 +42,9 @@ use crate::time::{Duration, Instant};
 const FRAME: Duration = Duration::from_millis(34);
 /// Longest wait: bounds the arithmetic, nothing else.
 const LONGEST_WAIT: Duration = Duration::from_secs(3600);
+/// Bytes from the unit between two looks at the keyboard: a few milliseconds' work, when rows come as fast as they can be
+/// read.
+const PART: usize = 8 * 1024;
 /// Pieces of a recording between two looks at the keyboard.
 const PIECES: usize = 64;
 
@@ -213,8 +216,21 @@ impl Console {
             }
             // A stopped terminal keeps the drawing waiting, Ctrl-Z everything: what the unit has answered meanwhile goes
             // before what has become due meanwhile.
-            if self.take_arrived() {
-                return self.ended();
+            self.inbox.collect();
+            loop {
+                let (leaves, more) = self.take_arrived();
+                if leaves {
+                    return self.ended();
+                }
+                if let Ok(event) = self.keys.try_recv() {
+                    hurry = true;
+                    if self.take_key(event, screen) {
+                        return self.ended();
+                    }
+                }
+                if !more {
+                    break;
+                }
             }
             let now = self.clock.now();
             // A flood of inputs must not keep a timer from expiring.
@@ -227,13 +243,7 @@ impl Console {
             self.play();
             if let Ok(event) = self.keys.try_recv() {
                 hurry = true;
-                if self.handle(Input::Terminal(event)) {
-                    return self.ended();
-                }
-                if std::mem::take(&mut self.suspends)
-                    && let Err(error) = screen.suspend().and_then(|()| self.draw_anew(screen))
-                    && self.end(Err(error))
-                {
+                if self.take_key(event, screen) {
                     return self.ended();
                 }
                 continue;
@@ -297,20 +307,28 @@ impl Console {
         self.over.take().unwrap_or(Ok(End::Quit))
     }
 
-    /// Hands the app the bytes that have come. Gives `true` when it is to end.
-    fn take_arrived(&mut self) -> bool {
-        let arrived = self.inbox.arrived();
-        self.hand_in(arrived)
+    /// Tells the app of a key, or of whatever else the terminal says. Gives `true` when it is to end.
+    fn take_key(&mut self, event: TerminalEvent, screen: &mut Screen) -> bool {
+        self.handle(Input::Terminal(event))
+            || (std::mem::take(&mut self.suspends)
+                && screen.suspend().and_then(|()| self.draw_anew(screen)).is_err_and(|error| self.end(Err(error))))
     }
 
-    fn hand_in(&mut self, mut arrived: Vec<Arrived>) -> bool {
+    /// Hands the app some of the bytes that have come. Gives whether it is to end, and whether there are more of them.
+    fn take_arrived(&mut self) -> (bool, bool) {
+        let (arrived, more) = self.inbox.part_of_arrived(PART);
+        let leaves = self.hand_in(arrived, if more { Input::ArrivedSoFar } else { Input::Arrived });
+        (leaves, more)
+    }
+
+    fn hand_in(&mut self, mut arrived: Vec<Arrived>, input: fn(Vec<Arrived>) -> Input) -> bool {
         if arrived.is_empty() {
             return false;
         }
         for piece in &mut arrived {
             piece.at += self.skew;
         }
-        self.handle(Input::Arrived(arrived))
+        self.handle(input(arrived))
     }
 
     /// When the app's timer expires, by the clock. While a recording is played it expires in the recording's time.

@@ -70,6 +70,7 @@ fn no_byte_is_lost_when_one_link_takes_the_place_of_another() {
             type_keys(&mut console, "y");
         }
     }
+    console.inbox.collect();
     console.take_arrived();
     console.close_link();
     let recorded = |name| std::fs::read_to_string(folder.path().join(name)).expect("a recording");

@@ -6,14 +6,17 @@
 //! page is known, what looks like it is one as well, and what does not is something else, for instance the answers of a
 //! dialogue that somebody has meanwhile.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeSet;
 
-use super::diagnostics::{Assembler, FIRST_PAGE, Page, STOPPED, UNDER_WAY, has_words};
-use super::dialogue::LONGEST_TYPED;
-use super::job::Desk;
 use crate::record::Span;
+use crate::session::diagnostics::{Assembler, FIRST_PAGE, Page, STOPPED, UNDER_WAY, has_words};
+use crate::session::job::Desk;
+use crate::session::keys::{Key, Typed};
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderText, Message, Text, diagnostics};
+use crate::wire::{LoaderText, MenuKey, Message, Text, diagnostics};
 
 /// How long behind a key other than S a line may be its answer.
 const ANSWER: Duration = Duration::from_millis(1000);
@@ -24,7 +27,7 @@ const CEASED: Duration = Duration::from_secs(3);
 
 /// Listens for pages.
 #[derive(Debug, Default)]
-pub(super) struct Pages {
+pub(in crate::session) struct Pages {
     block: Assembler,
     /// When the block under construction began.
     begun: Instant,
@@ -38,8 +41,6 @@ pub(super) struct Pages {
     counted: u64,
     /// S has been typed an odd number of times since the unit has started.
     switched_on: bool,
-    /// What is typed is the answer to a question, up to Enter: the `s` of `Yes` is no key.
-    answers: bool,
     /// Keys are seen at all: not every recording has them.
     has_keys: bool,
     /// When the last key was sent, and the last S.
@@ -105,23 +106,17 @@ fn labels(lines: &[Text]) -> Vec<String> {
 }
 
 impl Pages {
-    /// These bytes have been sent.
-    pub(super) fn typed(&mut self, keys: &[u8], desk: &mut Desk<'_>) {
+    /// This has been sent.
+    pub(in crate::session) fn typed(&mut self, typed: &Typed, desk: &mut Desk<'_>) {
         self.has_keys = true;
         self.key_at = Some(desk.now);
-        if keys.len() > LONGEST_TYPED {
-            // A file that is sent as it is: its letters are no keys, and anything may answer them.
+        if *typed == Typed::File {
+            // Anything may answer it.
             self.other_key(desk.now);
-            return;
         }
-        for key in keys {
-            match key.to_ascii_lowercase() {
-                b'\r' | 0x1B => {
-                    self.answers = false;
-                    self.other_key(desk.now);
-                }
-                _ if self.answers => self.other_key(desk.now),
-                b's' => {
+        for key in typed.keys() {
+            match key {
+                Key::Menu(MenuKey::Diagnostics) => {
                     // They may have been on before anybody here has pressed a key.
                     self.switched_on = !(self.switched_on || desk.facts.diagnostics.is_some());
                     self.switched_at = Some(desk.now);
@@ -131,9 +126,11 @@ impl Pages {
                         self.ceased = desk.now + STOPPED;
                     }
                 }
-                key => {
-                    self.answers = matches!(key, b'd' | b'l');
-                    self.switched_on &= !matches!(key, b'v' | b'm' | b'l');
+                Key::Menu(MenuKey::View | MenuKey::Menu | MenuKey::Load) => {
+                    self.switched_on = false;
+                    self.other_key(desk.now);
+                }
+                Key::Menu(MenuKey::Default | MenuKey::Stream) | Key::Leave | Key::Enter | Key::Other => {
                     self.other_key(desk.now);
                 }
             }
@@ -146,7 +143,7 @@ impl Pages {
     }
 
     /// The unit has printed this, and no job has made anything of it.
-    pub(super) fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) {
+    pub(in crate::session) fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) {
         match message {
             Message::Row(_) => return,
             Message::MenuKey(_) | Message::Prompt(_) => {
@@ -198,7 +195,7 @@ impl Pages {
 
     /// The link is gone, or nothing is listened for: the rest of what came last will not come, and what the unit does
     /// meanwhile nobody knows. What a page looks like stays known.
-    pub(super) fn interrupt(&mut self) {
+    pub(in crate::session) fn interrupt(&mut self) {
         if self.block.due().is_some() || self.before.is_some() || self.key_at.is_some() {
             let known = self.known.take();
             *self = Pages { known, has_keys: self.has_keys, ..Pages::default() };
@@ -206,7 +203,7 @@ impl Pages {
     }
 
     fn restarted(&mut self, desk: &mut Desk<'_>) {
-        (self.switched_on, self.begun_on, self.answers) = (false, false, false);
+        (self.switched_on, self.begun_on) = (false, false);
         (self.known, self.before) = (None, None);
         self.stopped(desk);
     }
@@ -223,13 +220,13 @@ impl Pages {
     }
 
     /// When it wants to be looked after.
-    pub(super) fn due(&self) -> Option<Instant> {
+    pub(in crate::session) fn due(&self) -> Option<Instant> {
         // A page that may still be going on says more than the time.
         self.block.due().or(self.runs.then_some(self.ceased))
     }
 
     /// Time has passed: the pages that are complete now.
-    pub(super) fn tick(&mut self, desk: &mut Desk<'_>) -> Vec<Page> {
+    pub(in crate::session) fn tick(&mut self, desk: &mut Desk<'_>) -> Vec<Page> {
         let mut pages = Vec::new();
         if self.block.due().is_some_and(|due| due <= desk.now) {
             pages = self.complete(desk);
@@ -241,7 +238,7 @@ impl Pages {
     }
 
     /// Nothing more comes of the block under construction: the pages it makes.
-    pub(super) fn complete(&mut self, desk: &mut Desk<'_>) -> Vec<Page> {
+    pub(in crate::session) fn complete(&mut self, desk: &mut Desk<'_>) -> Vec<Page> {
         let cut = std::mem::take(&mut desk.cut);
         let page = self.block.complete(desk);
         let rest = desk.pending.filter(|_| std::mem::replace(&mut desk.cut, cut));
@@ -299,7 +296,7 @@ impl Pages {
     }
 
     /// Whether a line is one of a page while pages come.
-    pub(super) fn owns(&self, line: &str) -> bool {
+    pub(in crate::session) fn owns(&self, line: &str) -> bool {
         self.known.as_ref().is_some_and(|known| known.fits(line))
     }
 
