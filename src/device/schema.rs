@@ -106,7 +106,7 @@ pub fn read(file: &str, text: &str) -> Result<Product, Vec<Complaint>> {
     let complaints = Complaints::about(file, text);
     let raw: RawProduct = match toml::from_str(text) {
         Ok(raw) => raw,
-        Err(error) => return Err(complaints.and_the_end(&error)),
+        Err(error) => return Err(complaints.ended_by(&error)),
     };
     let mut reader = Reader { complaints };
     let product = reader.product(raw);
