@@ -27,7 +27,7 @@ use super::super::objects::{Objects, Saved, is_parameter};
 use super::super::{Area, Store};
 use crate::canopen::ObjectAddress;
 use crate::device::dictionary::Group;
-use crate::device::{BIT_RATES_KBPS, Product};
+use crate::device::{BIT_RATES_KBPS, HIGHEST_NODE_ID, Product};
 use crate::wire::stream::Source;
 
 /// Bytes of the whole image: two slots.
@@ -159,7 +159,7 @@ impl Parameters {
         if !(shortest..=longest).contains(&period_ms) {
             return Err(ParametersError::Value("stream period"));
         }
-        if !(1..=127).contains(&values[4]) {
+        if !(1..=HIGHEST_NODE_ID).contains(&values[4]) {
             return Err(ParametersError::Value("node-ID"));
         }
         let kbps = u16_at(values, 6);
