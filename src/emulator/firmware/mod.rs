@@ -107,7 +107,7 @@ impl Firmware {
             dialogue: Dialogue::Menu,
             keys: VecDeque::new(),
             after_return: false,
-            measurement: Measurement::start(board.now, board.product, &mut objects),
+            measurement: Measurement::start(board.now, board.product, board.sensors, &mut objects),
             objects,
             errors: ActiveErrors::default(),
             network: Network::start(board.now, board.product, autonomous),
@@ -388,7 +388,7 @@ impl Firmware {
             self.print(board, Sentence::DiagnosticsOff);
         } else {
             self.print(board, Sentence::DiagnosticsOn);
-            self.page_at = Some(board.now.max(self.first_data_at(board)));
+            self.page_at = Some(board.now.max(self.measurement.first_data_at()));
         }
     }
 
@@ -410,8 +410,7 @@ impl Firmware {
             _ => return Dialogue::View { place, since },
         };
         let Some(object) = next else {
-            self.measurement.resume(board.now);
-            self.network.resume(board.now.since(since));
+            self.resume(since, board.now);
             self.print(board, Sentence::ViewEnd);
             self.print_menu(board);
             return Dialogue::Menu;
@@ -433,13 +432,18 @@ impl Firmware {
     /// Rows come at whole periods from now, but not before the first valid data.
     fn arm_stream(&mut self, board: &Board<'_>, stream: StreamSetting) {
         self.row = None;
-        let first_data_at = self.first_data_at(board);
-        self.row_at = stream.on.then(|| first_data_at.max(board.now + period(stream)));
+        self.row_at = stream.on.then(|| self.measurement.first_data_at().max(board.now + period(stream)));
     }
 
-    /// No measured values before the converters have settled (section 1.1; errata B-199, C-15).
-    fn first_data_at(&self, board: &Board<'_>) -> Instant {
-        self.started_at + Duration::from_millis(u64::from(board.product.measurement.first_data_ms))
+    /// Goes on behind the view, which was opened at a moment. What had not become valid by then is not printed yet: no
+    /// measured values before the converters have settled (section 1.1; errata B-199, C-15).
+    fn resume(&mut self, halted_at: Instant, now: Instant) {
+        self.measurement.resume(halted_at, now);
+        let first_data_at = self.measurement.first_data_at();
+        self.network.resume(now.since(halted_at), first_data_at);
+        for due in [&mut self.row_at, &mut self.page_at].into_iter().flatten() {
+            *due = first_data_at.max(*due);
+        }
     }
 
     /// A row or page: only while nothing else is asked or shown (errata E-117) and no more than `room` waits with it;
