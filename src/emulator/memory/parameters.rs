@@ -28,6 +28,7 @@ use super::super::{Area, Store};
 use crate::canopen::ObjectAddress;
 use crate::device::dictionary::Group;
 use crate::device::{BIT_RATES_KBPS, HIGHEST_NODE_ID, Product};
+use crate::time::Duration;
 use crate::wire::stream::Source;
 
 /// Bytes of the whole image: two slots.
@@ -69,6 +70,13 @@ pub struct StreamSetting {
     pub source: Source,
     /// Repetition time in ms, within what the product takes.
     pub period_ms: u16,
+}
+
+impl StreamSetting {
+    /// Time from one row to the next.
+    pub fn period(self) -> Duration {
+        Duration::from_millis(u64::from(self.period_ms))
+    }
 }
 
 /// What the loader does when power comes.
