@@ -67,7 +67,7 @@ impl Firmware {
     /// Starts the application that lies in flash: first-start text if it is new, banner, menu.
     pub fn start(board: &mut Board<'_>, identity: Identity, dialect: Dialect) -> Self {
         let mut objects = board.parameters.objects();
-        about::put(&mut objects, &identity, board.serial_number);
+        about::put(&mut objects, &identity, board.parameters.values().serial_number.unwrap_or_default());
         let autonomous = objects.get(0x5555, 0) == Value::Boolean(true);
         let mut firmware = Firmware {
             dialect,

@@ -6,7 +6,7 @@ use axcon::emulator::knob::Knob;
 use axcon::emulator::{NetworkState, NmtCommand, Refusal};
 use axcon::wire::stream::{Reading, Row};
 
-use super::Bench;
+use super::{Bench, Setup};
 
 const PRODUCTS: [&str; 2] = ["AXTC4CO", "AXRTD8CO"];
 
@@ -131,6 +131,31 @@ fn changes_act_at_once_and_stay_only_if_they_are_saved() {
     rtd8.power_on();
     rtd8.run_ms(1_000);
     assert_eq!((rtd8.read("3000:2"), rtd8.read("3030:2")), (Ok(0.0), Ok(-4.0)), "the user's own constants");
+}
+
+#[test]
+fn a_unit_keeps_its_serial_number_with_its_memory_whatever_the_seed() {
+    for name in PRODUCTS {
+        let number = |bench: &mut Bench| bench.read("1018:4").expect("it runs");
+        let mut bench = Bench::of(name, 0);
+        let first = number(&mut bench);
+        let made_with = |seed, parameters| {
+            let product = Product::named(name).expect("built in");
+            let mut bench = Bench::of(name, 0);
+            let flash = bench.unit().flash().to_vec();
+            let loader = product.loader.kind;
+            let mut bench = Bench::new(Setup { product, loader, seed, dialect: 0, flash, parameters });
+            bench.run_ms(500);
+            bench
+        };
+        let parameters = bench.unit().parameters().to_vec();
+        assert_eq!(number(&mut made_with(2, parameters)), first, "{name}");
+        let mut other = made_with(2, Vec::new());
+        assert_ne!(number(&mut other), first, "{name}: another unit");
+        other.keys(b"dYes\r");
+        other.run_ms(1_000);
+        assert_eq!(number(&mut other), number(&mut made_with(2, Vec::new())), "{name}: no default touches it");
+    }
 }
 
 // Errata E-93, E-G4.
