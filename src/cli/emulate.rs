@@ -78,6 +78,7 @@ mod hosting {
     use crate::emulator::Unit;
     use crate::emulator::fault::{self, Fault};
     use crate::emulator::scenario::{self, LARGEST_FILE, Scenario, Stage, Verb};
+    use crate::emulator::words::shown;
     use crate::host::Input;
     use crate::host::pty::{PortLink, PortLinkError};
     use crate::host::signal::Signals;
@@ -175,14 +176,11 @@ mod hosting {
         let mut faults = vec![Vec::new(); products.len()];
         for spec in specs {
             let refused = |complaint: String| {
-                let shown = crate::wire::visible::line(spec.as_bytes());
-                CliError::message(Kind::Usage, format!("--fault '{shown}': {complaint}"))
+                CliError::message(Kind::Usage, format!("--fault '{}': {complaint}", shown(spec)))
                     .hint("docs/emulator.md describes the faults, for example: --fault 'lost to-unit at byte 5000'")
             };
             let (places, begin) = places(spec, products.len()).map_err(refused)?;
-            // Blank as many columns as stand before the fault, so that its complaints count them.
-            let blanks = spec.chars().count() - spec.chars().skip(begin).count();
-            let fault: String = std::iter::repeat_n(' ', blanks).chain(spec.chars().skip(begin)).collect();
+            let fault = blanked(spec, begin);
             for place in places.unwrap_or_else(|| (0..products.len()).collect()) {
                 let fault = Fault::read(&fault, products[place]).map_err(|error| refused(error.to_string()))?;
                 faults[place].push(fault);
@@ -205,6 +203,11 @@ mod hosting {
             Ok(number) => Err(format!("there is no unit {number}: they are numbered 1 to {units}")),
             Err(_) => Ok((None, 0)),
         }
+    }
+
+    /// A line with blanks before this character, so that complaints count the columns of the whole line.
+    fn blanked(line: &str, begin: usize) -> String {
+        std::iter::repeat_n(' ', begin).chain(line.chars().skip(begin)).collect()
     }
 
     /// A scenario's file: its name and its text.
@@ -460,12 +463,14 @@ mod hosting {
             }
             let (places, begin) = places(trimmed, products.len())?;
             let places = places.unwrap_or_else(|| vec![0]);
-            let verb: String = trimmed.chars().skip(begin).collect();
-            let verb = verb.trim_start();
-            let verbs = places.into_iter().map(|place| Ok((place, Verb::read(verb, products[place])?)));
+            let verb = blanked(trimmed, begin);
+            let verbs = places.into_iter().map(|place| Ok((place, Verb::read(&verb, products[place])?)));
             let verbs: Result<Vec<_>, scenario::WordError> = verbs.collect();
             verbs.map(|verbs| Some(Order::Tell(verbs))).map_err(|error| {
-                format!("{}: {error} ('help' says what there is)", crate::wire::visible::line(verb.as_bytes()))
+                // A verb that nobody knows is quoted by the complaint itself.
+                let first = verb.chars().take_while(|character| character.is_whitespace()).count() + 1;
+                let context = if error.column > first { format!("{}: ", shown(trimmed)) } else { String::new() };
+                format!("{context}{error} ('help' says what there is)")
             })
         }
     }
@@ -490,18 +495,19 @@ mod hosting {
             let products: Vec<&Product> = Product::all().iter().collect();
             let read = |line: &str| Order::read(line, &products);
             let tell = |verbs: &[(usize, Verb)]| Ok(Some(Order::Tell(verbs.to_vec())));
-            assert_eq!(read(" Power  OFF "), tell(&[(0, Verb::Power(false))]));
-            assert_eq!(read("2 power on"), tell(&[(1, Verb::Power(true))]));
+            assert_eq!(read(" Power  OFF "), tell(&[(0, Verb::PowerOff)]));
+            assert_eq!(read("2 power on"), tell(&[(1, Verb::PowerOn)]));
             assert_eq!(read("ALL status"), tell(&[(0, Verb::Status), (1, Verb::Status)]));
             assert_eq!(read(""), Ok(None));
             assert_eq!(read("Quit"), Ok(Some(Order::Quit)));
             assert_eq!(read("3 quit"), Err("there is no unit 3: they are numbered 1 to 2".into()));
             let complaint = read("explode\x1b[2J").expect_err("no such verb");
-            assert!(
-                complaint.starts_with("explode^[[2J: column 1: 'explode^[[2J' is not known; there is: set"),
-                "{complaint}"
-            );
+            assert!(complaint.starts_with("column 1: 'explode^[[2J' is not known; there is: set"), "{complaint}");
             assert!(read("2").expect_err("nothing to do").contains("a verb is missing"));
+            let complaint = read("2 read \x1b[2J").expect_err("no entry");
+            assert!(complaint.starts_with("2 read ^[[2J: column 8: '^[[2J' is no entry"), "{complaint}");
+            let complaint = read(&format!("open {}", "x".repeat(100_000))).expect_err("no input");
+            assert!(complaint.len() < 300, "{complaint}");
             assert_eq!(read("help  faults").map_err(|complaint| complaint.contains("'help' is not known")), Err(true));
             assert_eq!(read("Help Faults"), Ok(Some(Order::HelpFaults)));
             let fault = Fault::read("queue 64", products[1]).expect("a fault");

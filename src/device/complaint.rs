@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::wire::visible;
+
 /// One thing that is wrong with a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Complaint {
@@ -28,12 +30,16 @@ impl fmt::Display for Complaint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Complaint { file, line, column, key, message } = self;
         let colon = if key.is_empty() { "" } else { ": " };
-        write!(f, "{file}:{line}:{column}: {key}{colon}{message}")
+        let text = format!("{file}:{line}:{column}: {key}{colon}{message}");
+        // It quotes the file, which may hold anything, to a terminal.
+        f.write_str(&visible::line(text.as_bytes()))
     }
 }
 
 /// Complaints about one file that are told: more help nobody, and each is looked up in the text.
 const MOST_COMPLAINTS: usize = 100;
+/// Characters of a message that are told: a key or a text of the file may have any length.
+const LONGEST_MESSAGE: usize = 400;
 
 /// The complaints about one file.
 #[derive(Debug)]
@@ -58,7 +64,11 @@ impl<'a> Complaints<'a> {
         }
     }
 
-    fn put(&mut self, at: usize, key: String, message: String) {
+    fn put(&mut self, at: usize, key: String, mut message: String) {
+        if let Some((end, _)) = message.char_indices().nth(LONGEST_MESSAGE) {
+            message.truncate(end);
+            message.push_str(" ...");
+        }
         let before = self.text.get(..at).unwrap_or_default();
         let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
         self.found.push(Complaint {
@@ -70,8 +80,8 @@ impl<'a> Complaints<'a> {
         });
     }
 
-    /// The last one: the text is no TOML, or not of the shape that is wanted.
-    pub fn and_the_end(mut self, error: &toml::de::Error) -> Vec<Complaint> {
+    /// The complaints with one more behind them: the text is no TOML, or not of the shape that is wanted.
+    pub fn ended_by(mut self, error: &toml::de::Error) -> Vec<Complaint> {
         let at = error.span().map_or(0, |span| span.start);
         self.add(at, "", error.message().trim_end().replace('\n', "; "));
         self.found

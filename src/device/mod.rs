@@ -165,6 +165,9 @@ pub struct Loader {
     pub file_name: String,
 }
 
+/// Highest node-ID (CiA 301); the lowest is 1.
+pub const HIGHEST_NODE_ID: u8 = 127;
+
 /// Bit rates on the CAN side that LSS can set, in kbit/s (manuals, section 3.1.2).
 pub const BIT_RATES_KBPS: [u16; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 

@@ -54,7 +54,8 @@ pub struct Setup {
     pub product: &'static Product,
     /// Which bootloader is in its boot flash.
     pub loader: LoaderKind,
-    /// Decides everything that chance decides: noise, the simulated process, serial number.
+    /// Decides everything that chance decides: noise, the simulated process, and the serial number of a unit that has
+    /// none in its non-volatile memory.
     pub seed: u64,
     /// How it words its prose: 0 for the plain way, another seed for another dialect.
     pub dialect: u64,
@@ -114,7 +115,6 @@ pub enum Running {
 pub struct Unit {
     product: &'static Product,
     loader: LoaderKind,
-    serial_number: u32,
     dialect: u64,
     flash: Flash,
     parameters: ParameterStore,
@@ -155,7 +155,6 @@ enum Reset {
 struct Board<'a> {
     now: Instant,
     product: &'static Product,
-    serial_number: u32,
     flash: &'a mut Flash,
     parameters: &'a mut ParameterStore,
     sensors: &'a Sensors,
@@ -172,13 +171,13 @@ impl Unit {
     pub fn new(setup: Setup) -> Self {
         let Setup { product, loader, seed, dialect, flash, parameters } = setup;
         let mut stores = VecDeque::new();
+        let serial_number = Rng::new(seed).fork("serial number").next_u64() as u32;
         Unit {
             product,
             loader,
-            serial_number: Rng::new(seed).fork("serial number").next_u64() as u32,
             dialect,
             flash: Flash::new(product.flash, flash, seed),
-            parameters: ParameterStore::new(product, parameters, &mut stores),
+            parameters: ParameterStore::new(product, serial_number, parameters, &mut stores),
             sensors: Sensors::new(product, seed),
             uart: Uart::new(),
             stores,
@@ -388,7 +387,6 @@ impl Unit {
         let mut board = Board {
             now,
             product: self.product,
-            serial_number: self.serial_number,
             flash: &mut self.flash,
             parameters: &mut self.parameters,
             sensors: &self.sensors,

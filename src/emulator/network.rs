@@ -75,9 +75,11 @@ impl Network {
         }
     }
 
-    /// Goes on after it was halted for a time: what was planned comes that much later.
-    pub fn resume(&mut self, halted: Duration) {
-        self.start_at = self.start_at.map(|due| due + halted);
+    /// Goes on after it was halted for a time: what was planned comes that much later, and not before the first data,
+    /// which may come later too.
+    pub fn resume(&mut self, halted: Duration, first_data_at: Instant) {
+        self.ready_at = first_data_at;
+        self.start_at = self.start_at.map(|due| first_data_at.max(due + halted));
     }
 
     /// Carries out an order; resets are the application's affair and only end what was planned.
@@ -162,6 +164,20 @@ mod tests {
         network.command(at(4_000), NmtCommand::Stop);
         network.step(at(6_000));
         assert_eq!(network.state(), NetworkState::Stopped, "an order cancels it");
+    }
+
+    // E-110: while the view is open nothing is measured, so nothing becomes valid either.
+    #[test]
+    fn what_is_planned_comes_later_by_the_time_the_view_was_open() {
+        let mut early = network("AXTC4CO", true);
+        early.resume(Duration::from_secs(10), at(13_000));
+        assert_eq!(early.deadline(), Some(at(15_000)));
+        early.command(at(12_000), NmtCommand::Start);
+        assert_eq!((early.state(), early.deadline()), (NetworkState::PreOperational, Some(at(13_000))));
+        let mut late = network("AXTC4CO", false);
+        late.resume(Duration::from_secs(10), at(3_000));
+        late.command(at(14_000), NmtCommand::Start);
+        assert_eq!(late.state(), NetworkState::Operational, "the first data were there before");
     }
 
     #[test]

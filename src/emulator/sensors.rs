@@ -174,11 +174,12 @@ impl Sensors {
     /// open. The thermocouple is of the type the channel is set to. Channels count from 1.
     pub fn thermocouple(&self, now: Instant, channel: u8, thermocouple: Thermocouple) -> Option<f64> {
         let input = &self.inputs[usize::from(channel) - 1];
-        if input.broken[place(None)] {
-            return None;
-        }
+        // A short bridges whatever is broken behind it, as at an RTD.
         if input.shorted {
             return Some(0.0);
+        }
+        if input.broken[place(None)] {
+            return None;
         }
         let celsius = match input.quantity {
             Quantity::Microvolts(microvolts) => return Some(microvolts),
@@ -357,6 +358,19 @@ mod tests {
             before = exhaust;
         }
         assert!(highest - lowest > 30.0, "alive: {lowest} to {highest}");
+    }
+
+    #[test]
+    fn a_short_bridges_a_circuit_that_is_broken() {
+        let mut thermocouples = sensors("AXTC4CO", 1);
+        let mut rtds = sensors("AXRTD8CO", 1);
+        for knob in [Knob::Open(1, None), Knob::Short(1)] {
+            thermocouples.turn(knob).expect("a knob of this unit");
+            rtds.turn(knob).expect("a knob of this unit");
+        }
+        assert_eq!(thermocouples.thermocouple(Instant::ZERO, 1, Thermocouple::J), Some(0.0));
+        let curve = Curve::from_objects([3.9083, -5.775, -4.18301]);
+        assert!(rtds.rtd(Instant::ZERO, 1, Wiring::Two, curve).main.is_some_and(|volts| volts < 0.01));
     }
 
     // B-10, B-11, B-12, B-13, B-14, B-18

@@ -190,6 +190,10 @@ mod tests {
         found
     }
 
+    fn bytes(releases: &[(u64, Vec<u8>)]) -> Vec<u8> {
+        releases.iter().flat_map(|(_, bytes)| bytes.clone()).collect()
+    }
+
     #[test]
     fn text_leaves_at_the_line_rate_in_small_lots() {
         let mut uart = Uart::new();
@@ -208,11 +212,11 @@ mod tests {
         // 300 µs: three characters are out, the fourth is on its way.
         uart.hold(Instant::from_micros(300));
         let found = releases(&mut uart, Instant::from_millis(50));
-        assert_eq!(found.concat_bytes(), b"0123");
+        assert_eq!(bytes(&found), b"0123");
         assert_eq!(uart.deadline(), None, "held");
         uart.resume(Instant::from_millis(50));
         let rest = releases(&mut uart, Instant::from_millis(100));
-        assert_eq!(rest.concat_bytes(), b"456789abcdef");
+        assert_eq!(bytes(&rest), b"456789abcdef");
         assert_eq!(rest.last().map(|(at, _)| *at), Some(51_041), "12 characters after the XON");
     }
 
@@ -222,15 +226,5 @@ mod tests {
         uart.send(Instant::ZERO, &[b'.', XOFF, b'a', b'b']);
         let found = releases(&mut uart, Instant::from_millis(1));
         assert_eq!(found, [(173, vec![b'.', XOFF]), (347, b"ab".to_vec())]);
-    }
-
-    trait ConcatBytes {
-        fn concat_bytes(&self) -> Vec<u8>;
-    }
-
-    impl ConcatBytes for Vec<(u64, Vec<u8>)> {
-        fn concat_bytes(&self) -> Vec<u8> {
-            self.iter().flat_map(|(_, bytes)| bytes.clone()).collect()
-        }
     }
 }

@@ -67,7 +67,7 @@ impl<'a> Words<'a> {
     ///
     /// # Errors
     /// If there is none: `what` is missing, which may be one of `allowed`.
-    pub fn expect(&mut self, what: &str, allowed: &str) -> Result<(usize, &'a str), WordError> {
+    pub fn require(&mut self, what: &str, allowed: &str) -> Result<(usize, &'a str), WordError> {
         self.take().ok_or_else(|| WordError { column: self.end, message: format!("{what} is missing: {allowed}") })
     }
 
@@ -76,7 +76,7 @@ impl<'a> Words<'a> {
     /// # Errors
     /// If it is another, or none.
     pub fn exactly(&mut self, wanted: &str) -> Result<(), WordError> {
-        let (column, word) = self.expect("a word", wanted)?;
+        let (column, word) = self.require("a word", wanted)?;
         if word.eq_ignore_ascii_case(wanted) { Ok(()) } else { Err(unknown(column, word, wanted)) }
     }
 
@@ -85,7 +85,7 @@ impl<'a> Words<'a> {
     /// # Errors
     /// If the next word is none; `what` it should have been.
     pub fn number(&mut self, what: &str) -> Result<f64, WordError> {
-        let (column, word) = self.expect(what, "a number")?;
+        let (column, word) = self.require(what, "a number")?;
         word.parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(|| WordError {
             column,
             message: format!("'{}' is not {what}: write a number like 23.5", shown(word)),
@@ -98,16 +98,14 @@ impl<'a> Words<'a> {
     /// If the next word is none of them.
     pub fn whole(&mut self, what: &str, range: std::ops::RangeInclusive<u64>) -> Result<u64, WordError> {
         let allowed = format!("{} to {}", range.start(), range.end());
-        let (column, word) = self.expect(what, &allowed)?;
+        let (column, word) = self.require(what, &allowed)?;
         let hexadecimal = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X"));
-        let number = match hexadecimal {
-            // A sign would be taken as well.
-            Some(digits) if digits.starts_with('+') => None,
-            Some(digits) => u64::from_str_radix(digits, 16).ok(),
-            None => word.parse().ok(),
-        };
-        number
-            .filter(|number| range.contains(number))
+        let (digits, radix) = hexadecimal.map_or((word, 10), |digits| (digits, 16));
+        // The parser would take a sign as well.
+        let plain = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+        u64::from_str_radix(digits, radix)
+            .ok()
+            .filter(|number| plain && range.contains(number))
             .ok_or_else(|| WordError { column, message: format!("'{}' is not {allowed}", shown(word)) })
     }
 

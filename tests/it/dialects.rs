@@ -1,8 +1,9 @@
 //! The console against units that word and lay out everything in their own way, within what the manuals fix: the same
 //! facts and the same deeds for every dialect.
 
-use axcon::canopen::Value;
+use axcon::canopen::{ObjectAddress, Value};
 use axcon::device::Product;
+use axcon::device::dictionary::Access;
 use axcon::session::{Command, Event, Job, Outcome, UnitState};
 use axcon::time::Duration;
 use axcon::version::Version;
@@ -115,6 +116,16 @@ fn every_dialects_diagnostics_are_read_and_stopped() {
 fn every_dialects_dictionary_is_read_to_the_same_facts() {
     // A walk over the whole dictionary takes its time: fewer of them.
     in_dialects(40, |bench, product| {
+        // Settings with more digits than any temperature has.
+        let real = |number: f32| number.to_le_bytes().to_vec();
+        let mut settings = vec![(0x6126, 1, real(0.000_5)), (0x6127, 2, real(-1_234.567_8))];
+        if product.name == "AXRTD8CO" {
+            settings.extend([(0x3000, 1, vec![0, 0]), (0x3020, 1, real(0.000_012_5))]);
+        }
+        for (index, sub, data) in settings {
+            let at = ObjectAddress::new(index, sub);
+            bench.unit.unit_mut().write_object(bench.now, at, &data).map_err(|refusal| format!("{at}: {refusal}"))?;
+        }
         let outcome = bench.ask(Command::ReadDictionary);
         let Outcome::DictionaryRead(reading) = outcome else { return Err(format!("{outcome:?}")) };
         if !reading.complete {
@@ -131,6 +142,7 @@ fn every_dialects_dictionary_is_read_to_the_same_facts() {
             };
             let same = match read.value {
                 None => value.as_f64().is_nan(),
+                Some(setting) if entry.access == Access::ReadWrite => setting == value,
                 // As many digits as the unit prints, and one scan older perhaps.
                 Some(Value::Real32(number)) => (f64::from(number) - value.as_f64()).abs() < 1.0,
                 Some(other) => {

@@ -1,9 +1,9 @@
 //! The loaders a unit may have in its boot flash: they take an S-record file and write it to program flash.
 //!
-//! Three generations behind one door: two that keep a page and write it when the next one begins ([`paged`], g1 and g2),
-//! and one with a ring of characters ([`g3`]). A loader lives in flash of its own: no
-//! file can damage it. It knows nothing of what it loads: success means that the end record has come. Which program
-//! runs after the reset is decided by the unit (`emulator/mod.rs`).
+//! Three generations with one interface: two that keep a page and write it when the next one begins ([`paged`], g1 and
+//! g2), and one with a ring of characters ([`g3`]). A loader lives in flash of its own: no file can damage it. It knows
+//! nothing of what it loads: success means that the end record has come. Which program runs after the reset is decided by
+//! the unit (`emulator/mod.rs`).
 //!
 //! What the manual quotes of a product's loader comes from the product's file and wins over what the public loaders
 //! print. No dialect touches these texts.

@@ -1,4 +1,4 @@
-//! What every loader does with its transmitter: texts, the marks of its progress, and the hand that stops the sender.
+//! What every loader does with its transmitter: texts, marks of progress, and XOFF and XON for the sender.
 
 use super::Board;
 use crate::emulator::uart::{XOFF, XON};

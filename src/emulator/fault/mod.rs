@@ -136,7 +136,7 @@ impl Fault {
 
     /// Takes the words of a fault out of a line.
     pub(super) fn parse(words: &mut Words<'_>, product: &Product) -> Result<Fault, WordError> {
-        let (column, word) = words.expect("a fault", NAMES)?;
+        let (column, word) = words.require("a fault", NAMES)?;
         let mishap = match word.to_ascii_lowercase().as_str() {
             "lost" => Mishap::Lost,
             "doubled" => Mishap::Doubled,
@@ -174,7 +174,7 @@ impl Fault {
 
     fn of_flash(words: &mut Words<'_>, product: &Product) -> Result<Fault, WordError> {
         let defects = "worn-out, protected, stuck";
-        let (column, word) = words.expect("what is wrong with it", defects)?;
+        let (column, word) = words.require("what is wrong with it", defects)?;
         let defect = match word.to_ascii_lowercase().as_str() {
             "worn-out" => Defect::WornOut,
             "protected" => Defect::Protected,
@@ -191,7 +191,7 @@ impl Fault {
 
 impl Way {
     fn parse(words: &mut Words<'_>, allowed: &str) -> Result<Way, WordError> {
-        let (column, word) = words.expect("a way", allowed)?;
+        let (column, word) = words.require("a way", allowed)?;
         let ways = [("to-unit", Way::ToUnit), ("from-unit", Way::FromUnit)];
         let found = ways.into_iter().find(|(name, _)| word.eq_ignore_ascii_case(name) && allowed.contains(name));
         found.map(|(_, way)| way).ok_or_else(|| unknown(column, word, allowed))
@@ -201,7 +201,7 @@ impl Way {
 impl When {
     fn parse(words: &mut Words<'_>, counted: &str) -> Result<When, WordError> {
         let allowed = format!("at {counted} N, one in N");
-        let (column, word) = words.expect("when", &allowed)?;
+        let (column, word) = words.require("when", &allowed)?;
         if word.eq_ignore_ascii_case("at") {
             words.exactly(counted)?;
             number(words).map(When::At)
@@ -361,6 +361,7 @@ mod tests {
             ("flash torn at word 1", "column 7: 'torn' is not known; there is: worn-out, protected, stuck"),
             ("flash stuck at word 0x10000", "column 21: '0x10000' is not 0 to 65535"),
             ("flash stuck at word 0x+1", "column 21: '0x+1' is not 0 to 65535"),
+            ("flash stuck at word +1", "column 21: '+1' is not 0 to 65535"),
             ("latency 16ms", "column 9: '16ms' is not 0 to 60000"),
             ("queue 5000", "column 7: '5000' is not 0 to 4096"),
             ("\x1b[2J", "column 1: '^[[2J' is not known"),

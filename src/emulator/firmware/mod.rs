@@ -1,16 +1,19 @@
-//! The application: banner, main menu and its dialogues, data stream, diagnostics (manuals, chapter 4).
+//! The application: power-up, what it prints by itself, and its side of the network (manuals, chapter 4).
 //!
 //! What it says is worded by [`Dialect`]; who it is stands in the program flash it was started from; what it measures and
 //! is set to lies in its object dictionary ([`Objects`]). Keys come one by one; while the port has more to send than
-//! [`BLOCKED_AT`] characters, the program is stuck in printing and keys wait, as many as the receiver can keep.
+//! [`BLOCKED_AT`] characters, the program is stuck in printing and keys wait, as many as the receiver can keep. What a key
+//! does is in `dialogue`.
 
 mod about;
+mod diagnosis;
+mod dialogue;
 mod prompt;
 mod view;
 
 use std::collections::VecDeque;
 
-use super::dialect::{ChannelDiagnosis, Diagnosis, Dialect, Sentence};
+use super::dialect::{Dialect, Sentence};
 use super::errors::{ActiveErrors, Class, ErrorEvent};
 use super::measurement::{self, Measurement};
 use super::memory::StreamSetting;
@@ -19,17 +22,13 @@ use super::objects::{Effect, Objects};
 use super::uart::{XOFF, XON};
 use super::{Board, Refusal, Reset};
 use crate::canopen::{ObjectAddress, Value};
-use crate::device::SensorKind;
 use crate::device::dictionary::{Group, Object};
 use crate::image::Identity;
 use crate::time::{Duration, Instant};
-use crate::wire::stream::{Reading, Row, Source};
-use prompt::{ESCAPE, Echo, Line, Typed};
+use dialogue::Dialogue;
 
 /// A diagnostics page comes at this interval (section 4.1.4).
-pub const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
-/// Repetition rate that an empty answer takes (errata E-105).
-pub const DEFAULT_PERIOD_MS: u16 = 1_000;
+const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
 
 /// Characters waiting to be sent at which the program is stuck in printing and takes no keys.
 const BLOCKED_AT: usize = 2_048;
@@ -41,9 +40,6 @@ const ROW_BUFFER: usize = 512;
 /// The same with a page of diagnostics: it has room behind any number of rows, and all that waits is less than a tenth of
 /// a second of the line.
 const PAGE_BUFFER: usize = 1_024;
-
-/// The password for new software. Real ones come from Axiomatic; this is the emulator's build setting (errata E-112).
-const PASSWORD: &str = "AXIO-2010";
 
 /// The application while it runs.
 #[derive(Debug)]
@@ -67,38 +63,11 @@ pub struct Firmware {
     page_at: Option<Instant>,
 }
 
-/// Who gets the keys.
-#[derive(Debug)]
-enum Dialogue {
-    Menu,
-    /// The source that was chosen, where the question wants Enter behind its key.
-    StreamSource {
-        chosen: Option<Source>,
-    },
-    StreamPeriod {
-        source: Source,
-        line: Line,
-    },
-    Defaults {
-        line: Line,
-    },
-    Password {
-        line: Line,
-    },
-    /// The object dictionary is shown up to this place of the walk; scanning and CAN are halted since then.
-    View {
-        place: usize,
-        since: Instant,
-    },
-    /// The reset follows when the last text has left.
-    Leaving,
-}
-
 impl Firmware {
     /// Starts the application that lies in flash: first-start text if it is new, banner, menu.
     pub fn start(board: &mut Board<'_>, identity: Identity, dialect: Dialect) -> Self {
         let mut objects = board.parameters.objects();
-        about::put(&mut objects, &identity, board.serial_number);
+        about::put(&mut objects, &identity, board.parameters.values().serial_number.unwrap_or_default());
         let autonomous = objects.get(0x5555, 0) == Value::Boolean(true);
         let mut firmware = Firmware {
             dialect,
@@ -107,7 +76,7 @@ impl Firmware {
             dialogue: Dialogue::Menu,
             keys: VecDeque::new(),
             after_return: false,
-            measurement: Measurement::start(board.now, board.product, &mut objects),
+            measurement: Measurement::start(board.now, board.product, board.sensors, &mut objects),
             objects,
             errors: ActiveErrors::default(),
             network: Network::start(board.now, board.product, autonomous),
@@ -163,7 +132,7 @@ impl Firmware {
         }
         if self.row_at.is_some_and(|due| due <= now) {
             let stream = board.parameters.values().stream;
-            self.row_at = self.row_at.map(|due| due + period(stream));
+            self.row_at = self.row_at.map(|due| due + stream.period());
             let objects = &self.objects;
             let row = self.row.take().unwrap_or_else(|| {
                 let row = board.product.stream.emit(&measurement::row(objects, stream.source));
@@ -260,186 +229,21 @@ impl Firmware {
         }
     }
 
-    fn key(&mut self, board: &mut Board<'_>, key: u8) {
-        self.dialogue = match std::mem::replace(&mut self.dialogue, Dialogue::Menu) {
-            Dialogue::Menu => self.menu_key(board, key.to_ascii_lowercase()),
-            Dialogue::StreamSource { chosen } => self.source_key(board, key, chosen),
-            Dialogue::StreamPeriod { source, line } => self.line_key(
-                board,
-                key,
-                line,
-                |line| Dialogue::StreamPeriod { source, line },
-                |firmware, board, answer| firmware.stream_on(board, source, &answer),
-            ),
-            Dialogue::Defaults { line } => {
-                self.line_key(board, key, line, |line| Dialogue::Defaults { line }, Firmware::restore_defaults)
-            }
-            Dialogue::Password { line } => {
-                self.line_key(board, key, line, |line| Dialogue::Password { line }, Firmware::enter_loader)
-            }
-            Dialogue::View { place, since } => self.view_key(board, key, place, since),
-            Dialogue::Leaving => Dialogue::Leaving,
-        };
-    }
-
-    fn menu_key(&mut self, board: &mut Board<'_>, key: u8) -> Dialogue {
-        match key {
-            b'm' => {
-                self.print_menu(board);
-                Dialogue::Menu
-            }
-            b'v' => self.open_view(board),
-            b'd' => self.ask(board, Sentence::AskDefaults, Dialogue::Defaults { line: Line::new(Echo::Plain) }),
-            b't' if board.parameters.values().stream.on => {
-                board.parameters.change(board.stores, |values| values.stream.on = false);
-                self.row_at = None;
-                self.print(board, Sentence::StreamOff);
-                Dialogue::Menu
-            }
-            b't' => self.ask(board, Sentence::AskSource, Dialogue::StreamSource { chosen: None }),
-            b's' => {
-                self.toggle_diagnostics(board);
-                Dialogue::Menu
-            }
-            b'l' => self.ask(board, Sentence::AskPassword, Dialogue::Password { line: Line::new(Echo::Stars) }),
-            _ => Dialogue::Menu,
-        }
-    }
-
-    fn source_key(&mut self, board: &mut Board<'_>, key: u8, chosen: Option<Source>) -> Dialogue {
-        let stay = Dialogue::StreamSource { chosen };
-        let source = match (self.dialect.source_of(key), key, chosen) {
-            (Some(source), _, _) if self.dialect.source_wants_enter() => {
-                self.echo(board, &[key]);
-                return Dialogue::StreamSource { chosen: Some(source) };
-            }
-            (Some(source), _, _) => {
-                self.echo(board, &[key]);
-                source
-            }
-            (None, b'\r', Some(source)) => source,
-            (None, b'\r' | ESCAPE, _) => return self.cancel(board),
-            (None, _, _) => return stay,
-        };
-        let limits = board.product.measurement.stream_period_ms;
-        let prompt = self.dialect.ask_period(limits, DEFAULT_PERIOD_MS);
-        self.say(board, &prompt);
-        Dialogue::StreamPeriod { source, line: Line::new(Echo::Plain) }
-    }
-
-    /// A key of an answer: echoes it, and hands the answer on when it is complete.
-    fn line_key(
-        &mut self,
-        board: &mut Board<'_>,
-        key: u8,
-        mut line: Line,
-        stay: impl FnOnce(Line) -> Dialogue,
-        answered: impl FnOnce(&mut Self, &mut Board<'_>, String) -> Dialogue,
-    ) -> Dialogue {
-        match line.take(key) {
-            Typed::More(echo) => self.echo(board, echo),
-            Typed::Character(character) => self.echo(board, &[character]),
-            Typed::Answer(answer) => return answered(self, board, answer),
-            Typed::Cancelled => return self.cancel(board),
-        }
-        stay(line)
-    }
-
-    fn stream_on(&mut self, board: &mut Board<'_>, source: Source, answer: &str) -> Dialogue {
-        let Some(period_ms) = parse_period(answer, board.product.measurement.stream_period_ms) else {
-            let text = self.dialect.bad_period(board.product.measurement.stream_period_ms);
-            self.say(board, &text);
-            return Dialogue::Menu;
-        };
-        let stream = StreamSetting { on: true, source, period_ms };
-        board.parameters.change(board.stores, |values| values.stream = stream);
-        let text = self.dialect.stream_on(source, period_ms);
-        self.say(board, &text);
-        self.arm_stream(board, stream);
-        Dialogue::Menu
-    }
-
-    fn restore_defaults(&mut self, board: &mut Board<'_>, answer: String) -> Dialogue {
-        if answer != board.product.console.defaults_answer {
-            return self.cancel(board);
-        }
-        // Stream settings, node-ID and bit rate are kept apart from the object dictionary (errata E-106).
-        board.parameters.restore(board.stores, None);
-        self.print(board, Sentence::DefaultsRestored);
-        *board.reset = Some(Reset::Start);
-        Dialogue::Leaving
-    }
-
-    fn enter_loader(&mut self, board: &mut Board<'_>, answer: String) -> Dialogue {
-        if answer.is_empty() {
-            return self.cancel(board);
-        }
-        if answer != PASSWORD {
-            self.print(board, Sentence::WrongPassword);
-            return Dialogue::Menu;
-        }
-        self.print(board, Sentence::RightPassword);
-        *board.reset = Some(Reset::StayInLoader);
-        Dialogue::Leaving
-    }
-
-    fn toggle_diagnostics(&mut self, board: &mut Board<'_>) {
-        if self.page_at.take().is_some() {
-            self.print(board, Sentence::DiagnosticsOff);
-        } else {
-            self.print(board, Sentence::DiagnosticsOn);
-            self.page_at = Some(board.now.max(self.first_data_at(board)));
-        }
-    }
-
-    fn open_view(&mut self, board: &mut Board<'_>) -> Dialogue {
-        if self.network.state() != NetworkState::PreOperational {
-            self.print(board, Sentence::ViewRefused);
-            return Dialogue::Menu;
-        }
-        self.print(board, Sentence::ViewTitle);
-        self.say_objects(board, view::pdo_block(board.product));
-        self.print(board, Sentence::ViewNext);
-        Dialogue::View { place: 0, since: board.now }
-    }
-
-    fn view_key(&mut self, board: &mut Board<'_>, key: u8, place: usize, since: Instant) -> Dialogue {
-        let next = match key {
-            b'\r' => view::object(board.product, place),
-            b'x' | b'X' => None,
-            _ => return Dialogue::View { place, since },
-        };
-        let Some(object) = next else {
-            self.measurement.resume(board.now);
-            self.network.resume(board.now.since(since));
-            self.print(board, Sentence::ViewEnd);
-            self.print_menu(board);
-            return Dialogue::Menu;
-        };
-        self.say_objects(board, std::iter::once(object));
-        Dialogue::View { place: place + 1, since }
-    }
-
-    fn ask(&mut self, board: &mut Board<'_>, prompt: Sentence, dialogue: Dialogue) -> Dialogue {
-        self.print(board, prompt);
-        dialogue
-    }
-
-    fn cancel(&mut self, board: &mut Board<'_>) -> Dialogue {
-        self.print(board, Sentence::Cancelled);
-        Dialogue::Menu
-    }
-
     /// Rows come at whole periods from now, but not before the first valid data.
     fn arm_stream(&mut self, board: &Board<'_>, stream: StreamSetting) {
         self.row = None;
-        let first_data_at = self.first_data_at(board);
-        self.row_at = stream.on.then(|| first_data_at.max(board.now + period(stream)));
+        self.row_at = stream.on.then(|| self.measurement.first_data_at().max(board.now + stream.period()));
     }
 
-    /// No measured values before the converters have settled (section 1.1; errata B-199, C-15).
-    fn first_data_at(&self, board: &Board<'_>) -> Instant {
-        self.started_at + Duration::from_millis(u64::from(board.product.measurement.first_data_ms))
+    /// Goes on behind the view, which was opened at a moment. What had not become valid by then is not printed yet: no
+    /// measured values before the converters have settled (section 1.1; errata B-199, C-15).
+    fn resume(&mut self, halted_at: Instant, now: Instant) {
+        self.measurement.resume(halted_at, now);
+        let first_data_at = self.measurement.first_data_at();
+        self.network.resume(now.since(halted_at), first_data_at);
+        for due in [&mut self.row_at, &mut self.page_at].into_iter().flatten() {
+            *due = first_data_at.max(*due);
+        }
     }
 
     /// A row or page: only while nothing else is asked or shown (errata E-117) and no more than `room` waits with it;
@@ -452,34 +256,6 @@ impl Firmware {
 
     fn is_viewing(&self) -> bool {
         matches!(self.dialogue, Dialogue::View { .. })
-    }
-
-    fn diagnosis(&self, board: &Board<'_>) -> Diagnosis {
-        let objects = &self.objects;
-        let layout = &board.product.stream;
-        let row = measurement::row(objects, Source::FieldValue);
-        let is_rtd = board.product.measurement.sensors == SensorKind::Rtd;
-        let mut unit = vec![("Supply Voltage", objects.number(0x5000, 0), 2, "V")];
-        unit.push(match board.product.measurement.sensors {
-            SensorKind::Thermocouple => ("Cold Junction", objects.number(0x3100, 0), 3, "C"),
-            SensorKind::Rtd => ("Source Current", objects.number(0x5001, 0), 3, "mA"),
-        });
-        let first = layout.channels.len() - usize::from(board.product.measurement.channels);
-        let channels = (1u8..).zip(&row.readings[first..]).map(|(number, reading)| ChannelDiagnosis {
-            name: layout.channels[first + usize::from(number) - 1].clone(),
-            field_value: layout.emit(&one(*reading)),
-            process_value: objects.integer(0x7130, number),
-            status: objects.integer(0x6150, number) as u8,
-            microvolts: objects.integer(0x2010, number),
-            ohm: is_rtd.then(|| objects.number(0x2000, number)),
-        });
-        Diagnosis {
-            unit,
-            channels: channels.collect(),
-            errors: self.errors.count(),
-            uptime: board.now.since(self.started_at),
-            network: self.network.state(),
-        }
     }
 
     fn print_menu(&mut self, board: &mut Board<'_>) {
@@ -495,7 +271,7 @@ impl Firmware {
     fn say_objects(&mut self, board: &mut Board<'_>, shown: impl Iterator<Item = &'static Object>) {
         let mut text = String::from("\r\n");
         for object in shown {
-            text.push_str(&self.dialect.view_object(object, view::entries(object, &self.objects)));
+            text.push_str(&self.dialect.view_object(board.product, object, view::entries(object, &self.objects)));
         }
         self.say(board, &text);
     }
@@ -513,39 +289,5 @@ impl Firmware {
 
     fn with_line_ends(&self, text: String) -> String {
         if self.dialect.line_end() == "\r\n" { text } else { text.replace("\r\n", self.dialect.line_end()) }
-    }
-}
-
-/// A row of one field.
-fn one(reading: Reading) -> Row {
-    Row { source: Source::FieldValue, readings: vec![reading] }
-}
-
-fn period(stream: StreamSetting) -> Duration {
-    Duration::from_millis(u64::from(stream.period_ms))
-}
-
-/// The repetition rate an answer means: nothing typed means the default.
-fn parse_period(answer: &str, (shortest, longest): (u16, u16)) -> Option<u16> {
-    let answer = answer.trim();
-    if answer.is_empty() {
-        return Some(DEFAULT_PERIOD_MS);
-    }
-    let plain = answer.bytes().all(|byte| byte.is_ascii_digit());
-    plain.then(|| answer.parse().ok()).flatten().filter(|period_ms| (shortest..=longest).contains(period_ms))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_repetition_rate_is_a_whole_number_within_its_limits() {
-        for (answer, period_ms) in [("", Some(1_000)), ("1", Some(1)), ("60000", Some(60_000)), (" 250 ", Some(250))] {
-            assert_eq!(parse_period(answer, (1, 60_000)), period_ms, "{answer:?}");
-        }
-        for answer in ["0", "60001", "-5", "1.5", "x", "99999999999", "1 0"] {
-            assert_eq!(parse_period(answer, (1, 60_000)), None, "{answer:?}");
-        }
     }
 }

@@ -40,8 +40,10 @@ pub enum Reading {
 #[derive(Clone, Debug)]
 pub struct Measurement {
     scan: Scan,
+    /// When the converter's next reading is due.
+    reading_at: Instant,
     channels: Vec<Channel>,
-    /// Nothing is published before.
+    /// No temperature is published before: the converters have to settle.
     first_data_at: Instant,
     published: bool,
 }
@@ -121,8 +123,8 @@ const PV_SHORT: i16 = -448;
 const PV_FROZEN: i16 = -384;
 
 impl Measurement {
-    /// Begins at the unit's start.
-    pub fn start(now: Instant, product: &Product, objects: &mut Objects) -> Self {
+    /// Begins at the unit's start. The supply is known at once, everything else has no value yet.
+    pub fn start(now: Instant, product: &Product, sensors: &Sensors, objects: &mut Objects) -> Self {
         let channel = Channel {
             reading: Reading::Off,
             thresholds: [Threshold::Kept; 3],
@@ -134,11 +136,14 @@ impl Measurement {
             objects.set(0x6100, channel, Value::NOT_A_NUMBER);
             objects.set(0x7130, channel, Value::Integer16(PV_OFF));
         }
+        objects.set(0x5000, 0, Value::Real32(sensors.supply(now) as f32));
+        let scan = match product.measurement.sensors {
+            SensorKind::Thermocouple => Scan::Thermocouples(Thermocouples::start(channels, objects)),
+            SensorKind::Rtd => Scan::Rtds(Rtds::start(channels, objects)),
+        };
         let measurement = Measurement {
-            scan: match product.measurement.sensors {
-                SensorKind::Thermocouple => Scan::Thermocouples(Thermocouples::start(now, channels)),
-                SensorKind::Rtd => Scan::Rtds(Rtds::start(now, channels)),
-            },
+            reading_at: now + scan.reading_time(),
+            scan,
             channels: vec![channel; usize::from(channels)],
             first_data_at: now + Duration::from_millis(u64::from(product.measurement.first_data_ms)),
             published: false,
@@ -149,31 +154,42 @@ impl Measurement {
 
     /// When the next reading is due.
     pub fn deadline(&self) -> Instant {
-        match &self.scan {
-            Scan::Thermocouples(scan) => scan.deadline(),
-            Scan::Rtds(scan) => scan.deadline(),
-        }
+        self.reading_at
     }
 
-    /// Goes on after it was halted: the next reading is a reading's time away.
-    pub fn resume(&mut self, now: Instant) {
-        match &mut self.scan {
-            Scan::Thermocouples(scan) => scan.resume(now),
-            Scan::Rtds(scan) => scan.resume(now),
+    /// When the first temperatures are published, or were.
+    pub fn first_data_at(&self) -> Instant {
+        self.first_data_at
+    }
+
+    /// Goes on after it was halted since a moment: the next reading is a reading's time away, and converters that had
+    /// not settled by then still need the rest of their time, up to a reading.
+    pub fn resume(&mut self, halted_at: Instant, now: Instant) {
+        let reading_time = self.scan.reading_time();
+        self.reading_at = now + reading_time;
+        if self.first_data_at > halted_at {
+            let left = self.first_data_at.since(halted_at);
+            self.first_data_at = now;
+            while self.first_data_at < now + left {
+                self.first_data_at += reading_time;
+            }
         }
     }
 
     /// Takes the reading that is due. Says whether anything new has been published.
     pub fn step(&mut self, now: Instant, sensors: &Sensors, objects: &mut Objects, errors: &mut ActiveErrors) -> bool {
-        if self.deadline() > now {
+        if self.reading_at > now {
             return false;
         }
+        let reading_at = self.reading_at;
+        self.reading_at += self.scan.reading_time();
         let channels = &mut self.channels;
         let mut read = |channel: u8, reading| channels[usize::from(channel) - 1].reading = reading;
         let updated = match &mut self.scan {
-            Scan::Thermocouples(scan) => scan.step(sensors, objects, &mut read),
-            Scan::Rtds(scan) => scan.step(sensors, objects, &mut read),
+            Scan::Thermocouples(scan) => scan.step(reading_at, sensors, objects, &mut read),
+            Scan::Rtds(scan) => scan.step(reading_at, sensors, objects, &mut read),
         };
+        objects.set(0x5000, 0, Value::Real32(sensors.supply(now) as f32));
         if now < self.first_data_at {
             return false;
         }
@@ -188,7 +204,6 @@ impl Measurement {
                 channel.evaluate(now, number, objects, errors);
             }
         }
-        objects.set(0x5000, 0, Value::Real32(sensors.supply(now) as f32));
         self.average(objects);
         true
     }
@@ -208,6 +223,16 @@ impl Measurement {
             objects.set(0x2100, sub, average.map_or(Value::NOT_A_NUMBER, |celsius| Value::Real32(celsius as f32)));
             let counts = average.map_or(PV_OFF, |celsius| scaled(celsius, factor, offset));
             objects.set(0x2130, sub, Value::Integer16(counts));
+        }
+    }
+}
+
+impl Scan {
+    /// Time from one reading of the converter to the next.
+    fn reading_time(&self) -> Duration {
+        match self {
+            Scan::Thermocouples(_) => thermocouples::SCAN_TIME,
+            Scan::Rtds(_) => rtds::READING_TIME,
         }
     }
 }
@@ -338,7 +363,9 @@ pub fn row(objects: &Objects, source: Source) -> Row {
             Source::FieldValue => 0x3100,
             Source::ProcessValue => 0x3130,
         };
-        readings.push(Field::Value(objects.number(index, 0)));
+        // A converter that has been frozen since the start has never read it.
+        let unread = objects.number(0x3100, 0).is_nan();
+        readings.push(if unread { Field::Disabled } else { Field::Value(objects.number(index, 0)) });
     }
     readings.extend((1..=product.measurement.channels).map(|channel| {
         let status = objects.integer(0x6150, channel);

@@ -13,7 +13,7 @@ use crate::canopen::Value;
 use crate::time::{Duration, Instant};
 
 /// One reading of the converter.
-const READING_TIME: Duration = Duration::from_millis(100);
+pub(super) const READING_TIME: Duration = Duration::from_millis(100);
 /// Readings between two of the same wires.
 const READINGS_BETWEEN_WIRES: u64 = 600;
 /// Below this the sensor is shorted, above that the circuit is open (appendix A, errata E-C11).
@@ -29,7 +29,6 @@ const FROZEN_SWEEPS: u32 = 2;
 /// The converter's state.
 #[derive(Clone, Debug)]
 pub(super) struct Rtds {
-    reading_at: Instant,
     next: Slot,
     /// Readings made so far.
     readings: u64,
@@ -73,9 +72,12 @@ struct Input {
 }
 
 impl Rtds {
-    pub(super) fn start(now: Instant, channels: u8) -> Self {
+    pub(super) fn start(channels: u8, objects: &mut Objects) -> Self {
+        objects.set(0x5001, 0, Value::NOT_A_NUMBER);
+        for channel in 1..=channels {
+            objects.set(0x2000, channel, Value::NOT_A_NUMBER);
+        }
         Rtds {
-            reading_at: now + READING_TIME,
             next: Slot::Current,
             readings: 0,
             ampere: NOMINAL_AMPERE,
@@ -85,23 +87,14 @@ impl Rtds {
         }
     }
 
-    pub(super) fn deadline(&self) -> Instant {
-        self.reading_at
-    }
-
-    pub(super) fn resume(&mut self, now: Instant) {
-        self.reading_at = now + READING_TIME;
-    }
-
     /// Makes one reading.
     pub(super) fn step(
         &mut self,
+        now: Instant,
         sensors: &Sensors,
         objects: &mut Objects,
         read: &mut impl FnMut(u8, Reading),
     ) -> Updated {
-        let now = self.reading_at;
-        self.reading_at += READING_TIME;
         self.readings += 1;
         let slot = self.next;
         if !sensors.is_frozen() {
@@ -182,7 +175,7 @@ impl Rtds {
         }
     }
 
-    /// Whether the wires of a channel are due.
+    /// Whether the wires of a channel are due. What is known of them is forgotten when the type of the sensor has changed.
     fn wants_wire(&mut self, objects: &Objects, number: u8) -> bool {
         let (readings, wire_read) = (self.readings, self.wire_read);
         let input = self.input(number);

@@ -20,8 +20,8 @@ impl Bench {
     fn new(name: &str) -> Self {
         let product = Product::named(name).expect("built in");
         let mut objects = Objects::factory(product, 127);
-        let measurement = Measurement::start(Instant::ZERO, product, &mut objects);
         let sensors = Sensors::new(product, 1);
+        let measurement = Measurement::start(Instant::ZERO, product, &sensors, &mut objects);
         let active = ActiveErrors::default();
         let mut bench = Bench { now: Instant::ZERO, sensors, objects, active, measurement };
         for channel in 1..=product.measurement.channels {
@@ -138,8 +138,8 @@ fn a_thermocouple_is_read_right_over_its_whole_range() {
 fn all_thermocouples_are_read_together_and_nothing_is_said_before_its_time() {
     let product = Product::named("AXTC4CO").expect("built in");
     let mut objects = Objects::factory(product, 127);
-    let mut measurement = Measurement::start(Instant::ZERO, product, &mut objects);
     let mut sensors = Sensors::new(product, 1);
+    let mut measurement = Measurement::start(Instant::ZERO, product, &sensors, &mut objects);
     sensors.turn(Knob::Open(3, None)).expect("an input");
     let mut errors = ActiveErrors::default();
     while measurement.deadline() < Instant::from_millis(3_000) {
@@ -558,8 +558,8 @@ fn a_converter_that_wakes_up_in_the_middle_of_its_first_sweep_reads_no_nonsense(
     let product = Product::named("AXRTD8CO").expect("built in");
     for thaw_ms in (5_050..7_000).step_by(100) {
         let mut objects = Objects::factory(product, 127);
-        let measurement = Measurement::start(Instant::ZERO, product, &mut objects);
         let sensors = Sensors::new(product, 1);
+        let measurement = Measurement::start(Instant::ZERO, product, &sensors, &mut objects);
         let mut bench = Bench { now: Instant::ZERO, sensors, objects, active: ActiveErrors::default(), measurement };
         bench.turn(Knob::Freeze(true));
         bench.run_ms(thaw_ms);

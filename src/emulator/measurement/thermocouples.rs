@@ -3,12 +3,12 @@
 use super::super::its90::Thermocouple;
 use super::super::objects::Objects;
 use super::super::sensors::Sensors;
-use super::{Reading, Updated, scaled};
+use super::{PV_OFF, Reading, Updated, scaled};
 use crate::canopen::Value;
 use crate::time::{Duration, Instant};
 
 /// All channels are read together at this interval.
-const SCAN_TIME: Duration = Duration::from_millis(200);
+pub(super) const SCAN_TIME: Duration = Duration::from_millis(200);
 /// An open circuit is found in the lowest of eight gains, one scan each (errata E-51: at most 1.6 s).
 const SCANS_TO_FIND_OPEN: u8 = 8;
 /// One step of the converter in µV: 24 bits over 2.5 V behind a gain of 32 (a guess that leaves every type its 0.001 °C
@@ -20,35 +20,27 @@ const LARGEST_UV: f64 = 2.5e6 / 32.0;
 /// The converter's state.
 #[derive(Clone, Debug)]
 pub(super) struct Thermocouples {
-    scan_at: Instant,
     /// Scans since a channel's voltage was last within range.
     open_scans: Vec<u8>,
     last: Vec<Reading>,
 }
 
 impl Thermocouples {
-    pub(super) fn start(now: Instant, channels: u8) -> Self {
+    pub(super) fn start(channels: u8, objects: &mut Objects) -> Self {
+        objects.set(0x3100, 0, Value::NOT_A_NUMBER);
+        objects.set(0x3130, 0, Value::Integer16(PV_OFF));
         let channels = usize::from(channels);
-        Thermocouples { scan_at: now + SCAN_TIME, open_scans: vec![0; channels], last: vec![Reading::Off; channels] }
-    }
-
-    pub(super) fn deadline(&self) -> Instant {
-        self.scan_at
-    }
-
-    pub(super) fn resume(&mut self, now: Instant) {
-        self.scan_at = now + SCAN_TIME;
+        Thermocouples { open_scans: vec![0; channels], last: vec![Reading::Off; channels] }
     }
 
     /// Reads all channels.
     pub(super) fn step(
         &mut self,
+        now: Instant,
         sensors: &Sensors,
         objects: &mut Objects,
         read: &mut impl FnMut(u8, Reading),
     ) -> Updated {
-        let now = self.scan_at;
-        self.scan_at += SCAN_TIME;
         // A converter that delivers nothing new leaves the old values: this unit has no status for it.
         if sensors.is_frozen() {
             return Updated::All;

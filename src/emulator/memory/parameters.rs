@@ -7,19 +7,20 @@
 //! | offset | bytes | |
 //! |---|---|---|
 //! | 0 | 4 | `AXNV` |
-//! | 4 | 2 | format, 2 |
+//! | 4 | 2 | format, 3; 2 is read as well, it has no serial number |
 //! | 6 | 2 | bytes of the values |
 //! | 8 | 4 | sequence number; the higher of two good slots is the current one |
 //! | 12 | 4 | product code, object 1018h sub-index 2 |
 //! | 16 | 10 | stream on, stream source (0 FV, 1 PV), period in ms (2), node-ID, 0, bit rate in kbit/s (2), start delay (0 at once, FFh waits for ever), first start pending |
-//! | 26 | 2 | number of kept parameters |
-//! | 28 | 4 + n each | index (2), sub-index, bytes n of the value, the value |
+//! | 26 | 4 | serial number, object 1018h sub-index 4; FFFFFFFFh if none has been given yet |
+//! | 30 | 2 | number of kept parameters |
+//! | 32 | 4 + n each | index (2), sub-index, bytes n of the value, the value |
 //! | then | 4 | CRC-32 (IEEE 802.3) of all before |
 //! | then | | not looked at, to the end of the slot |
 //!
 //! Kept parameters are those of the object dictionary that have been saved by 1010h and differ from the factory's
-//! (AXTC4CO manual, sections 3.2.7 and 3.2.8). Stream settings, node-ID and bit rate are kept on their own and no
-//! restoring touches them (sections 4.1.2 and 4.1.3, errata E-106).
+//! (AXTC4CO manual, sections 3.2.7 and 3.2.8). Stream settings, node-ID, bit rate and serial number are kept on their
+//! own and no restoring touches them (sections 4.1.2 and 4.1.3, errata E-106).
 
 use std::collections::VecDeque;
 
@@ -27,7 +28,8 @@ use super::super::objects::{Objects, Saved, is_parameter};
 use super::super::{Area, Store};
 use crate::canopen::ObjectAddress;
 use crate::device::dictionary::Group;
-use crate::device::{BIT_RATES_KBPS, Product};
+use crate::device::{BIT_RATES_KBPS, HIGHEST_NODE_ID, Product};
+use crate::time::Duration;
 use crate::wire::stream::Source;
 
 /// Bytes of the whole image: two slots.
@@ -35,7 +37,11 @@ pub const IMAGE_BYTES: usize = 2 * SLOT_BYTES;
 
 const SLOT_BYTES: usize = 2048;
 const MAGIC: &[u8; 4] = b"AXNV";
-const FORMAT: u16 = 2;
+const FORMAT: u16 = 3;
+/// The format before: without the serial number.
+const FORMAT_2: u16 = 2;
+/// Stands for a serial number that has not been given yet, as erased memory reads.
+const NO_SERIAL_NUMBER: u32 = u32::MAX;
 const HEADER_BYTES: usize = 16;
 const SCALAR_BYTES: usize = 10;
 const CRC_BYTES: usize = 4;
@@ -56,6 +62,9 @@ pub struct Parameters {
     pub start_delay: StartDelay,
     /// New software has been loaded and has not run yet.
     pub first_start: bool,
+    /// Serial number, given once and kept for ever (section 3.2.11). `None` in a memory that is blank, or that an older
+    /// version of this program has written.
+    pub serial_number: Option<u32>,
     /// Saved parameters of the object dictionary that differ from the factory's.
     pub saved: Saved,
 }
@@ -69,6 +78,13 @@ pub struct StreamSetting {
     pub source: Source,
     /// Repetition time in ms, within what the product takes.
     pub period_ms: u16,
+}
+
+impl StreamSetting {
+    /// Time from one row to the next.
+    pub fn period(self) -> Duration {
+        Duration::from_millis(u64::from(self.period_ms))
+    }
 }
 
 /// What the loader does when power comes.
@@ -114,6 +130,7 @@ impl Parameters {
             kbps: product.can.kbps,
             start_delay: StartDelay::AtOnce,
             first_start: false,
+            serial_number: None,
             saved: Saved::new(),
         }
     }
@@ -134,7 +151,7 @@ impl Parameters {
     /// Reads an intact slot.
     fn from_slot(product: &Product, slot: &[u8]) -> Result<Self, ParametersError> {
         let format = u16_at(slot, 4);
-        if format != FORMAT {
+        if ![FORMAT, FORMAT_2].contains(&format) {
             return Err(ParametersError::Format(format));
         }
         let code = u32_at(slot, 12);
@@ -148,6 +165,13 @@ impl Parameters {
         let (values, kept) = slot[HEADER_BYTES..HEADER_BYTES + payload_length(slot)]
             .split_first_chunk::<SCALAR_BYTES>()
             .ok_or(ParametersError::Value("length"))?;
+        let (serial_number, kept) = match format {
+            FORMAT_2 => (None, kept),
+            _ => {
+                let (number, kept) = kept.split_first_chunk().ok_or(ParametersError::Value("length"))?;
+                (Some(u32::from_le_bytes(*number)).filter(|&number| number != NO_SERIAL_NUMBER), kept)
+            }
+        };
         let flag = |value: u8, name| match value {
             0 => Ok(false),
             1 => Ok(true),
@@ -159,7 +183,7 @@ impl Parameters {
         if !(shortest..=longest).contains(&period_ms) {
             return Err(ParametersError::Value("stream period"));
         }
-        if !(1..=127).contains(&values[4]) {
+        if !(1..=HIGHEST_NODE_ID).contains(&values[4]) {
             return Err(ParametersError::Value("node-ID"));
         }
         let kbps = u16_at(values, 6);
@@ -177,6 +201,7 @@ impl Parameters {
             kbps,
             start_delay,
             first_start: flag(values[9], "first-start flag")?,
+            serial_number,
             saved: read_saved(product, kept).ok_or(ParametersError::Value("list of saved parameters"))?,
         })
     }
@@ -197,6 +222,7 @@ impl Parameters {
             StartDelay::WaitsForEver => 0xFF,
         });
         values.push(u8::from(self.first_start));
+        values.extend(self.serial_number.unwrap_or(NO_SERIAL_NUMBER).to_le_bytes());
         values.extend((self.saved.len() as u16).to_le_bytes());
         for (at, value) in &self.saved {
             let bytes = value.encode();
@@ -248,14 +274,16 @@ pub struct ParameterStore {
 
 impl ParameterStore {
     /// Takes over an image. One that is empty or cannot be used is replaced by factory settings, which are reported
-    /// as a write like any other.
-    pub fn new(product: &'static Product, image: Vec<u8>, stores: &mut VecDeque<Store>) -> Self {
+    /// as a write like any other. A memory that has no serial number gets this one.
+    pub fn new(product: &'static Product, serial_number: u32, image: Vec<u8>, stores: &mut VecDeque<Store>) -> Self {
         if let Ok(values) = Parameters::read(product, &image)
             && newest(&image).is_ok()
         {
-            return ParameterStore { product, image, values };
+            let mut store = ParameterStore { product, image, values };
+            store.change(stores, |values| values.serial_number = values.serial_number.or(Some(serial_number)));
+            return store;
         }
-        let values = Parameters::factory(product);
+        let values = Parameters { serial_number: Some(serial_number), ..Parameters::factory(product) };
         let mut image = values.to_slot(product, 1);
         image.resize(IMAGE_BYTES, BLANK);
         stores.push_back(Store { area: Area::Parameters, offset: 0, bytes: image.clone() });
@@ -352,13 +380,15 @@ mod tests {
     use crate::canopen::Value;
     use crate::rng::Rng;
 
+    const SERIAL_NUMBER: u32 = 4711;
+
     fn product() -> &'static Product {
         Product::named("AXTC4CO").expect("built in")
     }
 
     fn fresh() -> (ParameterStore, VecDeque<Store>) {
         let mut stores = VecDeque::new();
-        let store = ParameterStore::new(product(), Vec::new(), &mut stores);
+        let store = ParameterStore::new(product(), SERIAL_NUMBER, Vec::new(), &mut stores);
         (store, stores)
     }
 
@@ -398,7 +428,7 @@ mod tests {
         for (seed, product) in (0..6).flat_map(|seed| [(seed, product()), (seed, rtd8())]) {
             let mut chance = Rng::new(seed);
             let mut stores = VecDeque::new();
-            let mut memory = ParameterStore::new(product, Vec::new(), &mut stores);
+            let mut memory = ParameterStore::new(product, SERIAL_NUMBER, Vec::new(), &mut stores);
             let mut objects = memory.objects();
             stores.clear();
             for round in 0..12 {
@@ -421,11 +451,11 @@ mod tests {
                     assert_eq!(read, if is_new { new.clone() } else { old.clone() }, "seed {seed}, {round}, {cut}");
                     // A unit that goes on from here can store again.
                     if cut % 16 == 0 {
-                        let mut again = ParameterStore::new(product, image, &mut stores);
+                        let mut again = ParameterStore::new(product, 8, image, &mut stores);
                         again.change(&mut stores, |values| values.kbps = 10);
                         stores.clear();
                         let read = Parameters::read(product, again.image()).expect("stored");
-                        assert_eq!(read.kbps, 10);
+                        assert_eq!((read.kbps, read.serial_number), (10, Some(SERIAL_NUMBER)));
                     }
                 }
             }
@@ -506,9 +536,34 @@ mod tests {
     }
 
     #[test]
+    fn a_serial_number_is_given_once_and_an_older_memory_gets_one() {
+        let (mut memory, mut stores) = fresh();
+        memory.change(&mut stores, |values| values.node_id = 5);
+        let image = memory.image().to_vec();
+        stores.clear();
+        let memory = ParameterStore::new(product(), 8, image.clone(), &mut stores);
+        assert_eq!((memory.values().serial_number, memory.image()), (Some(SERIAL_NUMBER), &image[..]));
+        assert_eq!(stores.len(), 0, "nothing to write");
+        // As format 2 has it: the same without the four bytes.
+        let values = Parameters { node_id: 9, ..Parameters::factory(product()) };
+        let mut older = values.to_slot(product(), 7);
+        older.drain(HEADER_BYTES + SCALAR_BYTES..HEADER_BYTES + SCALAR_BYTES + 4);
+        older[4] = 2;
+        older[6] -= 4;
+        let crc_at = older.len() - CRC_BYTES;
+        let crc = crc32fast::hash(&older[..crc_at]);
+        older[crc_at..].copy_from_slice(&crc.to_le_bytes());
+        older.resize(IMAGE_BYTES, BLANK);
+        assert_eq!(Parameters::read(product(), &older), Ok(values.clone()));
+        let memory = ParameterStore::new(product(), 8, older, &mut stores);
+        assert_eq!(*memory.values(), Parameters { serial_number: Some(8), ..values });
+        assert_eq!(stores.pop_front().map(|store| store.offset), Some(SLOT_BYTES), "beside the older one");
+    }
+
+    #[test]
     fn a_memory_of_another_product_is_not_taken() {
         let mut stores = VecDeque::new();
-        let memory = ParameterStore::new(rtd8(), Vec::new(), &mut stores);
+        let memory = ParameterStore::new(rtd8(), SERIAL_NUMBER, Vec::new(), &mut stores);
         let error = Parameters::read(product(), memory.image()).expect_err("another product");
         assert_eq!(error.to_string(), "the parameter memory is of AXRTD8CO, not of AXTC4CO");
     }
@@ -554,8 +609,8 @@ mod tests {
         for (image, error) in cases {
             assert_eq!(Parameters::read(product(), &image), Err(error));
             let mut stores = VecDeque::new();
-            let memory = ParameterStore::new(product(), image, &mut stores);
-            assert_eq!(*memory.values(), factory);
+            let memory = ParameterStore::new(product(), SERIAL_NUMBER, image, &mut stores);
+            assert_eq!(*memory.values(), Parameters { serial_number: Some(SERIAL_NUMBER), ..factory.clone() });
             assert_eq!(stores.pop_front().map(|store| store.bytes), Some(memory.image().to_vec()));
         }
         assert_eq!(Parameters::read(product(), &[]), Ok(factory.clone()));

@@ -14,6 +14,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::sensors::Sensors;
+use super::words::shown;
 use crate::device::{Complaint, Complaints, Product};
 use crate::time::Duration;
 
@@ -75,13 +76,13 @@ impl Scenario {
         let mut complaints = Complaints::about(file, text);
         let raw: RawScenario = match toml::from_str(text) {
             Ok(raw) => raw,
-            Err(error) => return Err(complaints.and_the_end(&error)),
+            Err(error) => return Err(complaints.ended_by(&error)),
         };
         if let Some(named) = &raw.product {
             match Product::named(named.get_ref()) {
                 None => {
                     let known: Vec<String> = Product::all().iter().map(|known| known.name.to_lowercase()).collect();
-                    let message = format!("'{}' is no product; there is {}", named.get_ref(), known.join(", "));
+                    let message = format!("'{}' is no product; there is {}", shown(named.get_ref()), known.join(", "));
                     complaints.add(named.span().start, "product", message);
                     return complaints.or(None);
                 }
@@ -89,57 +90,109 @@ impl Scenario {
                 Some(_) => {}
             }
         }
-        // A file for units of several products may turn what some of them have not.
-        let mut terminals = raw.product.as_ref().map(|_| Sensors::new(product, 0));
-        let mut deeds = Vec::new();
+        let mut reading = Reading {
+            text,
+            product,
+            // A file for units of several products may turn what some of them have not.
+            terminals: raw.product.as_ref().map(|_| Sensors::new(product, 0)),
+            complaints,
+            deeds: Vec::new(),
+        };
         for moment in &raw.at {
-            let at = seconds(&moment.seconds, "at.seconds", &mut complaints).unwrap_or_default();
-            for deed in &moment.deeds {
-                match act(deed.get_ref(), product, terminals.as_mut()) {
-                    Ok(verb) => deeds.push((at, verb)),
-                    Err(error) => complaints.add(place_of(text, deed, error.column), "at.do", error.message),
-                }
-            }
+            reading.moment(moment);
         }
         for ramp in &raw.ramp {
-            let from = seconds(&ramp.from, "ramp.from", &mut complaints);
-            let to = seconds(&ramp.to, "ramp.to", &mut complaints);
-            let (Some(from), Some(to)) = (from, to) else { continue };
-            if to <= from {
-                complaints.add(ramp.to.span().start, "ramp.to", "a ramp ends later than it begins");
-                continue;
+            reading.ramp(ramp);
+        }
+        reading.deeds.sort_by_key(|(at, _)| *at);
+        let repeat = raw.repeat.as_ref().and_then(|repeat| reading.round(repeat));
+        reading.complaints.or(Some(Scenario { deeds: reading.deeds, repeat }))
+    }
+}
+
+/// A file while it is read.
+struct Reading<'a> {
+    text: &'a str,
+    product: &'a Product,
+    /// Where the file is for this product alone: its terminals, which have to have what is turned.
+    terminals: Option<Sensors>,
+    complaints: Complaints<'a>,
+    deeds: Vec<(Duration, Verb)>,
+}
+
+impl Reading<'_> {
+    fn moment(&mut self, moment: &RawMoment) {
+        let at = self.seconds(&moment.seconds, "at.seconds").unwrap_or_default();
+        for deed in &moment.deeds {
+            match self.act(deed.get_ref()) {
+                Ok(verb) => self.deeds.push((at, verb)),
+                Err(error) => self.complaints.add(place_of(self.text, deed, error.column), "at.do", error.message),
             }
-            let steps = ramp_steps(to - from);
-            for step in 0..=steps {
-                let part = f64::from(step) / f64::from(steps);
-                let value = ramp.start + (ramp.end - ramp.start) * part;
-                match act(&format!("set {} {value}", ramp.what.get_ref()), product, terminals.as_mut()) {
-                    Ok(verb) => deeds.push((from + (to - from).mul_f64(part), verb)),
-                    Err(error) => {
-                        complaints.add(ramp.what.span().start, "ramp.what", error.message);
-                        break;
-                    }
-                }
-                if deeds.len() > MOST_DEEDS {
-                    complaints.add(ramp.from.span().start, "ramp", format!("more than {MOST_DEEDS} steps in all"));
-                    return complaints.or(None);
+        }
+    }
+
+    fn ramp(&mut self, ramp: &RawRamp) {
+        let from = self.seconds(&ramp.from, "ramp.from");
+        let to = self.seconds(&ramp.to, "ramp.to");
+        let (Some(from), Some(to)) = (from, to) else { return };
+        if to <= from {
+            self.complaints.add(ramp.to.span().start, "ramp.to", "a ramp ends later than it begins");
+            return;
+        }
+        let steps = ramp_steps(to - from);
+        if self.deeds.len() + steps as usize >= MOST_DEEDS {
+            self.complaints.add(ramp.from.span().start, "ramp", format!("more than {MOST_DEEDS} steps in all"));
+            return;
+        }
+        for step in 0..=steps {
+            let part = f64::from(step) / f64::from(steps);
+            let value = ramp.start + (ramp.end - ramp.start) * part;
+            match self.act(&format!("set {} {value}", ramp.what.get_ref())) {
+                Ok(verb) => self.deeds.push((from + (to - from).mul_f64(part), verb)),
+                Err(error) => {
+                    self.complaints.add(ramp.what.span().start, "ramp.what", error.message);
+                    return;
                 }
             }
         }
-        deeds.sort_by_key(|(at, _)| *at);
-        let last = deeds.last().map_or(Duration::ZERO, |(at, _)| *at);
-        let repeat = raw.repeat.as_ref().and_then(|repeat| {
-            let after = seconds(repeat, "repeat", &mut complaints)?;
-            if after < last {
-                let message = format!("{} s is before the last deed, at {} s", repeat.get_ref(), last.as_secs_f64());
-                complaints.add(repeat.span().start, "repeat", message);
-            } else if after < SHORTEST_ROUND {
-                let message = format!("{} s is less than {} s", repeat.get_ref(), SHORTEST_ROUND.as_secs_f64());
-                complaints.add(repeat.span().start, "repeat", message);
+    }
+
+    /// After which time the scenario begins anew.
+    fn round(&mut self, repeat: &Spanned<f64>) -> Option<Duration> {
+        let after = self.seconds(repeat, "repeat")?;
+        let last = self.deeds.last().map_or(Duration::ZERO, |(at, _)| *at);
+        if after < last {
+            let message = format!("{} s is before the last deed, at {} s", repeat.get_ref(), last.as_secs_f64());
+            self.complaints.add(repeat.span().start, "repeat", message);
+        } else if after < SHORTEST_ROUND {
+            let message = format!("{} s is less than {} s", repeat.get_ref(), SHORTEST_ROUND.as_secs_f64());
+            self.complaints.add(repeat.span().start, "repeat", message);
+        }
+        Some(after)
+    }
+
+    fn seconds(&mut self, raw: &Spanned<f64>, key: &str) -> Option<Duration> {
+        let value = *raw.get_ref();
+        if !(0.0..=LONGEST_S).contains(&value) {
+            self.complaints.add(raw.span().start, key, format!("{value} is not 0 to {LONGEST_S} seconds"));
+            return None;
+        }
+        Some(Duration::from_secs_f64(value))
+    }
+
+    /// A verb that does something, as a file has nobody to answer; at the terminals, where they are given, something that
+    /// can be done there.
+    fn act(&mut self, line: &str) -> Result<Verb, WordError> {
+        match Verb::read(line, self.product)? {
+            Verb::Read(_) | Verb::Status => {
+                Err(WordError { column: 1, message: "a scenario does things; nobody would hear the answer".into() })
             }
-            Some(after)
-        });
-        complaints.or(Some(Scenario { deeds, repeat }))
+            Verb::Turn(knob) => {
+                let turned = self.terminals.as_mut().map_or(Ok(()), |terminals| terminals.turn(knob));
+                turned.map(|()| Verb::Turn(knob)).map_err(|error| WordError { column: 1, message: error.to_string() })
+            }
+            verb => Ok(verb),
+        }
     }
 }
 
@@ -156,30 +209,6 @@ fn place_of(text: &str, deed: &Spanned<String>, column: usize) -> usize {
 /// Steps of a ramp of this length.
 fn ramp_steps(length: Duration) -> u32 {
     (length.as_nanos() / RAMP_STEP.as_nanos()).clamp(1, u128::from(u32::MAX)) as u32
-}
-
-fn seconds(raw: &Spanned<f64>, key: &str, complaints: &mut Complaints<'_>) -> Option<Duration> {
-    let value = *raw.get_ref();
-    if !(0.0..=LONGEST_S).contains(&value) {
-        complaints.add(raw.span().start, key, format!("{value} is not 0 to {LONGEST_S} seconds"));
-        return None;
-    }
-    Some(Duration::from_secs_f64(value))
-}
-
-/// A verb that does something, as a file has nobody to answer; at the terminals, where they are given, something that
-/// can be done there.
-fn act(line: &str, product: &Product, terminals: Option<&mut Sensors>) -> Result<Verb, WordError> {
-    match Verb::read(line, product)? {
-        Verb::Read(_) | Verb::Status => {
-            Err(WordError { column: 1, message: "a scenario does things; nobody would hear the answer".into() })
-        }
-        Verb::Turn(knob) => {
-            let turned = terminals.map_or(Ok(()), |terminals| terminals.turn(knob));
-            turned.map(|()| Verb::Turn(knob)).map_err(|error| WordError { column: 1, message: error.to_string() })
-        }
-        verb => Ok(verb),
-    }
 }
 
 #[cfg(test)]
@@ -234,12 +263,19 @@ mod tests {
                 "product = 'axtc4co'\n[[ramp]]\nfrom = 1\nto = 2\nwhat = '1 resistance'\nstart = 1\nend = 2",
                 "test.toml:5:8: ramp.what: a unit with thermocouples has no resistance",
             ),
+            (
+                "[[ramp]]\nfrom = 0\nto = 200_000\nwhat = 'supply'\nstart = 1\nend = 2",
+                "test.toml:2:8: ramp: more than 1000000 steps in all",
+            ),
             ("repeat = 0.000000001", "test.toml:1:10: repeat: 0.000000001 s is less than 0.1 s"),
             // Blanks of two bytes; one written as an escape; a deed on a line of its own.
             ("[[at]]\nseconds = 1\ndo = ['open\u{a0}\u{a0}3\u{a0}X']", "test.toml:3:16: at.do: 'X' is not known"),
             ("[[at]]\nseconds = 1\ndo = [\"open\\u00203 X\"]", "test.toml:3:7: at.do: 'X' is not known"),
             ("[[at]]\nseconds = 1\ndo = ['''\nopen 3 X''']", "test.toml:3:7: at.do: 'X' is not known"),
             ("[[at", "test.toml:1:5: "),
+            // Nothing of a file reaches the terminal as a control code.
+            ("product = \"\\u001b[2J\"", "test.toml:1:11: product: '^[[2J' is no product; there is axtc4co"),
+            ("\"\\u001b[2J\" = 1", "test.toml:1:1: unknown field `^[[2J`, expected one of `product`"),
         ];
         for (text, expected) in table {
             let complaints = Scenario::read("test.toml", text, product()).expect_err(text);
@@ -255,6 +291,8 @@ mod tests {
             let complaints = Scenario::read("test.toml", text, product()).expect_err(text);
             assert_eq!(complaints.len(), 1, "and none has a second that says something else: {complaints:?}");
         }
+        let long = Scenario::read("test.toml", &format!("{} = 1", "x".repeat(100_000)), product()).expect_err("no key");
+        assert!(long[0].to_string().len() < 500, "{}", long[0]);
         let many = format!("[[at]]\nseconds = 1\ndo = [{}]", "\n'x',".repeat(100_000));
         let complaints = Scenario::read("test.toml", &many, product()).expect_err("no verbs");
         assert_eq!(complaints.len(), 101);

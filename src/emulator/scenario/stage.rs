@@ -181,8 +181,8 @@ impl Stage {
     fn act(&mut self, now: Instant, verb: &Verb) -> Result<Option<String>, String> {
         match verb {
             Verb::Turn(knob) => self.unit.turn(now, *knob).map_err(|error| error.to_string())?,
-            Verb::Power(true) => self.power_on(now),
-            Verb::Power(false) => self.power_off(now),
+            Verb::PowerOn => self.power_on(now),
+            Verb::PowerOff => self.power_off(now),
             Verb::PowerCycle(off) => {
                 self.power_off(now);
                 self.power_at = Some(now + *off);
@@ -207,7 +207,8 @@ impl Stage {
                 self.middleman.heal();
                 self.unit.repair_flash();
             }
-            Verb::Plug(plugged) => self.middleman.plug(*plugged),
+            Verb::Plug => self.middleman.plug(true),
+            Verb::Unplug => self.middleman.plug(false),
             Verb::Status => return Ok(Some(self.status())),
         }
         Ok(None)

@@ -14,8 +14,10 @@ use crate::time::Duration;
 pub enum Verb {
     /// Turn a knob at the terminals.
     Turn(Knob),
-    /// Switch the supply on or off.
-    Power(bool),
+    /// Switch the supply on.
+    PowerOn,
+    /// Switch the supply off.
+    PowerOff,
     /// Switch the supply off and on again after this time.
     PowerCycle(Duration),
     /// Order something as the network's master.
@@ -28,8 +30,10 @@ pub enum Verb {
     Fault(Fault),
     /// End all faults, those of the flash too, and plug the cable in.
     Heal,
-    /// Plug the cable in, or out.
-    Plug(bool),
+    /// Plug the serial cable in.
+    Plug,
+    /// Pull the serial cable out.
+    Unplug,
     /// Say what the unit does.
     Status,
 }
@@ -55,6 +59,9 @@ heal                       end all faults
 unplug, plug               pull the serial cable, or plug it in again
 status                     what the unit does";
 
+/// What can be set and set free: an input by its number, or something there is one of.
+const TERMINALS: &str = "1, cold-junction, supply, current";
+
 /// How long the supply is off if nothing is said.
 const USUAL_CYCLE: Duration = Duration::from_secs(1);
 
@@ -72,10 +79,10 @@ impl Verb {
 
     fn parse(words: &mut Words<'_>, product: &Product) -> Result<Verb, WordError> {
         let verbs = "set, process, open, short, repair, freeze, thaw, power, nmt, write, read, fault, heal, unplug, plug, status";
-        let (column, word) = words.expect("a verb", verbs)?;
+        let (column, word) = words.require("a verb", verbs)?;
         match word.to_ascii_lowercase().as_str() {
             "set" => Verb::set(words),
-            "process" => match words.expect("an input or a quantity", "1, cold-junction, supply, current")? {
+            "process" => match words.require("an input or a quantity", TERMINALS)? {
                 (_, word) if word.eq_ignore_ascii_case("cold-junction") => Ok(Verb::Turn(Knob::ColdJunction(None))),
                 (_, word) if word.eq_ignore_ascii_case("supply") => Ok(Verb::Turn(Knob::Supply(None))),
                 (_, word) if word.eq_ignore_ascii_case("current") => Ok(Verb::Turn(Knob::SourceCurrent(None))),
@@ -91,17 +98,17 @@ impl Verb {
             "freeze" => Ok(Verb::Turn(Knob::Freeze(true))),
             "thaw" => Ok(Verb::Turn(Knob::Freeze(false))),
             "power" => {
-                let (column, word) = words.expect("what to do with the supply", "on, off, cycle")?;
+                let (column, word) = words.require("what to do with the supply", "on, off, cycle")?;
                 match word.to_ascii_lowercase().as_str() {
-                    "on" => Ok(Verb::Power(true)),
-                    "off" => Ok(Verb::Power(false)),
+                    "on" => Ok(Verb::PowerOn),
+                    "off" => Ok(Verb::PowerOff),
                     "cycle" => words.cycle().map(Verb::PowerCycle),
                     _ => Err(unknown(column, word, "on, off, cycle")),
                 }
             }
             "nmt" => {
                 let orders = "start, stop, pre-operational, reset, reset-communication";
-                let (column, word) = words.expect("an order", orders)?;
+                let (column, word) = words.require("an order", orders)?;
                 match word.to_ascii_lowercase().as_str() {
                     "start" => Ok(Verb::Nmt(NmtCommand::Start)),
                     "stop" => Ok(Verb::Nmt(NmtCommand::Stop)),
@@ -114,7 +121,7 @@ impl Verb {
             "write" => {
                 let at = words.entry(product)?;
                 let data_type = product.dictionary.entry(at).map(|entry| entry.data_type);
-                let (column, word) = words.expect("a value", "a number, true, false")?;
+                let (column, word) = words.require("a value", "a number, true, false")?;
                 let value = data_type
                     .and_then(|data_type| data_type.parse(word))
                     .ok_or_else(|| WordError { column, message: format!("'{}' is no value of {at}", shown(word)) })?;
@@ -123,16 +130,15 @@ impl Verb {
             "read" => words.entry(product).map(Verb::Read),
             "fault" => Fault::parse(words, product).map(Verb::Fault),
             "heal" => Ok(Verb::Heal),
-            "unplug" => Ok(Verb::Plug(false)),
-            "plug" => Ok(Verb::Plug(true)),
+            "unplug" => Ok(Verb::Unplug),
+            "plug" => Ok(Verb::Plug),
             "status" => Ok(Verb::Status),
             _ => Err(unknown(column, word, verbs)),
         }
     }
 
     fn set(words: &mut Words<'_>) -> Result<Verb, WordError> {
-        let what = "1, cold-junction, supply, current";
-        let (column, word) = words.expect("an input or a quantity", what)?;
+        let (column, word) = words.require("an input or a quantity", TERMINALS)?;
         let knob = match word.to_ascii_lowercase().as_str() {
             "cold-junction" => Knob::ColdJunction(Some(words.number("a temperature in °C")?)),
             "supply" => Knob::Supply(Some(words.number("a voltage in V")?)),
@@ -140,7 +146,7 @@ impl Verb {
             _ => {
                 let number = input(column, word)?;
                 let quantities = "temperature, resistance, microvolts, lead";
-                let (column, word) = words.expect("a quantity", quantities)?;
+                let (column, word) = words.require("a quantity", quantities)?;
                 match word.to_ascii_lowercase().as_str() {
                     "temperature" => Knob::Temperature(number, words.number("a temperature in °C")?),
                     "resistance" => Knob::Resistance(number, words.number("a resistance in ohm")?),
@@ -156,7 +162,7 @@ impl Verb {
 
 impl Words<'_> {
     fn input(&mut self) -> Result<u8, WordError> {
-        let (column, word) = self.expect("an input", "its number, from 1")?;
+        let (column, word) = self.require("an input", "its number, from 1")?;
         input(column, word)
     }
 
@@ -165,10 +171,11 @@ impl Words<'_> {
     }
 
     fn entry(&mut self, product: &Product) -> Result<ObjectAddress, WordError> {
-        let (column, word) = self.expect("an entry", "index and sub-index, e.g. 6112:1")?;
-        let at: ObjectAddress = word
-            .parse()
-            .map_err(|error| WordError { column, message: format!("{error}").replace(word, &shown(word)) })?;
+        let (column, word) = self.require("an entry", "index and sub-index, e.g. 6112:1")?;
+        let at: ObjectAddress = word.parse().map_err(|_| WordError {
+            column,
+            message: format!("'{}' is no entry: write index and sub-index, e.g. 6112:1", shown(word)),
+        })?;
         if product.dictionary.entry(at).is_none() {
             return Err(WordError { column, message: format!("an {} has no entry {at}", product.name) });
         }
@@ -222,7 +229,7 @@ mod tests {
             ("repair 1", Verb::Turn(Knob::Repair(1))),
             ("freeze", Verb::Turn(Knob::Freeze(true))),
             ("thaw", Verb::Turn(Knob::Freeze(false))),
-            ("power OFF", Verb::Power(false)),
+            ("power OFF", Verb::PowerOff),
             ("power cycle", Verb::PowerCycle(Duration::from_secs(1))),
             ("power cycle 0.5", Verb::PowerCycle(Duration::from_millis(500))),
             ("nmt start", Verb::Nmt(NmtCommand::Start)),
@@ -235,8 +242,8 @@ mod tests {
             ("read 6100:1", Verb::Read(at(0x6100, 1))),
             ("fault queue 64", Verb::Fault(Fault::Queue(64))),
             ("heal", Verb::Heal),
-            ("unplug", Verb::Plug(false)),
-            ("plug", Verb::Plug(true)),
+            ("unplug", Verb::Unplug),
+            ("plug", Verb::Plug),
             ("status", Verb::Status),
         ];
         for (line, verb) in table {
@@ -269,7 +276,9 @@ mod tests {
             ("fault", "column 6: a fault is missing: lost, doubled"),
             ("fault queue -1", "column 13: '-1' is not 0 to 4096"),
             ("heal all", "column 6: 'all' is too much"),
-            ("read zzz", "column 6: 'zzz' is no entry of an object dictionary"),
+            ("read zzz", "column 6: 'zzz' is no entry: write index and sub-index, e.g. 6112:1"),
+            ("read \x1b[2J", "column 6: '^[[2J' is no entry"),
+            ("write 6112:1 \u{9b}2J", "column 14: '‹9b›2J' is no value of 6112:01"),
         ];
         for (line, complaint) in table {
             let found = read(line).expect_err(line);

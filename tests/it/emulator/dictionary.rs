@@ -4,8 +4,9 @@ use axcon::canopen::Abort;
 use axcon::device::Product;
 use axcon::emulator::knob::Knob;
 use axcon::emulator::{NetworkState, NmtCommand, Refusal};
+use axcon::wire::stream::{Reading, Row};
 
-use super::Bench;
+use super::{Bench, Setup};
 
 const PRODUCTS: [&str; 2] = ["AXTC4CO", "AXRTD8CO"];
 
@@ -132,6 +133,31 @@ fn changes_act_at_once_and_stay_only_if_they_are_saved() {
     assert_eq!((rtd8.read("3000:2"), rtd8.read("3030:2")), (Ok(0.0), Ok(-4.0)), "the user's own constants");
 }
 
+#[test]
+fn a_unit_keeps_its_serial_number_with_its_memory_whatever_the_seed() {
+    for name in PRODUCTS {
+        let number = |bench: &mut Bench| bench.read("1018:4").expect("it runs");
+        let mut bench = Bench::of(name, 0);
+        let first = number(&mut bench);
+        let made_with = |seed, parameters| {
+            let product = Product::named(name).expect("built in");
+            let mut bench = Bench::of(name, 0);
+            let flash = bench.unit().flash().to_vec();
+            let loader = product.loader.kind;
+            let mut bench = Bench::new(Setup { product, loader, seed, dialect: 0, flash, parameters });
+            bench.run_ms(500);
+            bench
+        };
+        let parameters = bench.unit().parameters().to_vec();
+        assert_eq!(number(&mut made_with(2, parameters)), first, "{name}");
+        let mut other = made_with(2, Vec::new());
+        assert_ne!(number(&mut other), first, "{name}: another unit");
+        other.keys(b"dYes\r");
+        other.run_ms(1_000);
+        assert_eq!(number(&mut other), number(&mut made_with(2, Vec::new())), "{name}: no default touches it");
+    }
+}
+
 // Errata E-93, E-G4.
 #[test]
 fn a_reset_of_communication_brings_back_what_is_kept_of_it_and_nothing_else() {
@@ -184,6 +210,47 @@ fn a_start_that_is_due_while_the_view_is_open_comes_later() {
         assert_eq!(bench.unit().network_state(), Some(NetworkState::PreOperational), "{name}");
         bench.run_ms(500);
         assert_eq!(bench.unit().network_state(), Some(NetworkState::Operational), "{name}: 5 s without the view");
+    }
+}
+
+// B-008, B-17: the supply has nothing to do with the converters of the inputs, which have to settle.
+#[test]
+fn the_supply_is_known_from_the_start_and_nothing_else_is() {
+    for (name, unread) in [("AXTC4CO", ["6100:1", "3100"]), ("AXRTD8CO", ["2000:1", "5001"])] {
+        let mut bench = measuring(name);
+        bench.power_off();
+        bench.power_on();
+        bench.run_ms(60);
+        assert!(bench.read("5000").is_ok_and(|volts| (20.0..30.0).contains(&volts)), "{name}");
+        for entry in unread {
+            assert!(bench.read(entry).is_ok_and(f64::is_nan), "{name} {entry}");
+        }
+        bench.turn(Knob::Supply(Some(12.5)));
+        bench.run_ms(300);
+        assert_eq!(bench.read("5000"), Ok(12.5), "{name}: read with every scan");
+    }
+}
+
+// B-199, B-186: scanning is halted, so nothing becomes valid meanwhile.
+#[test]
+fn a_view_that_is_opened_before_the_first_data_puts_them_off() {
+    for (name, first_data_ms) in [("AXTC4CO", 3_000), ("AXRTD8CO", 5_000)] {
+        let layout = &Product::named(name).expect("built in").stream;
+        let rows = |text: &str| text.lines().filter_map(|line| layout.parse(line)).collect::<Vec<Row>>();
+        let mut bench = Bench::of(name, 0);
+        bench.keys(b"tf100\r");
+        bench.keys(b"v");
+        bench.run_ms(10_000);
+        bench.keys(b"x");
+        bench.nmt(NmtCommand::Start);
+        bench.run_ms(1_000);
+        assert_eq!(rows(&bench.take()), [], "{name}");
+        assert_eq!(bench.unit().network_state(), Some(NetworkState::PreOperational), "{name}");
+        bench.run_ms(first_data_ms);
+        let rows = rows(&bench.take());
+        assert!(rows.len() > 10, "{name}: {}", rows.len());
+        let is_number = |reading: &Reading| matches!(reading, Reading::Value(celsius) if *celsius > 20.0);
+        assert!(rows.iter().all(|row| row.readings.iter().all(is_number)), "{name}: {rows:?}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! The G3 loader: erases everything at S0, then writes each record as it comes, out of a ring nobody guards.
+//! The G3 loader: erases everything at S0, then writes each record as it comes, out of a ring without overrun check.
 //!
 //! A public fact about the circular-buffer loaders of 2005 and later for 16-bit 56F83xx parts, likely but not proven
 //! for these units. From the AXRTD8CO manual, section 4.1.5, are a header, a prompt for any key, the prompt for the file,
@@ -7,7 +7,7 @@
 //!
 //! Decisions where no fact was at hand, all guesses: the wording of header and key prompt; after an error the loader
 //! empties its ring, prompts again and wants S0; what comes while an error text leaves is lost; XOFF is sent once until
-//! XON follows. Only the status bits of [`Fault`] occur, one at a time.
+//! XON follows. Only the status bits of [`LoadError`] occur, one at a time.
 
 mod reader;
 mod ring;
@@ -15,10 +15,10 @@ mod ring;
 use super::super::memory::{Flash, StartDelay, Written};
 use super::super::{Board, Reset};
 use super::voice::Voice;
-pub use crate::device::SECTOR_WORDS;
+use crate::device::SECTOR_WORDS;
 use crate::time::{Duration, Instant};
 pub use reader::Version;
-use reader::{Fault, Kind, Read, Reader};
+use reader::{Kind, LoadError, Read, Reader};
 use ring::Ring;
 
 /// Without a key for this long the application starts, if there is one (errata E-I12).
@@ -36,7 +36,7 @@ pub struct Loader {
     ring: Ring,
     reader: Reader,
     activity: Activity,
-    /// An S0 has come, its S7 not yet.
+    /// An S0 has come, and its S7 has not.
     loading: bool,
     /// The receiver could not read a character; the reader has not seen it yet.
     unreadable: bool,
@@ -138,19 +138,19 @@ impl Loader {
             }
             Activity::Erasing { first_word } => {
                 if let Some(written) = board.flash.step(board.now, board.stores) {
-                    match fault(written) {
+                    match error(written) {
                         None => self.erase(board, first_word + SECTOR_WORDS),
-                        Some(fault) => self.fail(board, fault),
+                        Some(error) => self.fail(board, error),
                     }
                 }
             }
-            Activity::Programming => match board.flash.step(board.now, board.stores).map(fault) {
+            Activity::Programming => match board.flash.step(board.now, board.stores).map(error) {
                 None => {}
                 Some(None) => {
                     self.activity = Activity::Reading;
                     self.read(board);
                 }
-                Some(Some(fault)) => self.fail(board, fault),
+                Some(Some(error)) => self.fail(board, error),
             },
             Activity::Complaining { .. } => {
                 self.ring.clear();
@@ -171,7 +171,7 @@ impl Loader {
     fn read(&mut self, board: &mut Board<'_>) {
         while self.activity == Activity::Reading {
             if std::mem::take(&mut self.unreadable) {
-                self.fail(board, Fault::Receive);
+                self.fail(board, LoadError::Receive);
                 return;
             }
             let Some(character) = self.ring.pop() else {
@@ -181,12 +181,10 @@ impl Loader {
             match self.reader.take(character, self.loading) {
                 Ok(Read::Nothing) => {}
                 // As it comes: the loader does not look at what it echoes.
-                Ok(Read::Text(byte)) => {
-                    self.voice.echo(board, &[byte]);
-                }
+                Ok(Read::Text(byte)) => self.voice.echo(board, &[byte]),
                 Ok(Read::Words { address, words }) => self.program(board, address, words),
                 Ok(Read::End(kind)) => self.take(board, kind),
-                Err(fault) => self.fail(board, fault),
+                Err(error) => self.fail(board, error),
             }
         }
     }
@@ -200,11 +198,9 @@ impl Loader {
                 board.parameters.change(board.stores, |values| values.start_delay = StartDelay::WaitsForEver);
                 self.erase(board, 0);
             }
-            Kind::Data => {
-                self.voice.mark(board);
-            }
+            Kind::Data => self.voice.mark(board),
             Kind::Terminator(entry) if entry >= board.flash.map().program_words => {
-                self.fail(board, Fault::StartAddress);
+                self.fail(board, LoadError::StartAddress);
             }
             Kind::Terminator(_) => self.finish(board),
         }
@@ -225,7 +221,7 @@ impl Loader {
     fn program(&mut self, board: &mut Board<'_>, address: u32, words: Vec<u16>) {
         let end = u64::from(address) + words.len() as u64;
         if end > u64::from(board.flash.map().program_words) {
-            self.fail(board, Fault::AddressRange);
+            self.fail(board, LoadError::AddressRange);
         } else {
             board.flash.program_words(board.now, address, words);
             self.activity = Activity::Programming;
@@ -246,22 +242,22 @@ impl Loader {
     }
 
     /// Says what is wrong and starts over; what has been erased stays erased, what has been programmed stays.
-    fn fail(&mut self, board: &mut Board<'_>, fault: Fault) {
+    fn fail(&mut self, board: &mut Board<'_>, error: LoadError) {
         self.reader = Reader::new(self.version);
         self.loading = false;
         self.voice.end_line(board);
-        self.voice.say(board, &format!("Error: {:04X}\r\n", fault.bit()));
+        self.voice.say(board, &format!("Error: {:04X}\r\n", error.bit()));
         self.voice.prompt(board);
         self.activity = Activity::Complaining { until: board.uart.finished_at() };
     }
 }
 
 /// What an operation of the flash that ended like this is called.
-fn fault(written: Written) -> Option<Fault> {
+fn error(written: Written) -> Option<LoadError> {
     match written {
         Written::Good => None,
-        Written::Mismatch => Some(Fault::Program),
-        Written::Refused => Some(Fault::Protection),
-        Written::Stuck => Some(Fault::Access),
+        Written::Mismatch => Some(LoadError::Program),
+        Written::Refused => Some(LoadError::Protection),
+        Written::Stuck => Some(LoadError::Access),
     }
 }

@@ -12,8 +12,9 @@
 /// Which loader of the generation it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
-    /// The last one that stumbles over a record with an odd number of data bytes: it takes words, so the check sum is the
-    /// last one's high byte, and what it counts never comes to nought. That it eats whatever follows is a guess.
+    /// The last one that fails on a record with an odd number of data bytes: it reads whole words, takes the check sum for
+    /// the high byte of the last one, and waits for the end of the record for ever. That it swallows all that follows is a
+    /// guess.
     V1_3,
     /// Takes them all.
     V2_0,
@@ -31,7 +32,7 @@ impl Version {
 
 /// What is wrong with a file, by the bits of the loader's status word (public facts about the loader).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub enum LoadError {
     /// The sum is wrong.
     Checksum,
     /// No record, one of a type it does not take, or one out of order.
@@ -50,18 +51,18 @@ pub enum Fault {
     AddressRange,
 }
 
-impl Fault {
+impl LoadError {
     /// Its bit.
     pub fn bit(self) -> u16 {
         match self {
-            Fault::Checksum => 0x0001,
-            Fault::Type => 0x0002,
-            Fault::Access => 0x0004,
-            Fault::Protection => 0x0008,
-            Fault::Program => 0x0010,
-            Fault::StartAddress => 0x0020,
-            Fault::Receive => 0x0040,
-            Fault::AddressRange => 0x0080,
+            LoadError::Checksum => 0x0001,
+            LoadError::Type => 0x0002,
+            LoadError::Access => 0x0004,
+            LoadError::Protection => 0x0008,
+            LoadError::Program => 0x0010,
+            LoadError::StartAddress => 0x0020,
+            LoadError::Receive => 0x0040,
+            LoadError::AddressRange => 0x0080,
         }
     }
 }
@@ -154,10 +155,10 @@ impl Reader {
     ///
     /// # Errors
     /// What the loader has against it. The caller starts over with a new reader.
-    pub fn take(&mut self, character: u8, header_seen: bool) -> Result<Read, Fault> {
+    pub fn take(&mut self, character: u8, header_seen: bool) -> Result<Read, LoadError> {
         match &mut self.place {
             Place::Start if character == b'S' => self.place = Place::Type,
-            Place::Start => return Err(Fault::Type),
+            Place::Start => return Err(LoadError::Type),
             Place::Type => {
                 let (shape, address_bytes) = match character {
                     b'0' => (Shape::Header, 4),
@@ -167,7 +168,7 @@ impl Reader {
                     b'7' if header_seen => (Shape::Terminator, 4),
                     b'8' if header_seen => (Shape::Terminator, 3),
                     b'9' if header_seen => (Shape::Terminator, 2),
-                    _ => return Err(Fault::Type),
+                    _ => return Err(LoadError::Type),
                 };
                 self.place = Place::Body(Body {
                     version: self.version,
@@ -207,7 +208,7 @@ impl Reader {
 
 impl Body {
     /// Takes a byte. Gives what follows, and the record's kind behind its check sum.
-    fn take(&mut self, byte: u8) -> Result<(Read, Option<Kind>), Fault> {
+    fn take(&mut self, byte: u8) -> Result<(Read, Option<Kind>), LoadError> {
         self.sum = self.sum.wrapping_add(byte);
         match self.part {
             Part::Length => {
@@ -244,7 +245,7 @@ impl Body {
                 return Ok((Read::Words { address: self.address, words: words(&self.data) }, None));
             }
             Part::Lost => {}
-            Part::Checksum if self.sum != 0xFF => return Err(Fault::Checksum),
+            Part::Checksum if self.sum != 0xFF => return Err(LoadError::Checksum),
             Part::Checksum => {
                 let kind = match self.shape {
                     Shape::Header => Kind::Header,
@@ -283,8 +284,8 @@ mod tests {
 
     const HEADER: &str = "S00700000000414275\r";
 
-    /// What comes of a text, up to the first fault.
-    fn read(text: &str) -> (Vec<Read>, Option<Fault>) {
+    /// What comes of a text, up to the first error.
+    fn read(text: &str) -> (Vec<Read>, Option<LoadError>) {
         let mut reader = Reader::new(Version::V2_0);
         let (mut reads, mut header_seen) = (Vec::new(), false);
         for character in text.bytes() {
@@ -294,13 +295,13 @@ mod tests {
                     header_seen |= read == Read::End(Kind::Header);
                     reads.push(read);
                 }
-                Err(fault) => return (reads, Some(fault)),
+                Err(error) => return (reads, Some(error)),
             }
         }
         (reads, None)
     }
 
-    fn fault(text: &str) -> Option<Fault> {
+    fn error(text: &str) -> Option<LoadError> {
         read(&(HEADER.to_owned() + text)).1
     }
 
@@ -319,8 +320,8 @@ mod tests {
     #[test]
     fn short_addresses_are_taken_as_well() {
         for (text, address) in [("S1050102AABB92", 0x102), ("S206010203AABB8E", 0x1_0203)] {
-            let (reads, fault) = read(&(HEADER.to_owned() + text + "\r"));
-            assert_eq!(fault, None, "{text}");
+            let (reads, error) = read(&(HEADER.to_owned() + text + "\r"));
+            assert_eq!(error, None, "{text}");
             assert_eq!(reads[3], Read::Words { address, words: vec![0xBBAA] }, "{text}");
         }
         let (reads, _) = read(&(HEADER.to_owned() + "S804010203F5\rS9030102F9\r"));
@@ -329,27 +330,27 @@ mod tests {
 
     #[test]
     fn lower_case_digits_are_zeros_and_so_the_sum_is_wrong() {
-        let (reads, fault) = read(&(HEADER.to_owned() + "S309000000803412cdabb8\r"));
+        let (reads, error) = read(&(HEADER.to_owned() + "S309000000803412cdabb8\r"));
         assert_eq!(reads[3], Read::Words { address: 0x80, words: vec![0x1234, 0x0000] });
-        assert_eq!(fault, Some(Fault::Checksum));
+        assert_eq!(error, Some(LoadError::Checksum));
     }
 
     #[test]
     fn a_header_with_a_two_byte_address_swallows_what_follows() {
         let text = "S0030000FC\r".to_owned() + &"S3090000008034120000B1\r".repeat(10);
-        let (reads, fault) = read(&text);
+        let (reads, error) = read(&text);
         assert!(reads.iter().all(|read| matches!(read, Read::Text(_))), "{reads:?}");
-        assert_eq!(fault, None, "it is still reading the text");
-        assert_eq!(read(&"S0030000FC\r".repeat(60)).1, Some(Fault::Checksum), "in the end the sum is wrong");
+        assert_eq!(error, None, "it is still reading the text");
+        assert_eq!(read(&"S0030000FC\r".repeat(60)).1, Some(LoadError::Checksum), "in the end the sum is wrong");
     }
 
     #[test]
-    fn what_is_no_record_is_a_fault_of_type() {
+    fn what_is_no_record_is_an_error_of_type() {
         for text in ["\n", "\r", "m", "s3", "S4", "S5", "S6", "SA"] {
-            assert_eq!(fault(text), Some(Fault::Type), "{text:?}");
+            assert_eq!(error(text), Some(LoadError::Type), "{text:?}");
         }
-        assert_eq!(read("S3").1, Some(Fault::Type), "data before the header");
-        assert_eq!(read("S7").1, Some(Fault::Type), "the end before the header");
+        assert_eq!(read("S3").1, Some(LoadError::Type), "data before the header");
+        assert_eq!(read("S7").1, Some(LoadError::Type), "the end before the header");
     }
 
     #[test]

@@ -1,9 +1,9 @@
-//! The receive ring: the interrupt puts characters in, the loader takes them out, and nobody looks whether it is full.
+//! The receive ring: the interrupt puts characters in, the loader takes them out. Neither checks whether it is full.
 
 use crate::device::RING;
 
-/// Characters received and not yet read. One too many takes the place of the oldest (facts: "character 551 overwrites"),
-/// and is read where that one stood. That no more than all places are read then is a guess.
+/// Characters received and not yet read. One more than it holds overwrites the oldest, and is read in its place (public
+/// sources: "character 551 overwrites"). How many are read after that is a guess: as many as it holds.
 #[derive(Debug)]
 pub struct Ring {
     slots: Box<[u8; RING]>,

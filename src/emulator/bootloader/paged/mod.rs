@@ -20,7 +20,7 @@ use super::voice::Voice;
 use crate::time::Instant;
 use profile::Ending;
 pub use profile::{G1, G2, Profile};
-use record::{DataRecord, Decoder, Fault, Record};
+use record::{DataRecord, Decoder, LoadError, Record};
 
 /// Address flag of data memory in CodeWarrior's files.
 const DATA_FLAG: u32 = 0x0200_0000;
@@ -118,7 +118,7 @@ impl Loader {
                 match self.decoder.take(character, self.load.is_some()) {
                     Ok(None) => {}
                     Ok(Some(record)) => self.take(board, record),
-                    Err(fault) => self.fail(board, fault),
+                    Err(error) => self.fail(board, error),
                 }
             }
         }
@@ -130,7 +130,7 @@ impl Loader {
             Activity::Writing { overrun, .. } => *overrun = true,
             Activity::Leaving => {}
             Activity::Listening | Activity::AwaitingSilence(_) if board.now < self.deaf_until => {}
-            Activity::Listening | Activity::AwaitingSilence(_) => self.fail(board, Fault::Receive),
+            Activity::Listening | Activity::AwaitingSilence(_) => self.fail(board, LoadError::Receive),
         }
     }
 
@@ -152,9 +152,9 @@ impl Loader {
             Activity::AwaitingSilence(then) => self.begin_to_write(board, then),
             Activity::Writing { then, overrun } => match board.flash.step(board.now, board.stores) {
                 None => self.activity = Activity::Writing { then, overrun },
-                Some(Written::Mismatch | Written::Refused) => self.fail(board, Fault::Flash),
-                Some(Written::Stuck) => self.fail(board, Fault::Internal),
-                Some(Written::Good) if overrun => self.fail(board, Fault::Receive),
+                Some(Written::Mismatch | Written::Refused) => self.fail(board, LoadError::Flash),
+                Some(Written::Stuck) => self.fail(board, LoadError::Internal),
+                Some(Written::Good) if overrun => self.fail(board, LoadError::Receive),
                 Some(Written::Good) => self.written(board, then),
             },
             other @ (Activity::Listening | Activity::Leaving) => self.activity = other,
@@ -175,7 +175,7 @@ impl Loader {
                 }
                 Activity::Listening => self.collect(board, VecDeque::from([data])),
                 Activity::AwaitingSilence(_) | Activity::Writing { .. } | Activity::Leaving => {
-                    self.fail(board, Fault::Overrun);
+                    self.fail(board, LoadError::Overrun);
                 }
             },
             // A record that is parked is lost here, and success is reported all the same.
@@ -273,12 +273,12 @@ impl Loader {
     }
 
     /// Says what is wrong and starts over: what is in the page buffer or parked is lost, S0 is wanted again.
-    fn fail(&mut self, board: &mut Board<'_>, fault: Fault) {
+    fn fail(&mut self, board: &mut Board<'_>, error: LoadError) {
         self.decoder = Decoder::new(self.profile.ignores);
         self.activity = Activity::Listening;
         self.load = None;
         self.voice.end_line(board);
-        self.voice.say(board, &format!("Error # {:04}\r\nRestarting.\r\n", fault.number()));
+        self.voice.say(board, &format!("Error # {:04}\r\nRestarting.\r\n", error.number()));
         self.deaf_until = board.uart.finished_at();
         self.voice.let_go_on(board);
         self.voice.prompt(board);

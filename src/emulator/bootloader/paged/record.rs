@@ -1,13 +1,13 @@
 //! S-records as the loaders with a page buffer take them: one character at a time, judged as early as they can.
 //!
-//! Some control characters are ignored wherever they stand, which ones says the profile. Both cases of hex digits are taken. What is wrong is one of
-//! the loader's own error numbers; the console's reader (`image`) is a different thing and tells more.
+//! Some control characters are ignored wherever they stand; the profile says which. Hex digits are taken in both cases.
+//! What is wrong is one of the loader's own error numbers; the console's reader (`image`) is another one and tells more.
 
 use super::super::super::uart::{XOFF, XON};
 
 /// What goes wrong, by the loader's numbers (public facts about the Motorola loaders).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub enum LoadError {
     /// Characters were lost because the loader did not listen.
     Receive,
     /// A character that cannot stand here.
@@ -24,17 +24,17 @@ pub enum Fault {
     Internal,
 }
 
-impl Fault {
+impl LoadError {
     /// Its number.
     pub fn number(self) -> u8 {
         match self {
-            Fault::Receive => 1,
-            Fault::Character => 2,
-            Fault::Record => 3,
-            Fault::Checksum => 4,
-            Fault::Overrun => 5,
-            Fault::Flash => 6,
-            Fault::Internal => 7,
+            LoadError::Receive => 1,
+            LoadError::Character => 2,
+            LoadError::Record => 3,
+            LoadError::Checksum => 4,
+            LoadError::Overrun => 5,
+            LoadError::Flash => 6,
+            LoadError::Internal => 7,
         }
     }
 }
@@ -64,7 +64,7 @@ pub struct DataRecord {
 pub enum Ignores {
     /// All of them.
     Controls,
-    /// The line ends CR and LF, and the flow control XON and XOFF; any other is [`Fault::Character`].
+    /// The line ends CR and LF, and the flow control XON and XOFF; any other is [`LoadError::Character`].
     LineEnds,
 }
 
@@ -119,7 +119,7 @@ impl Decoder {
     ///
     /// # Errors
     /// What the loader has against the character. The caller starts over with a new decoder.
-    pub fn take(&mut self, character: u8, header_seen: bool) -> Result<Option<Record>, Fault> {
+    pub fn take(&mut self, character: u8, header_seen: bool) -> Result<Option<Record>, LoadError> {
         if self.ignores.covers(character) {
             return Ok(None);
         }
@@ -128,19 +128,19 @@ impl Decoder {
                 self.place = Place::Type;
                 Ok(None)
             }
-            Place::Start => Err(Fault::Character),
+            Place::Start => Err(LoadError::Character),
             Place::Type => {
                 let kind = match character {
                     b'0' => Kind::Header,
                     b'3' if header_seen => Kind::Data,
                     b'7' if header_seen => Kind::End,
-                    _ => return Err(Fault::Record),
+                    _ => return Err(LoadError::Record),
                 };
                 self.place = Place::Body { kind, bytes: Vec::new(), high_digit: None };
                 Ok(None)
             }
             Place::Body { kind, bytes, high_digit } => {
-                let digit = hex_digit(character).ok_or(Fault::Character)?;
+                let digit = hex_digit(character).ok_or(LoadError::Character)?;
                 let Some(high) = high_digit.take() else {
                     *high_digit = Some(digit);
                     return Ok(None);
@@ -151,7 +151,7 @@ impl Decoder {
                     Kind::Data | Kind::End => SHORTEST_WITH_ADDRESS,
                 };
                 if bytes[0] < shortest {
-                    return Err(Fault::Record);
+                    return Err(LoadError::Record);
                 }
                 if bytes.len() <= usize::from(bytes[0]) {
                     return Ok(None);
@@ -165,10 +165,10 @@ impl Decoder {
 }
 
 /// Count, content and check sum add up to FFh in their lowest byte.
-fn complete(kind: Kind, bytes: &[u8]) -> Result<Record, Fault> {
+fn complete(kind: Kind, bytes: &[u8]) -> Result<Record, LoadError> {
     let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
     if sum != 0xFF {
-        return Err(Fault::Checksum);
+        return Err(LoadError::Checksum);
     }
     if kind == Kind::Header {
         return Ok(Record::Header);
@@ -193,11 +193,11 @@ fn hex_digit(character: u8) -> Option<u8> {
 mod tests {
     use super::*;
 
-    fn decode(text: &str) -> Result<Vec<Record>, Fault> {
+    fn decode(text: &str) -> Result<Vec<Record>, LoadError> {
         decode_as(Ignores::Controls, text)
     }
 
-    fn decode_as(ignores: Ignores, text: &str) -> Result<Vec<Record>, Fault> {
+    fn decode_as(ignores: Ignores, text: &str) -> Result<Vec<Record>, LoadError> {
         let mut decoder = Decoder::new(ignores);
         let mut records = Vec::new();
         for character in text.bytes() {
@@ -228,31 +228,31 @@ mod tests {
             assert_eq!(decode_as(Ignores::LineEnds, text), end, "{text:?}");
         }
         for text in ["\t", "S00\x073", "S0030000FC\x1a", "\0", "\x7f"] {
-            assert_eq!(decode_as(Ignores::LineEnds, text), Err(Fault::Character), "{text:?}");
+            assert_eq!(decode_as(Ignores::LineEnds, text), Err(LoadError::Character), "{text:?}");
         }
     }
 
     #[test]
-    fn each_fault_has_its_number() {
+    fn each_error_has_its_number() {
         let cases = [
-            ("s0030000FC", Fault::Character),
-            ("x", Fault::Character),
-            (" ", Fault::Character),
-            ("S0030000FG", Fault::Character),
-            ("S0030000FC\r\u{e9}", Fault::Character),
-            ("S3", Fault::Record),
-            ("S7", Fault::Record),
-            ("S1", Fault::Record),
-            ("S000", Fault::Record),
-            ("S0030000FC\rS5", Fault::Record),
-            ("S0030000FC\rS8", Fault::Record),
-            ("S0030000FC\rS304", Fault::Record),
-            ("S0030000FC\rS704", Fault::Record),
-            ("S0030000FD", Fault::Checksum),
-            ("S0030000FC\rS309000000803412CDABB9", Fault::Checksum),
+            ("s0030000FC", LoadError::Character),
+            ("x", LoadError::Character),
+            (" ", LoadError::Character),
+            ("S0030000FG", LoadError::Character),
+            ("S0030000FC\r\u{e9}", LoadError::Character),
+            ("S3", LoadError::Record),
+            ("S7", LoadError::Record),
+            ("S1", LoadError::Record),
+            ("S000", LoadError::Record),
+            ("S0030000FC\rS5", LoadError::Record),
+            ("S0030000FC\rS8", LoadError::Record),
+            ("S0030000FC\rS304", LoadError::Record),
+            ("S0030000FC\rS704", LoadError::Record),
+            ("S0030000FD", LoadError::Checksum),
+            ("S0030000FC\rS309000000803412CDABB9", LoadError::Checksum),
         ];
-        for (text, fault) in cases {
-            assert_eq!(decode(text), Err(fault), "{text:?}");
+        for (text, error) in cases {
+            assert_eq!(decode(text), Err(error), "{text:?}");
         }
     }
 

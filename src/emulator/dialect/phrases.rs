@@ -13,7 +13,7 @@ pub const MENU: [(&str, &str); 5] = [
 
 /// All choices of a dialect.
 #[derive(Clone, Debug)]
-pub struct Words {
+pub struct Phrases {
     pub line_end: &'static str,
     pub echo: bool,
     pub letters: Letters,
@@ -178,19 +178,19 @@ impl EntryStyle {
     }
 }
 
-impl Words {
+impl Phrases {
     /// The first of everything.
     pub fn plain() -> Self {
-        Words::choose(&mut First)
+        Phrases::choose(&mut First)
     }
 
     /// A choice for each thing.
     pub fn drawn(chance: &mut Rng) -> Self {
-        Words::choose(chance)
+        Phrases::choose(chance)
     }
 
     fn choose(chooser: &mut impl Chooser) -> Self {
-        Words {
+        Phrases {
             line_end: chooser.one(&["\r\n", "\r\n", "\r\n", "\r", "\n"]),
             echo: chooser.one(&[true, true, true, false]),
             letters: chooser.one(&[Letters::Mixed, Letters::Mixed, Letters::Mixed, Letters::Capitals]),
