@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::action::Action;
-use super::input::{Failure, ImageFacts};
+use super::image_facts::ImageFacts;
+use super::input::Failure;
 use super::keymap::{Cmd, Press};
 use super::picker::{Offers, Picked, Picker, placed};
 use super::screens::ScreenId;

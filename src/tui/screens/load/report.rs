@@ -10,7 +10,7 @@ use crate::device::{LoaderKind, Product};
 use crate::image::{DefectId, Misfit, Software};
 use crate::session::UnitState;
 use crate::time::Duration;
-use crate::tui::input::{Amount, ImageFacts};
+use crate::tui::image_facts::{Amount, ImageFacts};
 use crate::tui::screens::Scene;
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
