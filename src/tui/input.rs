@@ -21,6 +21,8 @@ pub const LARGEST_TEXT: u64 = 4 << 20;
 
 /// Largest file that is sent as it is: it takes 24 minutes.
 pub const LARGEST_SENT: u64 = 16 << 20;
+/// Entries of a folder that are read at most.
+pub const MOST_LISTED: usize = 10_000;
 
 /// What can happen.
 #[derive(Debug)]
@@ -55,7 +57,7 @@ pub enum Input {
     FilesListed {
         /// The folder, absolute where that could be found out.
         directory: PathBuf,
-        /// What is in it, in any order, or why it cannot be read.
+        /// What is in it, in any order and no more than [`MOST_LISTED`], or why it cannot be read.
         entries: Result<Vec<FileEntry>, String>,
     },
     /// Answer to [`Effect::CheckImage`].
@@ -88,8 +90,8 @@ pub enum Input {
         /// What is in it, or why it cannot be read.
         bytes: Result<Vec<u8>, String>,
     },
-    /// Answer to [`Effect::ListRecordings`]: newest first.
-    RecordingsListed(Result<Vec<RecordingEntry>, String>),
+    /// Answer to [`Effect::ListRecordings`].
+    RecordingsListed(Result<RecordingList, String>),
     /// How the recording is played now.
     Playing(Playing),
     /// The recording begins anew: what it showed so far has not happened yet.
@@ -114,8 +116,8 @@ pub enum Effect {
     DoNotOpen,
     /// Open a link (`/dev/ttyUSB0`, `emu:axtc4co`) and start its recording, or play a recording (`replay:FILE`): its
     /// bytes come as [`Input::Bytes`] and [`Input::Sent`] at the times they had. Answered by
-    /// [`Input::LinkOpened`] or [`Input::LinkFailed`]. A link that is open stays open until this one is, and is closed
-    /// before the answer says so.
+    /// [`Input::LinkOpened`] or [`Input::LinkFailed`]. A link that is open stays open until this one is, one that was lost is
+    /// looked for until then; it is given up before the answer says so.
     OpenLink(String),
     /// Close the open link. Not answered; what still comes from it must not be handed in.
     CloseLink,
@@ -224,11 +226,29 @@ pub struct Noted {
     pub ran: Option<Version>,
 }
 
-/// One recording.
+/// The recordings that are there.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RecordingList {
+    /// Newest first.
+    pub entries: Vec<RecordingEntry>,
+    /// How many older ones nobody has looked into.
+    pub older: usize,
+}
+
+/// One file with the name of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingEntry {
     /// What plays it: `replay:FILE`.
     pub link: String,
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// What it holds, or why it cannot be read.
+    pub content: Result<Recorded, String>,
+}
+
+/// What a recording holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recorded {
     /// When it began, local date and time.
     pub begun: String,
     /// The link it was made of, as the user named it then.
@@ -237,8 +257,8 @@ pub struct RecordingEntry {
     pub part: u32,
     /// How long it is, where its end can be read.
     pub length: Option<Duration>,
-    /// Bytes of the file.
-    pub bytes: u64,
+    /// A program writes it just now, this one or another.
+    pub is_being_written: bool,
 }
 
 /// What can be done to a recording that is played.

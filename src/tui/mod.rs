@@ -24,8 +24,8 @@ mod widgets;
 pub use app::{App, Options};
 pub use image_facts::ImageFacts;
 pub use input::{
-    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, Input, LARGEST_SENT, LARGEST_TEXT, LinkInfo, Noted,
-    Pace, Playback, Playing, PortEntry, RecordingEntry,
+    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, Input, LARGEST_SENT, LARGEST_TEXT, LinkInfo, MOST_LISTED, Noted,
+    Pace, Playback, Playing, PortEntry, Recorded, RecordingEntry, RecordingList,
 };
 pub use popup::ORDERS;
 pub use theme::Palette;

@@ -4,7 +4,7 @@ use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
 
 use super::stage::*;
 use crate::time::Duration;
-use crate::tui::{Effect, Input, RecordingEntry};
+use crate::tui::{Effect, Input, Recorded, RecordingList};
 
 /// The terminal with a hundred lines, each with its number.
 fn hundred_lines() -> Stage {
@@ -178,24 +178,42 @@ fn the_footer_names_as_many_keys_as_have_room_and_always_the_way_out() {
 }
 
 #[test]
-fn a_recording_s_name_stays_in_one_piece_and_the_one_being_written_is_called_that() {
+fn a_recording_s_name_stays_in_one_piece_and_those_being_written_are_called_that() {
     let name = "2026-01-31T12-00-00.cast";
-    let entry = |path: String| RecordingEntry {
-        link: format!("replay:{path}"),
-        begun: "2026-01-31 12:00:00".into(),
-        port: "/dev/ttyUSB0".into(),
-        part: 1,
-        length: Some(Duration::from_secs(1)),
-        bytes: 99,
+    let entry = |port: &str, is_being_written| {
+        let mut entry = recording("2026-01-31 12:00:00", port, 1, Some(Duration::from_secs(1)));
+        entry.link = format!("replay:/home/{}/{name}", "a".repeat(47));
+        entry.content = entry.content.map(|recorded| Recorded { is_being_written, ..recorded });
+        entry
     };
     let mut stage = Stage::connected(SMALL);
-    let written = link_info("x").recording.expect("one");
-    let long = format!("/home/{}/{name}", "a".repeat(47));
-    stage.keys("8").input(Input::RecordingsListed(Ok(vec![entry(long), entry(written)])));
+    stage.keys("8").recordings(vec![entry("u1", false), entry("u2", true), entry("u3", true)]);
     let picture = stage.picture();
     assert!(picture.contains(name), "{picture}");
-    let rows: Vec<&str> = picture.lines().filter(|line| line.contains("ttyUSB0") && line.contains("2026")).collect();
-    assert!(!rows[0].contains("being written") && rows[1].contains("being written"), "{picture}");
+    let is_written = |port: &str| picture.lines().any(|line| line.contains(port) && line.contains("being written"));
+    assert_eq!(["  u1", "  u2", "  u3"].map(is_written), [false, true, true], "{picture}");
+}
+
+#[test]
+fn what_cannot_be_read_is_listed_with_its_reason_and_what_is_left_out_is_counted() {
+    for size in [SMALL, LARGE] {
+        let mut stage = Stage::with_ports(size);
+        let why = "line 1: this is no asciicast recording: expected value at column 1";
+        let entries = vec![
+            no_recording("/home/user/20260301T120000Z-c-1.cast", why),
+            recording("2026-01-31 11:00:00", "/dev/ttyUSB0", 1, Some(Duration::from_secs(300))),
+        ];
+        stage.keys("8").input(Input::RecordingsListed(Ok(RecordingList { entries, older: 7 })));
+        let picture = stage.picture();
+        assert!(picture.contains("20260301T120000Z-c-1.cast  cannot be read: line 1: this is no"), "{picture}");
+        assert!(picture.contains("2 of 9, newest first"), "{picture}");
+        for word in why.split(' ') {
+            assert!(picture.contains(word), "all of the reason stands below: no '{word}' in {picture}");
+        }
+        assert!(!picture.contains("Attach this file"), "{picture}");
+        stage.press(KeyCode::Down);
+        assert!(stage.shows("Attach this file"), "{}", stage.picture());
+    }
 }
 
 #[test]
