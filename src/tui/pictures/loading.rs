@@ -196,3 +196,10 @@ fn what_to_do_next_stands_below_any_number_of_words_of_the_unit() {
     );
     assert!(stage.shows("Heard  ") && stage.shows(" …") && stage.shows("Enter goes back"), "{}", stage.picture());
 }
+
+#[test]
+fn all_findings_can_be_reached_while_the_link_is_lost() {
+    let mut stage = Stage::connected(SMALL).with_image(bad_image());
+    stage.lost().press(KeyCode::End);
+    assert!(stage.shows("── Findings ──") && !stage.shows("more line"), "{}", stage.picture());
+}
