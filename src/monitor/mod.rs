@@ -6,11 +6,9 @@ mod scrollback;
 mod stream;
 mod trend;
 
-use std::collections::VecDeque;
-
 pub use diagnostics::{Diagnostics, Tracked};
 pub use scrollback::{KEPT_LINES, Origin, Scrollback, TextLine};
-pub use stream::{Channel, Fault, Mark, Sample, Stream};
+pub use stream::{Channel, Fault, Faults, Mark, Sample, Stream};
 
 use crate::device::Product;
 use crate::session::Event;
@@ -20,8 +18,8 @@ use crate::session::Event;
 pub struct Monitor {
     /// The data stream.
     pub stream: Stream,
-    /// Faults seen since connecting, newest first.
-    pub faults: VecDeque<Fault>,
+    /// Faults seen since connecting.
+    pub faults: Faults,
     /// The unit's diagnostics.
     pub diagnostics: Diagnostics,
 }

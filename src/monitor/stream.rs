@@ -9,7 +9,7 @@ use crate::wire::stream::{Layout, Reading, Row, Source};
 
 /// Samples kept of each channel as they came; a [`Trend`] keeps the rest.
 pub const KEPT_SAMPLES: usize = 3600;
-/// Faults kept, the newest first.
+/// Faults kept.
 pub const KEPT_FAULTS: usize = 200;
 /// Marks kept.
 pub const KEPT_MARKS: usize = 100;
@@ -92,6 +92,15 @@ pub struct Sample {
     pub after_gap: bool,
 }
 
+/// The faults seen since connecting.
+#[derive(Debug, Default)]
+pub struct Faults {
+    /// Those that are kept, newest first: [`KEPT_FAULTS`] at most, and every one that lasts.
+    kept: VecDeque<Fault>,
+    /// All of them.
+    pub seen: u64,
+}
+
 /// A wiring fault.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
@@ -107,18 +116,15 @@ pub struct Fault {
 
 impl Stream {
     /// Takes in a row; faults that begin or end with it are noted in `faults`.
-    pub(super) fn row(&mut self, at: Instant, row: &Row, product: Option<&Product>, faults: &mut VecDeque<Fault>) {
+    pub(super) fn row(&mut self, at: Instant, row: &Row, product: Option<&Product>, faults: &mut Faults) {
         let names = channel_names(product, row.readings.len());
         let same =
             self.source == Some(row.source) && self.channels.iter().map(|channel| &channel.name).eq(names.iter());
         if !same {
             let marks = std::mem::take(&mut self.marks);
             *self = Stream { source: Some(row.source), marks, set: self.set, ..Stream::default() };
-            let is_gone = |fault: &&mut Fault| fault.until.is_none() && !names.contains(&fault.channel);
-            for fault in faults.iter_mut().filter(is_gone) {
-                // Nobody will say any more that it is over.
-                fault.until = Some(at);
-            }
+            // Nobody will say any more that it is over.
+            faults.end_all(at, |fault| !names.contains(&fault.channel));
             self.channels = names.into_iter().map(Channel::new).collect();
         }
         let interrupted = std::mem::take(&mut self.interrupted);
@@ -136,7 +142,7 @@ impl Stream {
         self.late = false;
         for (channel, &reading) in self.channels.iter_mut().zip(&row.readings) {
             channel.read(at, reading, gap_since);
-            note_fault(faults, &channel.name, Some(reading).filter(|reading| reading.is_fault()), at);
+            faults.note(&channel.name, Some(reading).filter(|reading| reading.is_fault()), at);
         }
     }
 
@@ -209,7 +215,7 @@ impl Stream {
 
     /// Marks a moment, which may be one of before.
     pub fn mark(&mut self, at: Instant) -> Mark {
-        let number = self.marks.iter().map(|mark| mark.number).max().unwrap_or(0) + 1;
+        let number = self.marks.iter().map(|mark| mark.number).max().unwrap_or(0).saturating_add(1);
         let mark = Mark { number, at };
         self.set_mark(mark);
         mark
@@ -339,17 +345,56 @@ fn channel_names(product: Option<&Product>, count: usize) -> Vec<String> {
     }
 }
 
-fn note_fault(faults: &mut VecDeque<Fault>, channel: &str, seen: Option<Reading>, at: Instant) {
-    let open = faults.iter_mut().find(|fault| fault.until.is_none() && fault.channel == channel);
-    if open.as_ref().map(|fault| fault.kind) == seen {
-        return;
+impl Faults {
+    /// Those that are kept, newest first.
+    pub fn iter(&self) -> impl Iterator<Item = &Fault> {
+        self.kept.iter()
     }
-    if let Some(fault) = open {
-        fault.until = Some(at);
+
+    /// Those that have not ended, newest first.
+    pub fn lasting(&self) -> impl Iterator<Item = &Fault> {
+        self.kept.iter().filter(|fault| fault.until.is_none())
     }
-    if let Some(kind) = seen {
-        faults.push_front(Fault { channel: channel.to_owned(), kind, since: at, until: None });
-        faults.truncate(KEPT_FAULTS);
+
+    /// Those that have ended, newest first.
+    pub fn ended(&self) -> impl Iterator<Item = &Fault> {
+        self.kept.iter().filter(|fault| fault.until.is_some())
+    }
+
+    /// Whether there was none.
+    pub fn is_empty(&self) -> bool {
+        self.kept.is_empty()
+    }
+
+    /// Takes in what a channel shows: a fault, or (`None`) none.
+    fn note(&mut self, channel: &str, shown: Option<Reading>, at: Instant) {
+        let open = self.kept.iter_mut().find(|fault| fault.until.is_none() && fault.channel == channel);
+        if open.as_ref().map(|fault| fault.kind) == shown {
+            return;
+        }
+        if let Some(fault) = open {
+            fault.until = Some(at);
+        }
+        if let Some(kind) = shown {
+            self.seen += 1;
+            self.kept.push_front(Fault { channel: channel.to_owned(), kind, since: at, until: None });
+            self.forget_oldest();
+        }
+    }
+
+    /// One that lasts is not forgotten, however old: it would begin anew with the next row. There is one of a channel.
+    fn forget_oldest(&mut self) {
+        if self.kept.len() > KEPT_FAULTS
+            && let Some(oldest) = self.kept.iter().rposition(|fault| fault.until.is_some())
+        {
+            self.kept.remove(oldest);
+        }
+    }
+
+    fn end_all(&mut self, at: Instant, is_gone: impl Fn(&Fault) -> bool) {
+        for fault in self.kept.iter_mut().filter(|fault| fault.until.is_none() && is_gone(fault)) {
+            fault.until = Some(at);
+        }
     }
 }
 
@@ -374,8 +419,7 @@ mod tests {
         let at = Instant::from_millis(2000);
         monitor.fold(&Event::Row { at, span: Span::default(), row: fewer }, None);
         let names: Vec<_> = monitor.stream.channels.iter().map(|channel| channel.name.clone()).collect();
-        let fault = &monitor.faults[0];
-        assert!(fault.until.is_some(), "{fault:?} beside {names:?}");
+        assert_eq!((monitor.faults.lasting().count(), monitor.faults.seen), (0, 1), "beside {names:?}");
     }
 
     fn with_first(reading: Reading) -> [Reading; 5] {
@@ -439,6 +483,10 @@ mod tests {
         let last = (0..=KEPT_MARKS as u64).map(|second| stream.mark(Instant::from_millis(second * 1000))).last();
         assert_eq!(last.map(|mark| mark.number), Some(KEPT_MARKS as u64 + 1));
         assert_eq!((stream.marks.len(), stream.marks[0].number), (KEPT_MARKS, 2));
+        // A recording may hold any number.
+        let later = Instant::from_millis(1_000_000);
+        stream.set_mark(Mark { number: u64::MAX, at: later });
+        assert_eq!(stream.mark(later).number, u64::MAX);
     }
 
     #[test]
@@ -448,6 +496,21 @@ mod tests {
             row(&mut monitor, number, with_first(if number % 2 == 0 { Reading::Open } else { Reading::Short }));
         }
         assert!(monitor.stream.channels.iter().all(|channel| channel.history.len() == KEPT_SAMPLES));
-        assert_eq!(monitor.faults.len(), KEPT_FAULTS);
+        assert_eq!(monitor.faults.iter().count(), KEPT_FAULTS);
+        assert_eq!(monitor.faults.seen, KEPT_SAMPLES as u64 + 100);
+    }
+
+    #[test]
+    fn a_fault_that_lasts_is_not_forgotten_for_many_that_come_and_go() {
+        let mut monitor = Monitor::default();
+        let value = Reading::Value(1.0);
+        for number in 0..3 * KEPT_FAULTS as u64 {
+            let loose = if number % 2 == 0 { Reading::Open } else { value };
+            row(&mut monitor, 1000 * number, [loose, value, value, value, Reading::Open]);
+        }
+        let lasting: Vec<_> = monitor.faults.lasting().map(|fault| fault.since).collect();
+        assert_eq!(lasting, [Instant::ZERO], "since it was seen first");
+        assert_eq!(monitor.faults.iter().count(), KEPT_FAULTS);
+        assert_eq!(monitor.faults.seen, 3 * KEPT_FAULTS as u64 / 2 + 1);
     }
 }

@@ -289,7 +289,7 @@ pub fn terminal_keys(theme: Theme, screen: ScreenId, after_prefix: bool, columns
 }
 
 fn prefix_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'static> {
-    let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
+    let mut line = Line::from(Span::styled(KEYS, theme.quiet()));
     if after_prefix {
         line.push_span(Span::styled("next key is for axcon: ", theme.warning()));
     } else {
@@ -308,7 +308,7 @@ fn prefix_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'
 
 /// The keys of the help page.
 pub fn help_keys(theme: Theme) -> Line<'static> {
-    let mut line = Line::from(Span::styled(" axcon ", theme.quiet()));
+    let mut line = Line::from(Span::styled(KEYS, theme.quiet()));
     for (key, meaning) in [("↑↓", "scroll"), ("1-9", "screen"), ("any other key", "back")] {
         line.push_span(Span::styled(key, theme.key()));
         line.push_span(Span::raw(format!(" {meaning}  ")));

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use ratatui::crossterm::event::Event as TerminalEvent;
 
-use crate::device::{self, LoaderKind, Product};
+use super::image_facts::ImageFacts;
+use crate::device::LoaderKind;
 use crate::endpoint::{Arrived, Transmit};
-use crate::image::{CheckedImage, DefectId, Report, Severity};
-use crate::session::LoadOrder;
+use crate::image::DefectId;
 use crate::time::Duration;
 use crate::version::Version;
 
@@ -21,6 +21,8 @@ pub const LARGEST_TEXT: u64 = 4 << 20;
 
 /// Largest file that is sent as it is: it takes 24 minutes.
 pub const LARGEST_SENT: u64 = 16 << 20;
+/// Entries of a folder that are read at most.
+pub const MOST_LISTED: usize = 10_000;
 
 /// What can happen.
 #[derive(Debug)]
@@ -57,7 +59,7 @@ pub enum Input {
     FilesListed {
         /// The folder, absolute where that could be found out.
         directory: PathBuf,
-        /// What is in it, in any order, or why it cannot be read.
+        /// What is in it, in any order and no more than [`MOST_LISTED`], or why it cannot be read.
         entries: Result<Vec<FileEntry>, String>,
     },
     /// Answer to [`Effect::CheckImage`].
@@ -90,8 +92,8 @@ pub enum Input {
         /// What is in it, or why it cannot be read.
         bytes: Result<Vec<u8>, String>,
     },
-    /// Answer to [`Effect::ListRecordings`]: newest first.
-    RecordingsListed(Result<Vec<RecordingEntry>, String>),
+    /// Answer to [`Effect::ListRecordings`].
+    RecordingsListed(Result<RecordingList, String>),
     /// How the recording is played now.
     Playing(Playing),
     /// The recording begins anew: what it showed so far has not happened yet.
@@ -116,8 +118,8 @@ pub enum Effect {
     DoNotOpen,
     /// Open a link (`/dev/ttyUSB0`, `emu:axtc4co`) and start its recording, or play a recording (`replay:FILE`): its
     /// bytes come as [`Input::Bytes`] and [`Input::Sent`] at the times they had. Answered by
-    /// [`Input::LinkOpened`] or [`Input::LinkFailed`]. A link that is open stays open until this one is, and is closed
-    /// before the answer says so.
+    /// [`Input::LinkOpened`] or [`Input::LinkFailed`]. A link that is open stays open until this one is, one that was lost is
+    /// looked for until then; it is given up before the answer says so.
     OpenLink(String),
     /// Close the open link. Not answered; what still comes from it must not be handed in.
     CloseLink,
@@ -226,11 +228,29 @@ pub struct Noted {
     pub ran: Option<Version>,
 }
 
-/// One recording.
+/// The recordings that are there.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RecordingList {
+    /// Newest first.
+    pub entries: Vec<RecordingEntry>,
+    /// How many older ones nobody has looked into.
+    pub older: usize,
+}
+
+/// One file with the name of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingEntry {
     /// What plays it: `replay:FILE`.
     pub link: String,
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// What it holds, or why it cannot be read.
+    pub content: Result<Recorded, String>,
+}
+
+/// What a recording holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recorded {
     /// When it began, local date and time.
     pub begun: String,
     /// The link it was made of, as the user named it then.
@@ -239,8 +259,8 @@ pub struct RecordingEntry {
     pub part: u32,
     /// How long it is, where its end can be read.
     pub length: Option<Duration>,
-    /// Bytes of the file.
-    pub bytes: u64,
+    /// A program writes it just now, this one or another.
+    pub is_being_written: bool,
 }
 
 /// What can be done to a recording that is played.
@@ -307,106 +327,4 @@ pub enum FileKind {
     Folder,
     /// Anything else.
     File,
-}
-
-/// What is to be sent of an image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Amount {
-    /// Records, header and terminator included.
-    pub records: usize,
-    /// Characters.
-    pub characters: usize,
-    /// What sending them takes, roughly.
-    pub time: Duration,
-}
-
-/// What reading and checking an image file brought.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImageFacts {
-    /// Which file.
-    pub path: PathBuf,
-    /// Whether it may be sent: no error stands.
-    pub ok: bool,
-    /// Product the image says it is for.
-    pub product: Option<String>,
-    /// Version the image says it is.
-    pub version: Option<Version>,
-    /// What is sent of the file as it is.
-    pub own: Amount,
-    /// What is sent if it is packed, as long as the loader keeps up with that.
-    pub packed: Amount,
-    /// Every defect in one line each, errors first: `line 12, column 43: ...`.
-    pub defects: Vec<String>,
-    /// Which errors stand, each once.
-    pub errors: Vec<DefectId>,
-    /// Errors in spite of which it may be sent, because the user says so.
-    pub allowed: Vec<DefectId>,
-    /// The image itself, if it may be sent.
-    pub checked: Option<CheckedImage>,
-}
-
-impl ImageFacts {
-    /// What a check for units with this loader, or with the one their product has, has found that allowed these errors; the
-    /// others come first.
-    pub fn of_report(path: PathBuf, report: &Report, loader: Option<LoaderKind>, allow: &[DefectId]) -> Self {
-        let identity = report.facts.identity.as_ref();
-        let mut errors: Vec<DefectId> = Vec::new();
-        for defect in report.defects.iter().filter(|defect| defect.severity == Severity::Error) {
-            if !errors.contains(&defect.id) {
-                errors.push(defect.id);
-            }
-        }
-        // What does not say what it is cannot be compared with the unit, nor with its banner: as 'axcon load' has it, it
-        // goes only if the user answers for it. As a file it is sound, and what the check calls it stands once.
-        let ok = report.is_ok() && (identity.is_some() || allow.contains(&DefectId::NoIdentity));
-        let is_nameless = report.is_ok() && !ok;
-        errors.extend(is_nameless.then_some(DefectId::NoIdentity));
-        let mut defects: Vec<_> = report.defects.iter().collect();
-        let stands = |id, severity| severity == Severity::Error || is_nameless && id == DefectId::NoIdentity;
-        defects.sort_by_key(|defect| !stands(defect.id, defect.severity));
-        let mut defects: Vec<String> = defects
-            .into_iter()
-            .map(|defect| {
-                let (severity, id) = (defect.severity.name(), defect.id);
-                let text =
-                    format!("{severity} {id}: line {}, column {}: {}", defect.line, defect.column, defect.message);
-                match is_nameless && id == DefectId::NoIdentity {
-                    true => format!("{text}, so nobody could tell afterwards what the unit runs"),
-                    false => text,
-                }
-            })
-            .collect();
-        if report.unlisted() > 0 {
-            defects.push(format!("{} more defects are not listed", report.unlisted()));
-        }
-        let image = report.image().filter(|_| ok);
-        let product = identity.and_then(|identity| Product::named(&identity.product));
-        let unit = product.map(|product| (loader.unwrap_or(product.loader.kind), &product.flash));
-        let amount = |records, characters| {
-            let time = device::transfer_time(characters as u64, report.facts.data_bytes, unit);
-            Amount { records, characters, time }
-        };
-        let packed = image.clone().map_or(Amount::default(), |image| {
-            let order = LoadOrder { packed: true, loader, ..LoadOrder::new(image, None) };
-            let beginning = order.at_its_beginning();
-            amount(beginning.records_total, beginning.bytes_total)
-        });
-        ImageFacts {
-            path,
-            ok,
-            product: identity.map(|identity| identity.product.clone()),
-            version: identity.map(|identity| identity.version),
-            own: amount(report.facts.records as usize, report.facts.characters as usize),
-            packed,
-            defects,
-            errors,
-            allowed: allow.to_vec(),
-            checked: image,
-        }
-    }
-
-    /// Whether nothing is wrong with the file but that it does not say what it is.
-    pub fn is_nameless(&self) -> bool {
-        !self.ok && self.errors == [DefectId::NoIdentity]
-    }
 }

@@ -8,6 +8,7 @@
 mod action;
 mod app;
 mod frame;
+mod image_facts;
 mod input;
 mod keymap;
 mod picker;
@@ -21,9 +22,10 @@ mod visible;
 mod widgets;
 
 pub use app::{App, Options};
+pub use image_facts::ImageFacts;
 pub use input::{
-    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LARGEST_SENT, LARGEST_TEXT, LinkInfo, Noted,
-    Pace, Playback, Playing, PortEntry, RecordingEntry,
+    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, Input, LARGEST_SENT, LARGEST_TEXT, LinkInfo, MOST_LISTED, Noted,
+    Pace, Playback, Playing, PortEntry, Recorded, RecordingEntry, RecordingList,
 };
 pub use popup::ORDERS;
 pub use theme::Palette;

@@ -7,9 +7,9 @@ use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 
 use ratatui::style::Style;
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 
-use super::input::{FileEntry, FileKind};
+use super::input::{FileEntry, FileKind, MOST_LISTED};
 use super::keymap::Cmd;
 use super::theme::Theme;
 use super::visible;
@@ -21,6 +21,8 @@ pub struct Picker {
     offers: Offers,
     directory: PathBuf,
     listing: Listing,
+    /// The folder that was asked for last, until it has been told of.
+    awaited: Option<PathBuf>,
     cursor: usize,
 }
 
@@ -41,7 +43,11 @@ enum Listing {
     /// Nobody has asked yet.
     Unread,
     Reading,
-    Read(Vec<FileEntry>),
+    Read {
+        entries: Vec<FileEntry>,
+        /// There is more in the folder than was read.
+        is_cut: bool,
+    },
     Failed(String),
 }
 
@@ -60,7 +66,7 @@ const DUMP: &[u8] = b"axcon.dictionary/";
 impl Picker {
     /// In a folder that nobody has read yet.
     pub fn new(offers: Offers, directory: PathBuf) -> Self {
-        Picker { offers, directory, listing: Listing::Unread, cursor: 0 }
+        Picker { offers, directory, listing: Listing::Unread, awaited: None, cursor: 0 }
     }
 
     /// Where it stands.
@@ -70,15 +76,22 @@ impl Picker {
 
     /// Whether its folder has been asked for and been told of, well or not.
     pub fn is_read(&self) -> bool {
-        matches!(self.listing, Listing::Read(_) | Listing::Failed(_))
+        matches!(self.listing, Listing::Read { .. } | Listing::Failed(_))
     }
 
     /// Wants a folder read; what is there stays in sight until then.
     pub fn list(&mut self, directory: PathBuf) -> PathBuf {
-        if !matches!(self.listing, Listing::Read(_)) {
+        if !matches!(self.listing, Listing::Read { .. }) {
             self.listing = Listing::Reading;
         }
+        self.awaited = Some(directory.clone());
         directory
+    }
+
+    /// Whether this folder was asked for last. Folders are read side by side: a slow one may come when nobody wants it any
+    /// more.
+    pub fn awaits(&self, directory: &Path) -> bool {
+        self.awaited.as_deref() == Some(directory)
     }
 
     /// A folder has been read.
@@ -88,10 +101,12 @@ impl Picker {
         let stays = self.directory == directory && self.is_read();
         let chosen = self.entries().get(self.cursor).map(|entry| entry.name.clone()).filter(|_| stays);
         self.directory = directory;
+        self.awaited = None;
         self.cursor = 0;
         self.listing = match entries {
             Err(why) => Listing::Failed(why),
             Ok(entries) => {
+                let is_cut = entries.len() >= MOST_LISTED;
                 let entries = offered(self.offers, entries, self.directory.parent().is_some());
                 let wanted = chosen.or(came_from.filter(|_| is_parent));
                 let position = entries.iter().position(|entry| Some(&entry.name) == wanted.as_ref());
@@ -99,7 +114,7 @@ impl Picker {
                 // A question wants a file, of dumps the newest; on a screen one looks around first.
                 let first = first_file.filter(|_| self.offers != Offers::Images).unwrap_or(0);
                 self.cursor = position.unwrap_or(first);
-                Listing::Read(entries)
+                Listing::Read { entries, is_cut }
             }
         };
     }
@@ -137,25 +152,15 @@ impl Picker {
                 return vec![Line::styled("  Reading the folder ...", theme.quiet())];
             }
             Listing::Failed(why) => {
-                return vec![
-                    Line::from(vec![
-                        Span::styled("  The folder cannot be read: ", theme.bad()),
-                        Span::raw(visible::text(why)),
-                    ]),
-                    Line::raw(format!("  {otherwise}")),
-                ];
+                let text = format!("The folder cannot be read: {}", visible::text(why));
+                let broken = format::wrap(&text, columns.saturating_sub(4)).into_iter();
+                let told = broken.map(|line| Line::styled(format!("  {line}"), theme.bad()));
+                return told.chain([Line::raw(format!("  {otherwise}"))]).collect();
             }
-            Listing::Read(entries) => entries,
+            Listing::Read { entries, .. } => entries,
         };
-        let mut rows = Vec::new();
-        if self.has_no_file() {
-            let text = match self.offers {
-                Offers::Images => "No image here, neither by name nor by how it begins.",
-                Offers::Dumps => "No saved object dictionary here (JSON).",
-                Offers::Anything => "No file here.",
-            };
-            rows.push(Line::styled(format!("  {text} {otherwise}"), theme.quiet()));
-        }
+        let remark = self.remark().map(|text| Line::styled(format!("  {text} {otherwise}"), theme.quiet()));
+        let mut rows: Vec<Line> = remark.into_iter().collect();
         let room = room.saturating_sub(rows.len());
         let first = lines::first_visible(self.cursor, entries.len(), room);
         let shown = entries.iter().enumerate().skip(first).take(room);
@@ -165,8 +170,8 @@ impl Picker {
 
     /// The entry that is drawn in row `row` of these `room` rows.
     pub fn entry_at(&self, row: usize, room: usize) -> Option<usize> {
-        let Listing::Read(entries) = &self.listing else { return None };
-        let above = usize::from(self.has_no_file());
+        let Listing::Read { entries, .. } = &self.listing else { return None };
+        let above = usize::from(self.remark().is_some());
         let room = room.saturating_sub(above);
         let row = row.checked_sub(above)?;
         let number = lines::first_visible(self.cursor, entries.len(), room) + row;
@@ -185,13 +190,22 @@ impl Picker {
 
     fn entries(&self) -> &[FileEntry] {
         match &self.listing {
-            Listing::Read(entries) => entries,
+            Listing::Read { entries, .. } => entries,
             Listing::Unread | Listing::Reading | Listing::Failed(_) => &[],
         }
     }
 
-    fn has_no_file(&self) -> bool {
-        !self.entries().iter().any(|entry| entry.kind == FileKind::File)
+    /// What has to be said above the entries.
+    fn remark(&self) -> Option<&'static str> {
+        let Listing::Read { entries, is_cut } = &self.listing else { return None };
+        let has_file = entries.iter().any(|entry| entry.kind == FileKind::File);
+        match self.offers {
+            _ if *is_cut => Some("There is more in this folder than was read."),
+            _ if has_file => None,
+            Offers::Images => Some("No image here, neither by name nor by how it begins."),
+            Offers::Dumps => Some("No saved object dictionary here (JSON)."),
+            Offers::Anything => Some("No file here."),
+        }
     }
 }
 
@@ -267,7 +281,7 @@ fn file_row(theme: Theme, entry: &FileEntry, is_chosen: bool, columns: usize) ->
     let (name, size) = match entry.kind {
         FileKind::Folder if entry.name == ".." => ("../".to_owned(), "folder above".to_owned()),
         FileKind::Folder => (format!("{}/", visible::text(&entry.name)), "folder".to_owned()),
-        FileKind::File => (visible::text(&entry.name), format!("{} bytes", format::grouped(entry.bytes))),
+        FileKind::File => (visible::text(&entry.name), format::counted(entry.bytes, "byte")),
     };
     let modified = entry.modified.as_deref().map(visible::text).unwrap_or_default();
     let room = columns.saturating_sub(42);
@@ -278,6 +292,7 @@ fn file_row(theme: Theme, entry: &FileEntry, is_chosen: bool, columns: usize) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tui::theme::Palette;
 
     fn entry(name: &str, kind: FileKind) -> FileEntry {
         FileEntry { name: name.into(), kind, bytes: 1, begins: Vec::new(), modified: None }
@@ -296,6 +311,20 @@ mod tests {
         let names: Vec<_> = offered(Offers::Images, entries, true).into_iter().map(|entry| entry.name).collect();
         assert_eq!(names, ["..", "zoo", "A.s19", "b.S"]);
         assert!(["x.elf.S", "x.SREC", "x.hex"].into_iter().all(is_image_name));
+    }
+
+    #[test]
+    fn a_folder_of_which_not_all_was_read_says_so() {
+        let rows = |count: usize| {
+            let mut picker = Picker::new(Offers::Anything, "/".into());
+            picker.listed("/".into(), Ok((0..count).map(|n| entry(&n.to_string(), FileKind::File)).collect()));
+            let rows = picker.rows(Theme::new(Palette::Mono), 80, 5, "Type a path.");
+            assert_eq!(picker.entry_at(rows.len() - 1, 5).is_some(), count > 0, "the last row can be clicked");
+            rows[0].to_string()
+        };
+        assert_eq!(rows(0), "  No file here. Type a path.");
+        assert!(rows(9).contains("0"), "{}", rows(9));
+        assert_eq!(rows(MOST_LISTED), "  There is more in this folder than was read. Type a path.");
     }
 
     #[test]

@@ -20,7 +20,7 @@ use axcon::image::make;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::tui::{
     App, Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Noted, Options, Palette,
-    RecordingEntry,
+    Recorded, RecordingEntry, RecordingList,
 };
 use axcon::version::Version;
 use insta::assert_snapshot;
@@ -103,14 +103,19 @@ impl Desk {
                 }
                 Effect::UploadBegins { noted, .. } => self.noted = Some(noted),
                 Effect::UploadEnds { .. } => self.noted = None,
-                Effect::ListRecordings => self.input(Input::RecordingsListed(Ok(vec![RecordingEntry {
-                    link: "replay:/home/service/.local/state/axcon/recordings/20260131T120000Z-ttyUSB0-1.cast".into(),
-                    begun: "2026-01-31 12:00:00".into(),
-                    port: "/dev/ttyUSB0".into(),
-                    part: 1,
-                    length: Some(Duration::from_secs(600)),
-                    bytes: 123_456,
-                }]))),
+                Effect::ListRecordings => {
+                    let recorded = Recorded {
+                        begun: "2026-01-31 12:00:00".into(),
+                        port: "/dev/ttyUSB0".into(),
+                        part: 1,
+                        length: Some(Duration::from_secs(600)),
+                        is_being_written: false,
+                    };
+                    let link = "replay:/home/service/.local/state/axcon/recordings/20260131T120000Z-ttyUSB0-1.cast";
+                    let entry = RecordingEntry { link: link.into(), bytes: 123_456, content: Ok(recorded) };
+                    let list = RecordingList { entries: vec![entry], older: 0 };
+                    self.input(Input::RecordingsListed(Ok(list)));
+                }
                 Effect::ListFiles(directory) => {
                     let entry = |(path, bytes): (&PathBuf, &Vec<u8>)| FileEntry {
                         name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),

@@ -6,7 +6,8 @@ use super::App;
 use crate::dump::{self, Dump};
 use crate::session::{Command, Job};
 use crate::time::{Duration, Instant};
-use crate::tui::input::{Effect, FIRST_BYTES, Failure, FileEntry, ImageFacts};
+use crate::tui::image_facts::ImageFacts;
+use crate::tui::input::{Effect, FIRST_BYTES, Failure, FileEntry};
 use crate::tui::picker::{begins_like_an_image, is_image_name};
 use crate::tui::popup::{Popup, Purpose, Question};
 use crate::tui::screens::dictionary::other_product;
@@ -16,20 +17,20 @@ use crate::tui::widgets::format;
 use crate::wire::stream::Row;
 
 impl App {
-    /// A folder has been read: for whoever has asked last.
+    /// A folder has been read: for whoever has asked for it, if anybody still waits.
     pub(super) fn files_listed(&mut self, directory: PathBuf, entries: Result<Vec<FileEntry>, String>) {
         self.dirty = true;
         match &mut self.popup {
-            Some(Popup::Asking(Question::Choose { picker, .. })) => {
+            Some(Popup::Asking(Question::Choose { picker, .. })) if picker.awaits(&directory) => {
                 picker.listed(directory, entries);
                 self.folder = picker.directory().to_path_buf();
             }
-            _ => {
-                if self.load.is_checking(&directory) {
-                    self.close_path_box();
-                }
+            _ if self.load.is_checking(&directory) => {
+                self.close_path_box();
                 self.load.listed(directory, entries);
             }
+            _ if self.load.awaits(&directory) => self.load.listed(directory, entries),
+            _ => {}
         }
     }
 
@@ -104,7 +105,7 @@ impl App {
         let total = bytes.len();
         if self.can_send() && self.command(Command::SendFile(bytes)) {
             self.view.sending = Some(Sending { name: name.clone(), sent: 0, total });
-            let text = format!("the file {name} is sent, {}", format::counted(total as u64, "byte"));
+            let text = format!("the file {name} is sent, {}", format::counted(total, "byte"));
             self.scrollback.note(self.now, text.clone());
             effects.push(Effect::Mark(text));
             self.terminal.follow();
@@ -197,6 +198,9 @@ impl App {
     }
 
     pub(super) fn export_dictionary(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
+        if self.view.export.as_ref().is_some_and(|export| export.path == path) {
+            return self.view.tell(Tone::Bad, "Not written: the rows of the stream go to that file.");
+        }
         let Some(read) = &self.view.dictionary else {
             return self.view.tell(Tone::Bad, "Nothing has been read yet: V reads the object dictionary.");
         };

@@ -30,7 +30,7 @@ impl App {
             }
             TerminalEvent::Paste(text) => {
                 self.dirty = true;
-                self.paste(&text);
+                self.paste(&text, effects);
             }
             TerminalEvent::Resize(columns, rows) => {
                 self.dirty = true;
@@ -41,7 +41,7 @@ impl App {
         }
     }
 
-    pub(super) fn mouse(&mut self, mouse: MouseEvent, effects: &mut Vec<Effect>) {
+    fn mouse(&mut self, mouse: MouseEvent, effects: &mut Vec<Effect>) {
         if self.is_too_small() {
             return;
         }
@@ -50,11 +50,8 @@ impl App {
             MouseEventKind::ScrollDown => Some(KeyCode::Down),
             _ => None,
         };
-        if let Some(code) = step.filter(|_| self.popup.is_none()) {
-            self.dirty = true;
-            return self.key(KeyEvent::new(code, KeyModifiers::NONE), effects);
-        }
-        if let (Some(code), Some(Popup::Asking(Question::Choose { .. }))) = (step, &self.popup) {
+        let moves = matches!(&self.popup, None | Some(Popup::Asking(Question::Choose { .. })));
+        if let Some(code) = step.filter(|_| moves) {
             self.dirty = true;
             return self.key(KeyEvent::new(code, KeyModifiers::NONE), effects);
         }
@@ -83,7 +80,7 @@ impl App {
                 None
             }
             row if row + 1 == rows => frame::key_at(self.theme, &self.footer(usize::from(columns)), column),
-            row => self.choose_at(columns, rows, row),
+            row => self.choose_at(row),
         };
         if let Some(cmd) = cmd {
             self.dirty = true;
@@ -107,13 +104,11 @@ impl App {
     }
 
     /// A click into a list: what stands there is chosen, and what is chosen already is done.
-    pub(super) fn choose_at(&mut self, columns: u16, rows: u16, y: u16) -> Option<Cmd> {
+    fn choose_at(&mut self, y: u16) -> Option<Cmd> {
         if self.help.is_some() {
             return None;
         }
-        let body = frame::body(Rect::new(0, 0, columns, rows), &self.view);
-        let (_, area) =
-            lines::split(body, frame::lost(&self.view, self.front, self.theme, usize::from(columns)).len() as u16);
+        let area = self.screen_area();
         self.dirty = true;
         let again = match self.front {
             ScreenId::Connect => {
@@ -140,7 +135,7 @@ impl App {
         again.then_some(Cmd::Accept)
     }
 
-    pub(super) fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+    fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
         if self.is_too_small() {
             return self.key_unseen(key, effects);
         }
@@ -159,24 +154,14 @@ impl App {
                     self.popup = None;
                     self.give_up_opening(effects);
                 }
-                Answer::Stay => {}
-                Answer::Close => self.popup = None,
-                Answer::Act(action) => {
-                    self.popup = None;
-                    self.perform(action, effects);
-                }
-                Answer::Meanwhile(action) => self.perform(action, effects),
+                answer => self.answered(answer, effects),
             }
             return;
         }
+        let area = self.screen_area();
         if let Some(help) = &mut self.help {
-            let page = isize::from(i16::try_from(self.size.1).unwrap_or(i16::MAX)) / 2;
-            match key.code {
-                KeyCode::Up => return help.scroll(-1),
-                KeyCode::Down => return help.scroll(1),
-                KeyCode::PageUp => return help.scroll(-page),
-                KeyCode::PageDown => return help.scroll(page),
-                _ => {}
+            if help.scrolls(key.code, self.front, area) {
+                return;
             }
             self.help = None;
             if self.front == ScreenId::Terminal && Press::Ctrl(']').is(key) {
@@ -224,25 +209,45 @@ impl App {
         }
     }
 
-    pub(super) fn paste(&mut self, text: &str) {
-        if self.is_too_small() {
+    /// A question has been answered, or not yet.
+    fn answered(&mut self, answer: Answer, effects: &mut Vec<Effect>) {
+        match answer {
+            Answer::Stay => {}
+            Answer::Close => self.popup = None,
+            Answer::Act(action) => {
+                self.popup = None;
+                self.perform(action, effects);
+            }
+            Answer::Meanwhile(action) => self.perform(action, effects),
+        }
+    }
+
+    fn paste(&mut self, text: &str, effects: &mut Vec<Effect>) {
+        if self.is_too_small() || text.is_empty() {
             return;
         }
         if let Some(popup) = &mut self.popup {
-            return popup.paste(text);
+            let answer = popup.paste(text);
+            return self.answered(answer, effects);
         }
-        if self.front != ScreenId::Terminal || self.help.is_some() {
+        // What cannot be done is said before it is asked about.
+        if self.front != ScreenId::Terminal || self.help.is_some() || !self.can_send() {
             return;
         }
         // Enter is CR on this line (manual, chapter 4); the unit knows ASCII only.
         let joined = text.replace("\r\n", "\r").replace('\n', "\r");
-        let bytes: Vec<u8> = joined.bytes().filter(|byte| matches!(byte, b' '..=b'~' | b'\r' | b'\t')).collect();
-        if !bytes.is_empty() {
-            self.popup = Some(Popup::Asking(Question::Paste(bytes)));
+        let is_known = |character: &char| matches!(character, ' '..='~' | '\r' | '\t');
+        let bytes: Vec<u8> = joined.chars().filter(is_known).map(|character| character as u8).collect();
+        let left_out = joined.chars().count() - bytes.len();
+        match bytes.is_empty() {
+            true => {
+                self.view.tell(Tone::Bad, "Not sent: the unit knows none of these characters; it takes ASCII only.")
+            }
+            false => self.ask(Question::Paste { bytes, left_out }),
         }
     }
 
-    pub(super) fn on(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
+    fn on(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
         match cmd {
             Cmd::Menu(menu) => self.menu(menu, effects),
             Cmd::Go(screen) => self.perform(Action::Go(screen), effects),
@@ -261,11 +266,12 @@ impl App {
                 self.theme = Theme::new(self.theme.palette().next());
                 self.view.tell(Tone::Quiet, format!("Colours: {}.", self.theme.palette().words()));
             }
-            Cmd::Reconnect => {
-                if matches!(self.view.link.state, LinkState::Lost(_)) {
-                    self.perform(Action::Reconnect, effects);
+            Cmd::Reconnect => match self.view.link.state {
+                LinkState::Lost(_) => self.perform(Action::Reconnect, effects),
+                LinkState::Closed | LinkState::Opening | LinkState::Open { .. } => {
+                    self.view.tell(Tone::Quiet, "No link is lost: 1 lists links.");
                 }
-            }
+            },
             Cmd::Up
             | Cmd::Down
             | Cmd::PageUp
@@ -312,23 +318,23 @@ impl App {
         lines::split(area, lost).1
     }
 
-    pub(super) fn screen(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
-        let area = frame::body(Rect::new(0, 0, self.size.0, self.size.1), &self.view);
+    /// A key of the screen in front.
+    fn screen(&mut self, cmd: Cmd, effects: &mut Vec<Effect>) {
+        let area = self.screen_area();
         let page = usize::from(area.height);
-        let below_lost = self.screen_area();
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         let action = match self.front {
             ScreenId::Connect => self.connect.on(cmd, &self.view),
             ScreenId::Overview => {
-                let faults = self.overview.faults_at(self.scene(), below_lost);
+                let faults = self.overview.faults_at(self.scene(), area);
                 self.overview.on(cmd, self.view.monitor.stream.channels.len(), faults)
             }
-            ScreenId::Terminal => self.terminal.on(cmd, &self.view, &self.scrollback, record, below_lost),
+            ScreenId::Terminal => self.terminal.on(cmd, &self.view, &self.scrollback, record, area),
             ScreenId::Load => self.load.on(cmd, &self.view, area),
             ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
             ScreenId::Stream => self.stream.on(cmd, &self.view),
             ScreenId::Diagnostics => {
-                let last = Diagnostics::last(self.scene(), below_lost);
+                let last = Diagnostics::last(self.scene(), area);
                 self.diagnostics.on(cmd, last, page)
             }
             ScreenId::Recordings => self.recordings.on(cmd, &self.view),
@@ -340,7 +346,7 @@ impl App {
     }
 
     /// A key of the unit's menu.
-    pub(super) fn menu(&mut self, menu: MenuCmd, effects: &mut Vec<Effect>) {
+    fn menu(&mut self, menu: MenuCmd, effects: &mut Vec<Effect>) {
         if menu == MenuCmd::Load {
             // Files can be looked at without a unit.
             return self.perform(Action::Go(ScreenId::Load), effects);

@@ -46,11 +46,16 @@ impl App {
     }
 
     /// Opens a link. The open one stays until that has worked, so that a name typed wrong costs nothing; only the same
-    /// port cannot be opened twice.
+    /// port cannot be opened twice. So does a lost one: what it has shown is all there is until another link is open, and
+    /// its cable may be plugged in again meanwhile.
     pub(super) fn open(&mut self, link: String, effects: &mut Vec<Effect>) {
-        let is_open = matches!(self.view.link.state, LinkState::Open { .. });
-        if !is_open || self.view.link.name.as_ref() == Some(&link) {
-            if is_open {
+        let stays = match self.view.link.state {
+            LinkState::Open { .. } => self.view.link.name.as_ref() != Some(&link),
+            LinkState::Lost(_) => true,
+            LinkState::Closed | LinkState::Opening => false,
+        };
+        if !stays {
+            if matches!(self.view.link.state, LinkState::Open { .. }) {
                 effects.push(Effect::CloseLink);
             }
             self.session = None;
@@ -119,6 +124,14 @@ impl App {
         self.session = None;
         self.begin_link(Link::default());
         self.view.tell(Tone::Quiet, "The link is closed.");
+        self.list_recordings_in_front(effects);
+    }
+
+    /// Which recordings there are, and which are being written, changes with the links.
+    fn list_recordings_in_front(&self, effects: &mut Vec<Effect>) {
+        if self.front == ScreenId::Recordings {
+            effects.push(Effect::ListRecordings);
+        }
     }
 
     /// Another link. Rows that go to a file go on if it is the same link again.
@@ -148,12 +161,13 @@ impl App {
             self.connect.opened(&info.link);
         }
         self.scrollback.begin(now, format!("connected to {}", visible::text(&info.link)));
-        self.begin_session(info);
+        self.begin_session(info, effects);
         // Who has chosen a recording wants to steer it.
         self.front = if self.front == ScreenId::Recordings { self.front } else { ScreenId::Overview };
         if !read_only {
             self.command(Command::Identify);
         }
+        self.list_recordings_in_front(effects);
     }
 
     /// The terminal begins anew: what it shows has happened at other times of day, or has not happened yet.
@@ -163,7 +177,7 @@ impl App {
     }
 
     /// A session on the link that has just been opened.
-    pub(super) fn begin_session(&mut self, info: LinkInfo) {
+    pub(super) fn begin_session(&mut self, info: LinkInfo, effects: &mut Vec<Effect>) {
         let session = if info.read_only { Session::of_recording } else { Session::new };
         self.session = Some(session(info.baud));
         self.start_of_day = info.start_of_day;
@@ -176,10 +190,11 @@ impl App {
             state: LinkState::Open { read_only: info.read_only },
             ..Link::default()
         });
+        self.terminal.begin_record();
         self.dictionary.begin_link();
         self.stream.begin_link();
         self.bench.begin_link();
-        self.load.begin_unit();
+        self.forget_loader(effects);
         if info.read_only {
             // What goes by in a recording is understood as it goes by; nothing is sent for it.
             self.command(Command::Overhear);
@@ -188,13 +203,13 @@ impl App {
     }
 
     /// The recording is played from its beginning again: nothing of it has happened yet.
-    pub(super) fn played_anew(&mut self, now: Instant, info: LinkInfo) {
+    pub(super) fn played_anew(&mut self, now: Instant, info: LinkInfo, effects: &mut Vec<Effect>) {
         self.dirty = true;
         if matches!(self.view.link.state, LinkState::Open { read_only: true }) {
             let playing = self.view.playing;
             self.forget_lines();
             self.scrollback.begin(now, "from the beginning".into());
-            self.begin_session(info);
+            self.begin_session(info, effects);
             self.view.playing = playing;
         }
     }
@@ -222,6 +237,7 @@ impl App {
             if self.opening.is_none() && self.popup.as_ref().is_some_and(Popup::ends_with_link) {
                 self.popup = None;
             }
+            self.list_recordings_in_front(effects);
         }
     }
 
@@ -307,10 +323,17 @@ impl App {
         self.dictionary.begin_link();
         self.stream.begin_link();
         self.bench.begin_link();
-        self.load.begin_unit();
+        self.forget_loader(effects);
         self.scrollback.note(self.now, text.clone());
         effects.push(Effect::Mark(text.clone()));
         self.view.tell(Tone::Bad, text);
+    }
+
+    /// What was said of the loader was said of another unit's; a file that was judged for it is judged anew.
+    fn forget_loader(&mut self, effects: &mut Vec<Effect>) {
+        if let Some(action) = self.load.begin_unit() {
+            self.perform(action, effects);
+        }
     }
 
     /// What happens from now on is not in the recording. That stays in sight: who has to prove something later must know.

@@ -94,14 +94,18 @@ fn the_kind_of_loader_is_chosen_on_the_load_screen_judged_and_ordered() {
         let words = kind.map_or("believed of every".to_owned(), |kind| format!("{}, as chosen", kind.name()));
         assert!(stage.shows(&words), "{}", stage.picture());
     }
-    // Of another unit nothing is known.
-    stage.keys("1").press(KeyCode::Enter).keys("y").opened("/dev/ttyUSB0").keys("4");
+    // Of another unit nothing is known, and what was judged for the loader of this one is judged anew.
+    stage.keys("1").press(KeyCode::Enter).keys("y").asked();
+    stage.opened("/dev/ttyUSB0");
+    let anew = Effect::CheckImage { path: good_image().path, loader: None, allow: Vec::new() };
+    assert!(stage.asked().contains(&anew));
+    stage.input(Input::ImageChecked(Box::new(good_image()))).keys("4");
     assert!(stage.shows("believed of every"), "{}", stage.picture());
 }
 
 #[test]
 fn an_image_is_sent_as_it_is_only_after_y() {
-    let mut stage = super::asked_to_send(SMALL, "AXTC4CO_V1.2.0.elf.S");
+    let mut stage = asked_to_send(SMALL, "AXTC4CO_V1.2.0.elf.S");
     stage.asked();
     stage.press(KeyCode::Enter);
     assert!(stage.asked().is_empty() && stage.shows("all the same"), "{}", stage.picture());

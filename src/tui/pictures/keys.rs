@@ -147,10 +147,14 @@ fn a_recording_is_steered_by_its_keys() {
     plays(&mut stage, 50, Pace::Paused);
     stage.keys(" ");
     assert_eq!(stage.asked(), [Effect::Play(Playback::Pace(Pace::Times(5)))], "as fast as before the pause");
-    plays(&mut stage, 100, Pace::AtOnce);
-    plays(&mut stage, 100, Pace::Paused);
-    stage.keys(" ");
-    assert_eq!(stage.asked(), [Effect::Play(Playback::Again(Pace::Times(1)))], "from the beginning");
+    // As every recording stands that has just been opened, and as one that was played to its end.
+    for pace in [Pace::AtOnce, Pace::Times(1), Pace::Paused] {
+        plays(&mut stage, 100, pace);
+        stage.keys(" ");
+        assert_eq!(stage.asked(), [Effect::Play(Playback::Again(Pace::Times(1)))], "from the beginning, {pace:?}");
+    }
+    stage.input(Input::Playing(Playing { position: seconds(0), length: Some(seconds(3600)), pace: Pace::Paused }));
+    assert!(stage.shows("Arrows move 36 s"), "{}", stage.picture());
 }
 
 #[test]

@@ -242,3 +242,30 @@ fn a_question_outlives_the_link_but_not_the_unit_it_was_about() {
     stage.bytes(String::from_utf8_lossy(BANNER).replace("V1.1.0", "V9.9.9").as_bytes()).wait(5000);
     assert!(stage.shows("Another unit") && !stage.shows("› Ye"), "{}", stage.picture());
 }
+
+#[test]
+fn c_on_a_lost_link_that_is_not_there_yet_gives_nothing_up() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.lost().asked();
+    stage.keys("c");
+    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB0".into())], "the loop goes on looking for the cable");
+    stage.input(Input::LinkFailed(Failure { text: "no such port".into(), hints: Vec::new() }));
+    assert!(stage.shows("Not connected") && stage.shows("No such port"), "{}", stage.picture());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("AXTC4CO 1.1.0") && stage.shows("Link lost: ") && stage.shows("TC1 "), "{}", stage.picture());
+    stage.keys("c").press(KeyCode::Esc);
+    assert!(stage.asked().ends_with(&[Effect::DoNotOpen]) && stage.shows("Link lost: "), "{}", stage.picture());
+    stage.input(Input::LinkBack("/dev/ttyUSB0".into())).bytes(MENU).wait(5000);
+    assert!(stage.shows("the AXTC4CO answers as before") && stage.shows("TC1 "), "{}", stage.picture());
+    stage.keys("c");
+    assert!(stage.shows("No link is lost"), "{}", stage.picture());
+}
+
+#[test]
+fn the_bytes_of_a_new_connection_are_in_sight_wherever_the_hex_view_was_stopped() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").prefix().keys("h").press(KeyCode::Home);
+    assert!(stage.shows("stopped"), "{}", stage.picture());
+    stage.lost().prefix().keys("c").opened("/dev/ttyUSB0").bytes(b"fresh").keys("3");
+    assert!(stage.shows("66 72 65 73 68"), "{}", stage.picture());
+}

@@ -4,7 +4,10 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::stage::*;
 use crate::image::DefectId;
-use crate::tui::{Effect, FileEntry, FileKind, ImageFacts, Input};
+use crate::record::Span;
+use crate::session::{Event, Facts, Known, LoadReport, Origin, Outcome, UnitNow, UnitState, Verdict};
+use crate::tui::{Effect, FileEntry, FileKind, ImageFacts, Input, Noted};
+use crate::version::Version;
 
 #[test]
 fn a_unit_in_its_loader_is_asked_for_no_password_and_an_empty_one_is_named() {
@@ -134,4 +137,69 @@ fn enter_says_what_stands_against_an_upload() {
     let mut stage = Stage::connected(SMALL).with_image(bad_image());
     stage.press(KeyCode::Enter);
     assert!(stage.shows("Not started: the file has errors"), "{}", stage.picture());
+}
+
+/// A unit of this product that runs this version, or says nothing of it; the file is V1.2.0.
+fn report_beside(size: (u16, u16), product: &str, version: Option<Version>) -> Stage {
+    let mut stage = Stage::connected(size).with_image(good_image());
+    let known = |value: String| Known { value, origin: Origin::Menu, span: Span::default() };
+    let version = version.map(|value| Known { value, origin: Origin::Menu, span: Span::default() });
+    let product = Some(known(product.to_owned()));
+    stage
+        .fold_with(Event::FactsChanged, &Facts { state: UnitState::Application, product, version, ..Facts::default() });
+    stage
+}
+
+#[test]
+fn what_stands_against_an_upload_can_be_read_to_its_end() {
+    let stage = report_beside(SMALL, "AXTC4CO", Some(Version::new(1, 10, 0)));
+    let picture = stage.picture();
+    for word in "Cannot start: the image is V1.2.0, older than the V1.10.0 that the unit runs. O sends it all the same."
+        .split(' ')
+    {
+        assert!(picture.contains(word), "no '{word}': {picture}");
+    }
+    assert!(picture.contains("(older: a downgrade)"), "{picture}");
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    stage.keys("k");
+    assert!(stage.shows("the loader needs."), "{}", stage.picture());
+}
+
+#[test]
+fn a_version_that_nobody_knows_is_remarked_upon() {
+    let remark = "Note        Nobody knows which version the unit has: the file may be older.";
+    for size in [SMALL, LARGE] {
+        let stage = report_beside(size, "AXTC4CO", None);
+        assert!(stage.shows(remark) && stage.shows("(cannot be compared)"), "{}", stage.picture());
+        let stage = report_beside(size, "AXTC4CO", Some(Version::new(1, 1, 0)));
+        assert!(!stage.shows("Note") && stage.shows("(newer)"), "{}", stage.picture());
+        let stage = report_beside(size, "AXRTD8CO", None);
+        assert!(!stage.shows("Note") && stage.shows("Cannot start"), "another product: {}", stage.picture());
+        let stage = Stage::connected(size).with_image(nameless_image(&[DefectId::NoIdentity]));
+        assert!(stage.shows("The file does not say its version"), "{}", stage.picture());
+        // What the note of an upload knows is compared with.
+        let noted = noted("AXTC4CO").map(|noted| Noted { ran: Some(Version::new(1, 1, 0)), ..noted });
+        let stage = Stage::in_loader(size, noted).with_image(good_image());
+        assert!(!stage.shows("Note") && stage.shows("(newer)"), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn what_to_do_next_stands_below_any_number_of_words_of_the_unit() {
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    let report = LoadReport { heard: "\u{9b}noise ".repeat(200), ..report(Verdict::Failed, UnitNow::Loader) };
+    stage.fold(Event::Finished(Outcome::Loaded(Box::new(report))));
+    assert!(
+        stage.shows("What next   Keep the unit powered") && stage.shows("back to the loader."),
+        "{}",
+        stage.picture()
+    );
+    assert!(stage.shows("Heard  ") && stage.shows(" …") && stage.shows("Enter goes back"), "{}", stage.picture());
+}
+
+#[test]
+fn all_findings_can_be_reached_while_the_link_is_lost() {
+    let mut stage = Stage::connected(SMALL).with_image(bad_image());
+    stage.lost().press(KeyCode::End);
+    assert!(stage.shows("── Findings ──") && !stage.shows("more line"), "{}", stage.picture());
 }

@@ -3,8 +3,10 @@
 use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
 
 use super::stage::*;
+use crate::record::Span;
+use crate::session::{Event, Facts, Known, Origin};
 use crate::time::Duration;
-use crate::tui::{Effect, Input, RecordingEntry};
+use crate::tui::{Effect, Failure, Input, LinkInfo, Recorded, RecordingList};
 
 /// The terminal with a hundred lines, each with its number.
 fn hundred_lines() -> Stage {
@@ -116,6 +118,9 @@ fn a_page_of_diagnostics_keeps_its_rows_whole_and_says_how_many_numbers_stand_be
         }
         assert!(seen.contains("RTD8 resistance") && seen.contains("Active Errors   "), "all can be reached: {seen}");
         assert!(!stage.shows("─ ↓ ") && !stage.shows("and ↓"), "the end: {}", stage.picture());
+        let end = stage.picture();
+        stage.press(KeyCode::Home).press(KeyCode::End);
+        assert_eq!(stage.picture(), end);
         assert!(seen.contains("─ ↓ ") || size != SMALL, "{size:?}: {seen}");
     }
 }
@@ -178,24 +183,56 @@ fn the_footer_names_as_many_keys_as_have_room_and_always_the_way_out() {
 }
 
 #[test]
-fn a_recording_s_name_stays_in_one_piece_and_the_one_being_written_is_called_that() {
+fn a_recording_s_name_stays_in_one_piece_and_those_being_written_are_called_that() {
     let name = "2026-01-31T12-00-00.cast";
-    let entry = |path: String| RecordingEntry {
-        link: format!("replay:{path}"),
-        begun: "2026-01-31 12:00:00".into(),
-        port: "/dev/ttyUSB0".into(),
-        part: 1,
-        length: Some(Duration::from_secs(1)),
-        bytes: 99,
+    let entry = |port: &str, is_being_written| {
+        let mut entry = recording("2026-01-31 12:00:00", port, 1, Some(Duration::from_secs(1)));
+        entry.link = format!("replay:/home/{}/{name}", "a".repeat(47));
+        entry.content = entry.content.map(|recorded| Recorded { is_being_written, ..recorded });
+        entry
     };
     let mut stage = Stage::connected(SMALL);
-    let written = link_info("x").recording.expect("one");
-    let long = format!("/home/{}/{name}", "a".repeat(47));
-    stage.keys("8").input(Input::RecordingsListed(Ok(vec![entry(long), entry(written)])));
+    stage.keys("8").recordings(vec![entry("u1", false), entry("u2", true), entry("u3", true)]);
     let picture = stage.picture();
     assert!(picture.contains(name), "{picture}");
-    let rows: Vec<&str> = picture.lines().filter(|line| line.contains("ttyUSB0") && line.contains("2026")).collect();
-    assert!(!rows[0].contains("being written") && rows[1].contains("being written"), "{picture}");
+    let is_written = |port: &str| picture.lines().any(|line| line.contains(port) && line.contains("being written"));
+    assert_eq!(["  u1", "  u2", "  u3"].map(is_written), [false, true, true], "{picture}");
+}
+
+#[test]
+fn what_cannot_be_read_is_listed_with_its_reason_and_what_is_left_out_is_counted() {
+    for size in [SMALL, LARGE] {
+        let mut stage = Stage::with_ports(size);
+        let why = "line 1: this is no asciicast recording: expected value at column 1";
+        let entries = vec![
+            no_recording("/home/user/20260301T120000Z-c-1.cast", why),
+            recording("2026-01-31 11:00:00", "/dev/ttyUSB0", 1, Some(Duration::from_secs(300))),
+        ];
+        stage.keys("8").input(Input::RecordingsListed(Ok(RecordingList { entries, older: 7 })));
+        let picture = stage.picture();
+        assert!(picture.contains("20260301T120000Z-c-1.cast  cannot be read: line 1: this is no"), "{picture}");
+        assert!(picture.contains("2 of 9, newest first"), "{picture}");
+        for word in why.split(' ') {
+            assert!(picture.contains(word), "all of the reason stands below: no '{word}' in {picture}");
+        }
+        assert!(!picture.contains("Attach this file"), "{picture}");
+        stage.press(KeyCode::Down);
+        assert!(stage.shows("Attach this file"), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn the_list_of_recordings_is_read_anew_when_a_link_opens_or_ends_in_front_of_it() {
+    let mut stage = Stage::connected(SMALL).with_recordings();
+    let is_read = |stage: &mut Stage| stage.asked().contains(&Effect::ListRecordings);
+    assert!(is_read(&mut stage), "as the screen comes to the front");
+    stage.lost();
+    assert!(is_read(&mut stage), "its recording is not written any more");
+    stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    assert!(is_read(&mut stage));
+    stage.keys("1").asked();
+    stage.keys("x");
+    assert!(!is_read(&mut stage), "nobody looks at it");
 }
 
 #[test]
@@ -222,4 +259,89 @@ fn help_says_that_more_follows_and_keeps_keys_apart_from_what_they_do() {
         stage.press(KeyCode::Down);
     }
     assert!(stage.shows("lines above") && !stage.shows("below"), "{}", stage.picture());
+    let end = stage.picture();
+    stage.press(KeyCode::Up);
+    assert!(
+        stage.picture() != end && stage.shows("1 more line below"),
+        "one step back is one line: {}",
+        stage.picture()
+    );
+    stage.press(KeyCode::End);
+    assert_eq!(stage.picture(), end);
+    stage.press(KeyCode::Home);
+    assert!(stage.shows("── Load software"), "{}", stage.picture());
+    stage.press(KeyCode::Enter);
+    assert!(!stage.shows("more lines below"), "any other key leaves it: {}", stage.picture());
+}
+
+#[test]
+fn all_keys_can_be_read_on_a_terminal_that_is_wide_and_low() {
+    for size in [(160, 24), (160, 40), (200, 60)] {
+        let mut stage = Stage::connected(size);
+        stage.keys("3").press(KeyCode::F(1));
+        let mut seen = stage.picture();
+        for _ in 0..60 {
+            stage.press(KeyCode::Down);
+            seen.push_str(&stage.picture());
+        }
+        for words in ["send a break", "connect again after the link was lost", "believes only the banner"] {
+            assert!(seen.contains(words), "{size:?}: no '{words}'");
+        }
+    }
+}
+
+#[test]
+fn the_keys_of_a_question_stay_in_sight_whatever_it_has_to_say() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).input(Input::LinkFailed(Failure {
+        text: "cannot open /dev/ttyUSB0: ".to_owned() + &"permission denied ".repeat(12),
+        hints: vec!["Ask whoever looks after this computer. ".repeat(4); 5],
+    }));
+    assert!(stage.shows("Enter close") && stage.shows("│ …"), "{}", stage.picture());
+    stage.click("Enter close");
+    assert!(!stage.shows("Not connected ─"), "{}", stage.picture());
+    // All that can be said of a stream at once.
+    let mut stage = Stage::streaming(SMALL);
+    stage.fold_with(Event::FactsChanged, &Facts { product: stage_product(), ..Facts::default() });
+    stage.keys("tp1");
+    assert!(stage.shows("unit will leave rows out.") && stage.shows("in the recording only."), "{}", stage.picture());
+    assert!(stage.shows("Enter switch on") && stage.shows("Every, in ms: › 1"), "{}", stage.picture());
+}
+
+fn stage_product() -> Option<Known<String>> {
+    Some(Known { value: "AXTC4CO".to_owned(), origin: Origin::Menu, span: Span::default() })
+}
+
+#[test]
+fn a_channel_is_chosen_also_when_the_unit_has_fewer_than_the_one_before() {
+    for screen in ["2", "6"] {
+        let mut stage = Stage::eight_channels(LARGE);
+        stage.keys(screen);
+        (0..7).for_each(|_| {
+            stage.press(KeyCode::Down);
+        });
+        assert!(stage.shows("› RTD8"), "{}", stage.picture());
+        stage.bytes(b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n");
+        assert!(stage.shows("› TC4"), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn a_narrower_window_stays_where_somebody_looks() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.keys("6z").press(KeyCode::Left);
+    (0..40).for_each(|_| {
+        stage.press(KeyCode::Left);
+    });
+    let looked_at = |stage: &Stage| {
+        let picture = stage.picture();
+        picture.split("At ").nth(1).map(|text| text[..8].to_owned()).expect("a time")
+    };
+    let at = looked_at(&stage);
+    stage.keys("zzzz");
+    assert!(stage.shows("1 minute, held") && looked_at(&stage) == at, "{}", stage.picture());
+    let picture = stage.picture();
+    let axis = picture.lines().rev().find(|line| line.contains("12:0") && line.trim_start().starts_with("12:"));
+    let first = axis.and_then(|line| line.split_whitespace().next()).expect("times below the axis").to_owned();
+    assert!(first <= at, "{at} is in sight: {picture}");
 }

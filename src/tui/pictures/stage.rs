@@ -20,7 +20,7 @@ use crate::session::{
 use crate::time::{Duration, Instant};
 use crate::tui::{
     App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Noted, Options, Palette, PortEntry,
-    RecordingEntry,
+    Recorded, RecordingEntry, RecordingList,
 };
 use crate::version::Version;
 
@@ -151,19 +151,17 @@ impl Stage {
 
     /// On the screen of recordings, two there.
     pub(super) fn with_recordings(mut self) -> Self {
-        let entry = |begun: &str, port: &str, part, length| RecordingEntry {
-            link: format!("replay:/home/user/{begun}.cast"),
-            begun: begun.into(),
-            port: port.into(),
-            part,
-            length,
-            bytes: 1_234_567,
-        };
-        self.keys("8").input(Input::RecordingsListed(Ok(vec![
-            entry("2026-01-31 11:00:00", "/dev/ttyUSB0", 1, Some(Duration::from_secs(300))),
-            entry("2026-01-30 09:15:00", "rfc2217://terminal-server-in-hall-4:4001", 2, None),
-        ])));
+        self.keys("8");
+        self.recordings(vec![
+            recording("2026-01-31 11:00:00", "/dev/ttyUSB0", 1, Some(Duration::from_secs(300))),
+            recording("2026-01-30 09:15:00", "rfc2217://terminal-server-in-hall-4:4001", 2, None),
+        ]);
         self
+    }
+
+    /// These recordings are there, and no others.
+    pub(super) fn recordings(&mut self, entries: Vec<RecordingEntry>) -> &mut Self {
+        self.input(Input::RecordingsListed(Ok(RecordingList { entries, older: 0 })))
     }
 
     /// On the load screen, the folder read.
@@ -297,6 +295,20 @@ impl Stage {
     pub(super) fn shows(&self, text: &str) -> bool {
         self.picture().contains(text)
     }
+}
+
+/// A recording that can be read, named by when it was begun.
+pub(super) fn recording(begun: &str, port: &str, part: u32, length: Option<Duration>) -> RecordingEntry {
+    RecordingEntry {
+        link: format!("replay:/home/user/{begun}.cast"),
+        bytes: 1_234_567,
+        content: Ok(Recorded { begun: begun.into(), port: port.into(), part, length, is_being_written: false }),
+    }
+}
+
+/// A file with the name of a recording, and why it is none.
+pub(super) fn no_recording(path: &str, why: &str) -> RecordingEntry {
+    RecordingEntry { link: format!("replay:{path}"), bytes: 12, content: Err(why.into()) }
 }
 
 /// What is in the folder of images.
@@ -433,5 +445,22 @@ pub(super) fn typed(mut stage: Stage, keys: &str) -> Stage {
 
 pub(super) fn pressed(mut stage: Stage, code: KeyCode) -> Stage {
     stage.press(code);
+    stage
+}
+
+/// On the terminal, asked for a file to send.
+pub(super) fn to_send(size: (u16, u16)) -> Stage {
+    let mut stage = Stage::connected(size);
+    stage.keys("3").prefix().keys("f");
+    stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(files()) });
+    stage
+}
+
+/// A file is chosen and read; it is asked once more.
+pub(super) fn asked_to_send(size: (u16, u16), name: &str) -> Stage {
+    let mut stage = to_send(size);
+    stage.keys(name).press(KeyCode::Enter);
+    let path = format!("/home/service/images/{name}").into();
+    stage.input(Input::BytesRead { path, bytes: Ok(vec![b'S'; 242_742]) });
     stage
 }

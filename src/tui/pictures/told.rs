@@ -3,10 +3,12 @@
 use ratatui::crossterm::event::{KeyCode, KeyModifiers};
 
 use super::stage::*;
+use crate::canopen::ObjectAddress;
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::image::DefectId;
-use crate::session::{Event, Facts, UnitState};
+use crate::record::Span;
+use crate::session::{DictionaryReading, Event, Facts, Outcome, ReadEntry, UnitState};
 use crate::tui::popup::ORDERS;
 use crate::tui::{Effect, Input, LinkInfo};
 use crate::wire::stream::Source;
@@ -235,4 +237,17 @@ fn packed_records_are_counted_before_they_are_sent() {
     let picture = stage.picture();
     assert!(picture.contains("packed from 242,742") && picture.contains("K packed: on"), "{picture}");
     assert!(!picture.contains("3,074 records"), "{picture}");
+}
+
+#[test]
+fn one_is_one_and_not_ones() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("v").press(KeyCode::Enter);
+    let at = ObjectAddress::new(0x1001, 0);
+    let entry = ReadEntry { at, value: None, text: "?".into(), span: Span::default(), known: true };
+    for (complete, told) in [(true, "The dictionary is read: 1 entry, "), (false, "was shown: 1 entry was read.")] {
+        let reading = DictionaryReading { entries: vec![entry.clone()], complete, unrecognised_lines: 0 };
+        stage.finished(Outcome::DictionaryRead(Box::new(reading)));
+        assert!(stage.shows(told), "{}", stage.picture());
+    }
 }

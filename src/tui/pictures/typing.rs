@@ -1,6 +1,6 @@
 //! What is typed, pasted and printed, in sentences.
 
-use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode};
+use ratatui::crossterm::event::{Event as TerminalEvent, KeyCode, KeyModifiers};
 
 use super::stage::*;
 use crate::tui::{Effect, Input};
@@ -77,4 +77,67 @@ fn a_break_is_sent_by_its_key_and_stands_between_the_lines_and_in_the_recording(
     assert!(stage.shows("── break sent"), "{}", stage.picture());
     stage.input(Input::BreakSent(Err("this link cannot send one".into())));
     assert!(stage.shows("No break sent: this link cannot send one."), "{}", stage.picture());
+}
+
+fn paste(stage: &mut Stage, text: &str) {
+    stage.input(Input::Terminal(TerminalEvent::Paste(text.into())));
+}
+
+#[test]
+fn pasted_words_are_looked_for_at_once() {
+    let mut stage = Stage::with_dictionary(SMALL);
+    stage.keys("/");
+    paste(&mut stage, "sensor type\nand more");
+    assert!(stage.shows("with 'sensor type'") && stage.shows("6110:01"), "{}", stage.picture());
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("with 'sensor type'"), "{}", stage.picture());
+}
+
+#[test]
+fn pasted_text_answers_no_question_and_takes_nothing_out_of_it() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").sent();
+    paste(&mut stage, "abc");
+    paste(&mut stage, "yes");
+    assert!(stage.sent().is_empty() && stage.shows("3 characters, one line"), "{}", stage.picture());
+    stage.keys("y");
+    assert_eq!(stage.sent(), b"abc");
+    // Another link was to be opened, and still is.
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("1").press(KeyCode::Down).press(KeyCode::Enter);
+    paste(&mut stage, "y");
+    stage.asked();
+    stage.keys("y");
+    assert_eq!(stage.asked(), [Effect::OpenLink("/dev/ttyUSB1".into())]);
+}
+
+#[test]
+fn what_of_a_paste_the_unit_does_not_know_is_told_before_it_is_sent() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3").sent();
+    paste(&mut stage, "m");
+    assert!(stage.shows("1 character, one line, goes to the unit") && !stage.shows("Left out"), "{}", stage.picture());
+    stage.press(KeyCode::Esc);
+    paste(&mut stage, "23 °C ≈ warm");
+    assert!(stage.shows("10 characters, one line, go") && stage.shows("Left out: 2 characters"), "{}", stage.picture());
+    stage.keys("y");
+    assert_eq!(stage.sent(), b"23 C  warm");
+    paste(&mut stage, "°");
+    assert!(stage.shows("Not sent: the unit knows none of these"), "{}", stage.picture());
+    stage.lost();
+    paste(&mut stage, "m");
+    assert!(stage.shows("Not sent: the link is lost.") && !stage.shows("Send the pasted"), "{}", stage.picture());
+}
+
+#[test]
+fn a_complaint_goes_when_what_it_is_about_does() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("t70000").press(KeyCode::Enter);
+    assert!(stage.shows("A whole number of milliseconds"), "{}", stage.picture());
+    stage.press(KeyCode::Backspace);
+    assert!(stage.shows("7000") && !stage.shows("A whole number"), "{}", stage.picture());
+    stage.press(KeyCode::Esc).keys("dyes").press(KeyCode::Enter);
+    assert!(stage.shows("Only the word Yes"), "{}", stage.picture());
+    stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL);
+    assert!(!stage.shows("Only the word Yes"), "{}", stage.picture());
 }

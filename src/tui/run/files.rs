@@ -1,16 +1,16 @@
-//! What the console asks of files, folders and ports; each is done in a thread of its own.
+//! What the console asks of files, folders and ports; all of it is done in threads.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::super::picker::is_image_name;
-use super::super::{FIRST_BYTES, FileEntry, FileKind, Input, LARGEST_TEXT, PortEntry, RecordingEntry};
+use super::super::{
+    FIRST_BYTES, FileEntry, FileKind, Input, LARGEST_TEXT, MOST_LISTED, PortEntry, Recorded, RecordingEntry,
+    RecordingList,
+};
 use crate::host::save::{SaveError, save};
 use crate::host::{self, library, ports, recorder};
-
-/// Entries of a folder that are shown at most.
-const MOST_ENTRIES: usize = 10_000;
 
 /// The serial ports.
 pub(super) fn ports() -> Result<Vec<PortEntry>, String> {
@@ -48,7 +48,7 @@ pub(super) fn folder(directory: &Path) -> Input {
     let entries = fs::read_dir(&directory).map_err(|error| error.to_string()).map(|entries| {
         entries
             .flatten()
-            .take(MOST_ENTRIES)
+            .take(MOST_LISTED)
             .filter_map(|entry| {
                 // Behind a link, what it leads to.
                 let metadata = fs::metadata(entry.path()).ok()?;
@@ -77,29 +77,33 @@ fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// The recordings: those of the state directory, and the one that this console writes, which may lie elsewhere.
-pub(super) fn recordings(written: Option<PathBuf>) -> Result<Vec<RecordingEntry>, String> {
+pub(super) fn recordings(written: Option<PathBuf>) -> Result<RecordingList, String> {
     let written = written.and_then(library::look);
     let in_state =
         recorder::folder().ok_or("this system does not say where programs keep their state").map_err(str::to_owned);
     let in_state = in_state.and_then(|folder| {
         library::list(&folder).map_err(|error| format!("cannot read '{}': {error}", folder.display()))
     });
-    let mut listed = match in_state {
-        Err(_) if written.is_some() => Vec::new(),
+    let mut library = match in_state {
+        Err(_) if written.is_some() => library::Library::default(),
         in_state => in_state?,
     };
-    if let Some(written) = written.filter(|written| listed.iter().all(|listed| listed.path != written.path)) {
-        listed.insert(0, written);
+    if let Some(written) = written.filter(|written| library.listed.iter().all(|listed| listed.path != written.path)) {
+        library.listed.insert(0, written);
     }
+    let recorded = |content: library::Content| Recorded {
+        begun: host::clock::local_text(content.header.unix_millis),
+        port: content.header.port,
+        part: content.header.part,
+        length: content.length,
+        is_being_written: content.is_being_written,
+    };
     let entry = |listed: library::Listed| RecordingEntry {
         link: format!("replay:{}", listed.path.display()),
-        begun: host::clock::local_text(listed.header.unix_millis),
-        port: listed.header.port,
-        part: listed.header.part,
-        length: listed.length,
         bytes: listed.bytes,
+        content: listed.content.map(recorded),
     };
-    Ok(listed.into_iter().map(entry).collect())
+    Ok(RecordingList { entries: library.listed.into_iter().map(entry).collect(), older: library.older })
 }
 
 /// Writes a file that is not there yet, whole or not at all.
@@ -163,11 +167,12 @@ mod tests {
         let path = folder.path().join("mine.cast");
         fs::write(&path, "{\"version\": 2, \"width\": 80, \"height\": 24}\n[1.5, \"o\", \"hello\"]\n")
             .expect("written");
-        let listed = recordings(Some(path.clone())).expect("listed");
+        let listed = recordings(Some(path.clone())).expect("listed").entries;
         assert_eq!(listed[0].link, format!("replay:{}", path.display()));
-        assert_eq!(listed[0].length, Some(crate::time::Duration::from_millis(1500)));
+        let length = listed[0].content.as_ref().map(|content| content.length);
+        assert_eq!(length, Ok(Some(crate::time::Duration::from_millis(1500))));
         fs::remove_file(&path).expect("removed");
-        let without = recordings(Some(path)).unwrap_or_default();
+        let without = recordings(Some(path)).map_or_else(|_| Vec::new(), |list| list.entries);
         assert_eq!(without.len(), listed.len() - 1, "what is not there is not listed");
     }
 }

@@ -2,14 +2,15 @@
 //!
 //! Everything that happens comes on one channel; the app is told, its effects are performed in their order, and the
 //! picture is drawn when something has changed: at once after a key, else at most a frame apart. Nothing wakes the
-//! loop without an input or a due timer. Files, ports and folders are looked at in threads of their own, and a network
-//! link is dialled in one, so that a slow disk or a silent host does not hold the keys.
+//! loop without an input or a due timer. Files, ports and folders are looked at in threads of their own, files are written
+//! in one, and a network link is dialled in one, so that a slow disk or a silent host does not hold the keys.
 
 mod connecting;
 mod files;
 mod player;
 #[cfg(all(test, unix))]
 mod tests;
+mod writer;
 
 use std::io;
 use std::path::PathBuf;
@@ -21,6 +22,7 @@ use ratatui::crossterm::event::Event as TerminalEvent;
 
 use connecting::DialResult;
 use player::{Player, Step};
+use writer::{Piece, Writer};
 
 use super::{App, Effect, Failure, ImageFacts, Input, LARGEST_SENT, Noted, Options, Palette, Playback};
 use crate::device::LoaderKind;
@@ -141,6 +143,7 @@ struct Console {
     /// By how much the console's time is ahead of the clock: a recording's time passes in no time.
     skew: Duration,
     recorder: Recorder,
+    writer: Writer,
     /// Links opened so far.
     sessions: u32,
     /// The program is to be stopped as soon as the effects before that are done.
@@ -160,6 +163,13 @@ impl Console {
     ) -> Self {
         let (answer, answers) = channel();
         let (dialling, dialled) = channel();
+        let (written, waker) = (answer.clone(), sender.clone());
+        let writer = Writer::start(move |path, result| {
+            if written.send(Input::FileWritten { path, result }).is_ok() {
+                // A full channel wakes the loop by itself.
+                let _ = waker.try_send(host::Input::Wake);
+            }
+        });
         Console {
             app,
             world,
@@ -178,6 +188,7 @@ impl Console {
             player: None,
             skew: Duration::ZERO,
             recorder: Recorder::nothing(),
+            writer,
             sessions: 0,
             suspends: false,
             over: None,
@@ -354,11 +365,8 @@ impl Console {
         for effect in effects {
             match effect {
                 Effect::OpenLink(name) => {
+                    // One that is open stays until this one is, and one that was lost is looked for until then.
                     self.dial += 1;
-                    if self.link.is_none() && self.player.is_none() {
-                        // The one that was lost is not looked for any more. An open one stays until this one is.
-                        self.close_link();
-                    }
                     match (self.world.resolve)(&name) {
                         Ok(spec) if spec.is_network() => self.dial(name, spec),
                         Ok(spec) => leaves |= self.open(&name, spec),
@@ -392,21 +400,16 @@ impl Console {
                     let bytes = files::bytes(&path, LARGEST_SENT);
                     Input::BytesRead { path, bytes }
                 }),
-                Effect::CreateFile { path, bytes } => {
-                    let result = files::create(&path, &bytes);
-                    leaves |= self.handle(Input::FileWritten { path, result });
-                }
-                Effect::AppendFile { path, bytes } => {
-                    if let Err(why) = files::append(&path, &bytes) {
-                        leaves |= self.handle(Input::FileWritten { path, result: Err(why) });
-                    }
-                }
+                Effect::CreateFile { path, bytes } => self.writer.write(Piece::New(path, bytes)),
+                Effect::AppendFile { path, bytes } => self.writer.write(Piece::More(path, bytes)),
                 Effect::Mark(text) => self.recorder.mark(self.now(), &text),
                 Effect::Play(playback) => self.steer(playback),
-                Effect::Order(line) => self.order(line),
+                Effect::Order(line) => leaves |= self.order(line),
                 Effect::Break => {
-                    let sent = self.link.as_ref().map(Connection::send_break);
-                    let sent = sent.unwrap_or(Ok(())).map_err(|error| error.to_string());
+                    let sent = match &self.link {
+                        Some(link) => link.send_break().map_err(|error| error.to_string()),
+                        None => Err("no link is open".to_owned()),
+                    };
                     leaves |= self.handle(Input::BreakSent(sent));
                 }
                 Effect::CheckImage { path, loader, allow } => {
@@ -491,10 +494,12 @@ impl Console {
         }
     }
 
-    /// Has the emulated unit do something.
-    fn order(&mut self, line: String) {
+    /// Has the emulated unit do something. Gives `true` when the console is to end.
+    fn order(&mut self, line: String) -> bool {
         let (answer, sender) = (self.answer.clone(), self.sender.clone());
-        let Some(link) = &self.link else { return };
+        let Some(link) = &self.link else {
+            return self.handle(Input::Ordered { line, answer: Err("no link is open".to_owned()) });
+        };
         let text = line.clone();
         link.order(&text, move |answered| {
             if answer.send(Input::Ordered { line, answer: answered }).is_ok() {
@@ -502,6 +507,7 @@ impl Console {
                 let _ = sender.try_send(host::Input::Wake);
             }
         });
+        false
     }
 
     /// Finds something out in a thread, which wakes the loop when it has.

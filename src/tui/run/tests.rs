@@ -110,3 +110,42 @@ fn a_path_of_nothing_is_told_as_what_it_is() {
     let picture = terminal.backend().to_string();
     assert!(picture.contains(words) && picture.contains("› /nowhere/x.S"), "{picture}");
 }
+
+#[test]
+fn a_lost_link_is_looked_for_also_after_c_was_pressed_too_early() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (pty, name) = (Pty::open(115_200).expect("a port"), folder.path().join("unit"));
+    let plug_in = || std::os::unix::fs::symlink(pty.path(), &name).expect("a link");
+    plug_in();
+    let mut console = console();
+    type_keys(&mut console, &format!("1p{}\r", name.display()));
+    assert!(console.link.is_some());
+    std::fs::remove_file(&name).expect("removed");
+    console.lose_link(failure());
+    type_keys(&mut console, "c");
+    assert!(console.link.is_none() && console.retry.is_some(), "there is nothing to open yet");
+    plug_in();
+    console.look_for_link();
+    assert!(console.link.is_some() && console.retry.is_none());
+}
+
+#[test]
+fn files_are_written_in_their_order_beside_the_loop_and_are_whole_when_it_ends() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("rows.csv");
+    let mut console = console();
+    let created = |text: &str| Effect::CreateFile { path: path.clone(), bytes: text.into() };
+    let appended = |text: &str| Effect::AppendFile { path: path.clone(), bytes: text.into() };
+    console.perform(vec![created("a"), appended("b"), appended("c")]);
+    // The file of somebody else: what was to stand behind a new one is not put into it.
+    let theirs = folder.path().join("theirs.csv");
+    std::fs::write(&theirs, "theirs").expect("written");
+    let more = Effect::AppendFile { path: theirs.clone(), bytes: "ours".into() };
+    console.perform(vec![Effect::CreateFile { path: theirs.clone(), bytes: "ours".into() }, more]);
+    let answer = || console.answers.recv_timeout(Duration::from_secs(60)).expect("an answer");
+    assert!(matches!(answer(), Input::FileWritten { result: Ok(()), .. }));
+    assert!(matches!(answer(), Input::FileWritten { result: Err(_), .. }), "it is there already");
+    drop(console);
+    let written = |path| std::fs::read_to_string(path).expect("there");
+    assert_eq!((written(&path), written(&theirs)), ("abc".into(), "theirs".into()));
+}

@@ -3,7 +3,7 @@
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 
 use super::{Scene, ScreenId};
 use crate::device::Product;
@@ -97,9 +97,9 @@ impl Connect {
     pub fn recorded(&mut self, recordings: &[RecordingEntry]) {
         // What is open may not be recorded.
         let mut recent: Vec<String> = self.current.iter().cloned().collect();
-        for entry in recordings {
-            if recent.len() < MOST_RECENT && !recent.contains(&entry.port) {
-                recent.push(entry.port.clone());
+        for recorded in recordings.iter().filter_map(|entry| entry.content.as_ref().ok()) {
+            if recent.len() < MOST_RECENT && !recent.contains(&recorded.port) {
+                recent.push(recorded.port.clone());
             }
         }
         self.change(true, |connect| (connect.recent, connect.recordings) = (recent, recordings.len()));
@@ -200,10 +200,11 @@ impl Connect {
         let mut places = Vec::new();
         match &self.ports {
             Ports::Listing => rows.push(Line::styled("  Looking for ports ...", theme.quiet())),
-            Ports::Failed(why) => rows.push(Line::from(vec![
-                Span::styled("  The ports cannot be listed: ", theme.bad()),
-                Span::raw(visible::text(why)),
-            ])),
+            Ports::Failed(why) => {
+                let text = format!("The ports cannot be listed: {}", visible::text(why));
+                let broken = format::wrap(&text, usize::from(columns).saturating_sub(4));
+                rows.extend(broken.into_iter().map(|line| Line::styled(format!("  {line}"), theme.bad())));
+            }
             Ports::Listed(ports) if ports.is_empty() => {
                 rows.push(Line::raw("  None found. Plug in the adapter and press R, or press P to type a path."));
             }

@@ -24,6 +24,7 @@ pub const BINDINGS: &[Binding] = &[
     Binding { keys: &[Press::Plain(KeyCode::PageUp)], cmd: Cmd::PageUp, short: "", long: "a page up" },
     Binding { keys: &[Press::Plain(KeyCode::PageDown)], cmd: Cmd::PageDown, short: "", long: "a page down" },
     Binding { keys: &[Press::Plain(KeyCode::Home)], cmd: Cmd::First, short: "", long: "to the first line" },
+    Binding { keys: &[Press::Plain(KeyCode::End)], cmd: Cmd::Last, short: "", long: "to the last line" },
 ];
 
 /// Columns of the numbers found and their extremes, their labels aside.
@@ -53,6 +54,7 @@ impl Diagnostics {
             Cmd::PageUp => self.scrolled.saturating_sub(page),
             Cmd::PageDown => self.scrolled + page,
             Cmd::First => 0,
+            Cmd::Last => last,
             _ => self.scrolled,
         }
         .min(last);

@@ -1,64 +1,93 @@
 //! All keys, made from the tables that give them their meaning.
 
 use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::ScreenId;
 use crate::tui::keymap::{Binding, EVERYWHERE, MENU};
-use crate::tui::theme::Theme;
+use crate::tui::theme::{Palette, Theme};
 use crate::tui::widgets::{format, lines};
 
 /// Columns of the keys.
 const KEY_COLUMNS: usize = 17;
-/// From this width on two columns of text stand side by side.
+/// From this width on two columns of text stand side by side, where all of it fits.
 const TWO_COLUMNS: u16 = 150;
 
 /// The page for the screen it was called from.
 #[derive(Debug, Default)]
 pub struct Help {
+    /// Rows above those that are shown.
     scrolled: usize,
 }
 
+/// How the page stands in an area.
+enum Layout {
+    /// Keys on the left, the rest on the right.
+    Beside([(Rect, Vec<Line<'static>>); 2]),
+    /// One below the other.
+    Below(Vec<Line<'static>>),
+    /// The same, with more rows than there is room for: so many are shown, one row says how many are not.
+    Scrolled(Vec<Line<'static>>, usize),
+}
+
 impl Help {
-    /// Moves by rows, positive to the end.
-    pub fn scroll(&mut self, rows: isize) {
-        // The picture stops at the end; this stops soon behind it.
-        let longest = page(Theme::new(crate::tui::theme::Palette::Mono), 80, ScreenId::Terminal).len();
-        self.scrolled = self.scrolled.saturating_add_signed(rows).min(longest);
+    /// Scrolls, if that is what the key does. `screen` and `area` are those of the picture.
+    pub fn scrolls(&mut self, key: KeyCode, screen: ScreenId, area: Rect) -> bool {
+        let (last, page) = match layout(Theme::new(Palette::Mono), screen, area) {
+            Layout::Scrolled(rows, room) => (rows.len() - room, room.max(1)),
+            Layout::Beside(_) | Layout::Below(_) => (0, 1),
+        };
+        let scrolled = self.scrolled.min(last);
+        self.scrolled = match key {
+            KeyCode::Up => scrolled.saturating_sub(1),
+            KeyCode::Down => scrolled + 1,
+            KeyCode::PageUp => scrolled.saturating_sub(page),
+            KeyCode::PageDown => scrolled + page,
+            KeyCode::Home => 0,
+            KeyCode::End => last,
+            _ => return false,
+        }
+        .min(last);
+        true
     }
 
     /// The picture.
     pub fn draw(&self, theme: Theme, screen: ScreenId, area: Rect, frame: &mut Frame) {
-        if area.width >= TWO_COLUMNS {
-            let half = area.width / 2 - 1;
-            let (left, right) = (Rect { width: half, ..area }, Rect { x: area.x + half + 2, width: half, ..area });
-            lines::draw(frame, left, keys(theme, half, screen));
-            return lines::draw(frame, right, notes(theme, half));
+        match layout(theme, screen, area) {
+            Layout::Beside(halves) => halves.into_iter().for_each(|(half, rows)| lines::draw(frame, half, rows)),
+            Layout::Below(rows) => lines::draw(frame, area, rows),
+            Layout::Scrolled(rows, room) => {
+                let first = self.scrolled.min(rows.len() - room);
+                let more = match rows.len() - room - first {
+                    0 => format!("── ↑ {} above ", format::counted(first, "line")),
+                    below => format!("── ↓ {} below ", format::counted(below, "more line")),
+                };
+                let shown = rows.into_iter().skip(first).take(room);
+                lines::draw(frame, area, shown.chain([Line::styled(more, theme.quiet())]));
+            }
         }
-        let rows = page(theme, area.width, screen);
-        let room = usize::from(area.height);
-        if rows.len() <= room {
-            return lines::draw(frame, area, rows);
-        }
-        // One row says how much more there is.
-        let room = room.saturating_sub(1);
-        let first = self.scrolled.min(rows.len().saturating_sub(room));
-        let below = rows.len() - first - room.min(rows.len() - first);
-        let more = match (first, below) {
-            (_, 0) => format!("── ↑ {first} lines above "),
-            (_, below) => format!("── ↓ {below} more lines below "),
-        };
-        let shown = rows.into_iter().skip(first).take(room);
-        lines::draw(frame, area, shown.chain([Line::styled(more, theme.quiet())]));
     }
 }
 
-fn page(theme: Theme, columns: u16, screen: ScreenId) -> Vec<Line<'static>> {
-    let mut rows = keys(theme, columns, screen);
+fn layout(theme: Theme, screen: ScreenId, area: Rect) -> Layout {
+    let room = usize::from(area.height);
+    if area.width >= TWO_COLUMNS {
+        let half = area.width / 2 - 1;
+        let (left, right) = (Rect { width: half, ..area }, Rect { x: area.x + half + 2, width: half, ..area });
+        let (keys, notes) = (keys(theme, half, screen), notes(theme, half));
+        if keys.len().max(notes.len()) <= room {
+            return Layout::Beside([(left, keys), (right, notes)]);
+        }
+    }
+    let mut rows = keys(theme, area.width, screen);
     rows.push(Line::default());
-    rows.extend(notes(theme, columns));
-    rows
+    rows.extend(notes(theme, area.width));
+    match rows.len() <= room {
+        true => Layout::Below(rows),
+        false => Layout::Scrolled(rows, room.saturating_sub(1)),
+    }
 }
 
 fn keys(theme: Theme, columns: u16, screen: ScreenId) -> Vec<Line<'static>> {
@@ -90,6 +119,7 @@ fn notes(theme: Theme, columns: u16) -> Vec<Line<'static>> {
         rows.extend(broken.into_iter().map(|line| Line::raw(format!("  {line}"))));
         rows.push(Line::default());
     }
+    rows.pop();
     rows
 }
 

@@ -9,8 +9,9 @@ use ratatui::text::{Line, Span};
 use super::Scene;
 use crate::time::Duration;
 use crate::tui::action::Action;
-use crate::tui::input::{Pace, Playback, Playing, RecordingEntry};
+use crate::tui::input::{Pace, Playback, Playing, RecordingEntry, RecordingList};
 use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::theme::Theme;
 use crate::tui::view::View;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
@@ -63,8 +64,6 @@ const PACES: [Pace; 6] =
     [Pace::Times(1), Pace::Times(2), Pace::Times(5), Pace::Times(10), Pace::Times(60), Pace::AtOnce];
 /// What an arrow moves by at least.
 const LEAST_STEP: Duration = Duration::from_secs(10);
-/// Ends the name of a recording.
-const ENDING: &str = ".cast";
 /// Rows of what is being played.
 const PLAYER_ROWS: u16 = 4;
 /// Rows below the list: where the chosen one lies, and how it is passed on.
@@ -83,13 +82,13 @@ pub struct Recordings {
 enum Found {
     #[default]
     Nothing,
-    Listed(Vec<RecordingEntry>),
+    Listed(RecordingList),
     Failed(String),
 }
 
 impl Recordings {
     /// The list has come.
-    pub fn listed(&mut self, found: Result<Vec<RecordingEntry>, String>) {
+    pub fn listed(&mut self, found: Result<RecordingList, String>) {
         self.found = found.map_or_else(Found::Failed, Found::Listed);
         self.cursor = self.cursor.min(self.entries().len().saturating_sub(1));
     }
@@ -97,7 +96,7 @@ impl Recordings {
     /// What was found, newest first.
     pub fn entries(&self) -> &[RecordingEntry] {
         match &self.found {
-            Found::Listed(entries) => entries,
+            Found::Listed(list) => &list.entries,
             Found::Nothing | Found::Failed(_) => &[],
         }
     }
@@ -120,15 +119,13 @@ impl Recordings {
             };
             return Some(Action::Tell(what.to_owned()));
         };
-        let step = playing.length.map_or(LEAST_STEP, |length| (length / 100).max(LEAST_STEP));
+        let step = step(playing);
         let play = match cmd {
+            // There is nothing to stop or to go on with, whatever its pace was.
+            Cmd::Pause if is_at_end(playing) => Playback::Again(Pace::Times(1)),
             Cmd::Pause if playing.pace != Pace::Paused => {
                 self.pace = Some(playing.pace);
                 Playback::Pace(Pace::Paused)
-            }
-            // At the end there is nothing to go on with.
-            Cmd::Pause if playing.length.is_some_and(|length| playing.position >= length) => {
-                Playback::Again(Pace::Times(1))
             }
             Cmd::Pause => Playback::Pace(self.pace.unwrap_or(Pace::Times(1))),
             Cmd::Faster => Playback::Pace(step_of_pace(playing.pace, 1)),
@@ -157,24 +154,40 @@ impl Recordings {
         let (rest, lower) = lines::split(rest, rest.height.saturating_sub(detail.len() as u16));
         lines::draw(frame, lower, detail);
         let (heading, list) = lines::split(rest, 1);
-        let entries = self.entries();
-        let remark = if entries.is_empty() { String::new() } else { format!("{}, newest first", entries.len()) };
-        lines::draw(frame, heading, [lines::rule(theme, area.width, "Recordings", &remark)]);
+        lines::draw(frame, heading, [lines::rule(theme, area.width, "Recordings", &self.remark())]);
         match &self.found {
             Found::Nothing => lines::draw(frame, list, [Line::styled("  Looking for recordings ...", theme.quiet())]),
             Found::Failed(why) => {
                 let broken = format::wrap(&visible::text(why), usize::from(list.width).saturating_sub(4));
                 lines::draw(frame, list, broken.into_iter().map(|line| Line::styled(format!("  {line}"), theme.bad())));
             }
-            Found::Listed(entries) if entries.is_empty() => {
+            Found::Listed(RecordingList { entries, .. }) if entries.is_empty() => {
                 let text = "  None yet. Every connection is recorded from its first byte.";
                 lines::draw(frame, list, [Line::styled(text, theme.quiet())]);
             }
-            Found::Listed(entries) => {
+            Found::Listed(RecordingList { entries, .. }) => {
                 let first = lines::first_visible(self.cursor, entries.len(), usize::from(list.height));
-                let rows = entries.iter().enumerate().skip(first);
-                lines::draw(frame, list, rows.map(|(number, entry)| self.row(scene, entry, number, list.width)));
+                let shown = entries.iter().enumerate().skip(first);
+                let columns = usize::from(list.width);
+                lines::draw(
+                    frame,
+                    list,
+                    shown.map(|(number, entry)| row(theme, entry, number == self.cursor, columns)),
+                );
             }
+        }
+    }
+
+    /// How many there are, and whether these are all.
+    fn remark(&self) -> String {
+        match &self.found {
+            Found::Listed(RecordingList { entries, older: 0 }) if !entries.is_empty() => {
+                format!("{}, newest first", entries.len())
+            }
+            Found::Listed(RecordingList { entries, older: older @ 1.. }) => {
+                format!("{} of {}, newest first", entries.len(), format::grouped(entries.len() + older))
+            }
+            Found::Listed(_) | Found::Nothing | Found::Failed(_) => String::new(),
         }
     }
 
@@ -193,24 +206,22 @@ impl Recordings {
         std::mem::replace(&mut self.cursor, number) == number
     }
 
-    /// Whether this console writes it now: of a session in parts it is the newest.
-    fn is_being_written(&self, view: &View, number: usize) -> bool {
-        let Some(recording) = view.link.recording.as_deref().filter(|_| view.can_send()) else { return false };
-        let stem = recording.strip_suffix(ENDING).unwrap_or(recording);
-        let is_of_session = |entry: &RecordingEntry| {
-            let path = entry.link.strip_prefix("replay:").unwrap_or(&entry.link);
-            path == recording || path.strip_prefix(stem).is_some_and(|rest| rest.starts_with(".p"))
-        };
-        self.entries().iter().position(is_of_session) == Some(number)
-    }
-
     /// Where the chosen one lies, and what to do with it.
     fn detail(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
         let Some(entry) = self.entries().get(self.cursor) else { return Vec::new() };
         let theme = scene.theme;
-        let path = visible::text(entry.link.strip_prefix("replay:").unwrap_or(&entry.link));
+        let path = visible::text(path_of(entry));
         let room = usize::from(columns).saturating_sub(4);
-        let mut rows = vec![lines::rule(theme, columns, "To send it to somebody", "")];
+        let (heading, text) = match &entry.content {
+            Ok(_) => (
+                "To send it to somebody",
+                "Attach this file: every byte, both directions, with times; of a password only its length. As one page \
+                 to read: axcon report --port replay:FILE --out report.html"
+                    .to_owned(),
+            ),
+            Err(why) => ("Cannot be read", format!("{}.", visible::sentence(why))),
+        };
+        let mut rows = vec![lines::rule(theme, columns, heading, "")];
         // Whoever copies the path needs all of it, and the file's name in one piece.
         let name = path.rfind('/').filter(|_| format::width(&path) > room).map_or(0, |slash| slash + 1);
         let (folder, name) = path.split_at(name);
@@ -220,31 +231,51 @@ impl Recordings {
                 .flat_map(|part| format::pieces(part, room))
                 .map(|piece| Line::styled(format!("  {piece}"), theme.strong())),
         );
-        let text = "Attach this file: every byte, both directions, with times; of a password only its length. As one page \
-                    to read: axcon report --port replay:FILE --out report.html";
-        rows.extend(format::wrap(text, room).into_iter().map(|line| Line::raw(format!("  {line}"))));
+        rows.extend(format::wrap(&text, room).into_iter().map(|line| Line::raw(format!("  {line}"))));
         rows.truncate(usize::from(DETAIL_ROWS));
         rows
     }
+}
 
-    fn row(&self, scene: Scene, entry: &RecordingEntry, number: usize, columns: u16) -> Line<'static> {
-        let is_chosen = number == self.cursor;
-        let length = entry.length.map_or_else(|| "?".to_owned(), format::minutes);
-        let size = format!("{} kB", format::grouped(entry.bytes.div_ceil(1000)));
-        let fixed = format!(
-            " {} {}  {length:>9}  {size:>11}  ",
-            if is_chosen { "›" } else { " " },
-            format::left(&entry.begun, 19)
-        );
-        let port = match entry.part {
-            0 | 1 => visible::text(&entry.port),
-            part => format!("{}, part {part}", visible::text(&entry.port)),
-        };
-        let port = if self.is_being_written(scene.view, number) { format!("{port}, being written") } else { port };
-        let room = usize::from(columns).saturating_sub(format::width(&fixed));
-        let style = if is_chosen { scene.theme.bar() } else { Style::new() };
-        Line::styled(format!("{fixed}{}", format::left(&format::keep_end(&port, room), room)), style)
+/// The file of a recording.
+fn path_of(entry: &RecordingEntry) -> &str {
+    entry.link.strip_prefix("replay:").unwrap_or(&entry.link)
+}
+
+/// An entry of the list: a recording, or why the file is none.
+fn row(theme: Theme, entry: &RecordingEntry, is_chosen: bool, columns: usize) -> Line<'static> {
+    let mark = if is_chosen { "›" } else { " " };
+    let recorded = match &entry.content {
+        Ok(recorded) => recorded,
+        Err(why) => {
+            let path = visible::text(path_of(entry));
+            let name = path.rsplit('/').next().unwrap_or_default();
+            let text = format!(" {mark} {name}  cannot be read: {}", visible::text(why));
+            return Line::styled(format::left(&text, columns), if is_chosen { theme.bar() } else { theme.bad() });
+        }
+    };
+    let length = recorded.length.map_or_else(|| "?".to_owned(), format::minutes);
+    let size = format!("{} kB", format::grouped(entry.bytes.div_ceil(1000)));
+    let fixed = format!(" {mark} {}  {length:>9}  {size:>11}  ", format::left(&recorded.begun, 19));
+    let mut port = visible::text(&recorded.port);
+    if recorded.part > 1 {
+        port.push_str(&format!(", part {}", recorded.part));
     }
+    if recorded.is_being_written {
+        port.push_str(", being written");
+    }
+    let room = columns.saturating_sub(format::width(&fixed));
+    let style = if is_chosen { theme.bar() } else { Style::new() };
+    Line::styled(format!("{fixed}{}", format::left(&format::keep_end(&port, room), room)), style)
+}
+
+/// What an arrow moves by.
+fn step(playing: Playing) -> Duration {
+    playing.length.map_or(LEAST_STEP, |length| (length / 100).max(LEAST_STEP))
+}
+
+fn is_at_end(playing: Playing) -> bool {
+    playing.length.is_some_and(|length| playing.position >= length)
 }
 
 fn step_of_pace(pace: Pace, step: isize) -> Pace {
@@ -256,7 +287,7 @@ fn step_of_pace(pace: Pace, step: isize) -> Pace {
 fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
     let theme = scene.theme;
     let name = scene.view.link.name.as_deref().map(visible::text).unwrap_or_default();
-    let ended = playing.length.is_some_and(|length| playing.position >= length);
+    let ended = is_at_end(playing);
     let defect = scene.view.link.defect.as_deref();
     let pace = match playing.pace {
         _ if ended && defect.is_some() => "cannot be read on".to_owned(),
@@ -290,7 +321,10 @@ fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
                 theme.bad(),
             ),
             None => Line::styled(
-                "  All screens show the unit as it was then. Arrows move 10 s, Home to its start.",
+                format!(
+                    "  All screens show the unit as it was then. Arrows move {}, Home to its start.",
+                    format::period(step(playing))
+                ),
                 theme.quiet(),
             ),
         },

@@ -135,7 +135,10 @@ impl Stream {
         match cmd {
             Cmd::Up => self.channel = self.channel.saturating_sub(1),
             Cmd::Down => self.channel = (self.channel + 1).min(last),
-            Cmd::Zoom => self.window = (self.window + 1) % WINDOWS.len(),
+            Cmd::Zoom => {
+                self.window = (self.window + 1) % WINDOWS.len();
+                self.keep_cursor_in_sight(values);
+            }
             Cmd::Pause if self.held.is_some() => self.held = None,
             Cmd::Pause => self.held = values.newest.map(|at| Held { end: at, cursor: at }),
             Cmd::Left | Cmd::Right => self.move_cursor(values, cmd == Cmd::Left),
@@ -172,9 +175,18 @@ impl Stream {
         let step = (held.end.since(from) / CURSOR_STEPS).max(Duration::from_millis(1));
         let cursor = match earlier {
             true => from + held.cursor.since(from).saturating_sub(step),
-            false => (held.cursor + step).min(held.end),
+            false => (held.cursor + step).min(newest),
         };
-        self.held = Some(Held { cursor, ..held });
+        // The window that was moved to the cursor goes on with it.
+        self.held = Some(Held { cursor, end: held.end.max(cursor) });
+    }
+
+    /// A narrower window ends where the one before did, which may be long after what is looked at: then it is moved there.
+    fn keep_cursor_in_sight(&mut self, values: &Values) {
+        let (Some(held), Some(length)) = (self.held, WINDOWS[self.window].1) else { return };
+        if held.cursor < self.times(values, held.end).0 {
+            self.held = Some(Held { end: (held.cursor + length / 2).min(held.end), ..held });
+        }
     }
 
     /// The moments at the edges of the chart that ends at `end`.
@@ -331,7 +343,7 @@ impl Stream {
             None => Some(channel.reading),
             Some(held) => channel.at(held.cursor).map(|(_, reading)| reading),
         };
-        let is_chosen = number == self.channel;
+        let is_chosen = self.is_chosen(stream, number);
         let is_old = scene.view.why_old().is_some() || self.held.is_some();
         let (state, style) = state(theme, reading);
         let unit = if source == Source::FieldValue { " °C" } else { "   " };

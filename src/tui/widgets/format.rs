@@ -18,9 +18,14 @@ pub fn grouped(number: impl TryInto<u64>) -> String {
     shown
 }
 
-/// `1 row`, `1,200 rows`.
-pub fn counted(number: u64, what: &str) -> String {
-    format!("{} {what}{}", grouped(number), if number == 1 { "" } else { "s" })
+/// `1 row`, `1,200 rows`, `2 entries`.
+pub fn counted(number: impl TryInto<u64>, what: &str) -> String {
+    let number = number.try_into().unwrap_or(u64::MAX);
+    match what.strip_suffix('y') {
+        _ if number == 1 => format!("1 {what}"),
+        Some(stem) => format!("{} {stem}ies", grouped(number)),
+        None => format!("{} {what}s", grouped(number)),
+    }
 }
 
 /// `0:21`, `12:05`, `1:00:00`.
@@ -203,6 +208,7 @@ mod tests {
     #[test]
     fn numbers_are_grouped() {
         assert_eq!([0, 1, 1200].map(|number| counted(number, "row")), ["0 rows", "1 row", "1,200 rows"]);
+        assert_eq!([0, 1, 2].map(|number| counted(number, "entry")), ["0 entries", "1 entry", "2 entries"]);
         assert_eq!([0, 999, 1000, 242_846, 1_000_000].map(grouped), ["0", "999", "1,000", "242,846", "1,000,000"]);
     }
 

@@ -19,7 +19,7 @@ fn a_file_goes_from_the_terminal_to_the_unit_as_it_is() {
     assert!(question.contains("keys.txt, 4 bytes, goes to the unit as if typed."), "{question}");
     assert!(desk.sent.is_empty(), "nothing leaves before the answer");
     desk.keys("y");
-    let told = desk.wait_for("Sent: all 4 bytes of keys.txt have left.");
+    let told = desk.wait_for("Sent: all of keys.txt has left, 4 bytes.");
     assert!(told.contains("the file keys.txt is sent, 4 bytes"), "{told}");
     assert_eq!(desk.sent, b"mm\n\xff");
     assert_eq!(desk.marks, ["the file keys.txt is sent, 4 bytes"], "in the recording, too");

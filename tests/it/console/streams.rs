@@ -68,7 +68,7 @@ fn the_stream_is_suggested_as_it_was_and_a_change_of_source_says_what_it_costs()
     desk.run(Duration::from_secs(45)).pull().input(Input::LinkBack("/dev/ttyUSB0".into()));
     desk.run(Duration::from_secs(5)).keys("6");
     let told = desk.picture();
-    assert!(told.contains("No row since the unit is there again") && !told.contains("The stream is off"), "{told}");
+    assert!(told.contains("No row since the unit is back") && !told.contains("The stream is off"), "{told}");
     desk.keys("t");
     let asked = desk.picture();
     assert!(asked.contains("› 20000") && !asked.contains("begin anew"), "{asked}");

@@ -2,6 +2,8 @@
 //!
 //! Before it has been read the manual's own table is there to look things up.
 
+use std::collections::BTreeMap;
+
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
@@ -196,32 +198,21 @@ impl Dictionary {
             let object = product?.dictionary.object(at.index)?;
             Some((object, object.entry(at.sub)?))
         };
-        let mut rows: Vec<Row> = match &view.dictionary {
-            Some(read) => {
-                let entries = read.dump.entries.iter().filter_map(|entry| Some((entry.at()?, entry)));
-                let mut rows: Vec<_> = entries
-                    .map(|(at, entry)| Row { at, known: known(at), read: Some(entry), difference: None })
-                    .collect();
-                let missing =
-                    Row::of_manual(product).filter(|row| read.reading.entries.iter().all(|read| read.at != row.at));
-                rows.extend(missing.collect::<Vec<_>>());
-                rows
-            }
-            None => Row::of_manual(product).collect(),
-        };
+        let mut rows: BTreeMap<ObjectAddress, Row> = Row::of_manual(product).map(|row| (row.at, row)).collect();
+        let read = view.dictionary.iter().flat_map(|read| &read.dump.entries);
+        for (at, entry) in read.filter_map(|entry| Some((entry.at()?, entry))) {
+            rows.insert(at, Row { at, known: known(at), read: Some(entry), difference: None });
+        }
         if let (Some(other), Some(read)) = (&self.other, &view.dictionary) {
             // What is measured is another value at every reading.
             for difference in dump::differences(&other.dump, &read.dump).into_iter().filter(|found| found.setting) {
                 let index = u16::from_str_radix(&difference.index, 16).unwrap_or_default();
                 let at = ObjectAddress::new(index, difference.subindex);
-                match rows.iter_mut().find(|row| row.at == at) {
-                    Some(row) => row.difference = Some(difference),
-                    None => rows.push(Row { at, known: known(at), read: None, difference: Some(difference) }),
-                }
+                let row = rows.entry(at).or_insert_with(|| Row { at, known: known(at), read: None, difference: None });
+                row.difference = Some(difference);
             }
         }
-        rows.sort_by_key(|row| (row.at.index, row.at.sub));
-        rows
+        rows.into_values().collect()
     }
 
     /// The rows that are shown.

@@ -14,7 +14,7 @@ use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use report::{findings, findings_room, misfits, objections, report};
+use report::{findings_shown, misfits, objections, report};
 use verdict::verdict;
 
 use super::Scene;
@@ -22,7 +22,8 @@ use crate::device::LoaderKind;
 use crate::image::DefectId;
 use crate::session::Job;
 use crate::tui::action::Action;
-use crate::tui::input::{FileEntry, ImageFacts};
+use crate::tui::image_facts::ImageFacts;
+use crate::tui::input::FileEntry;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::picker::{Offers, Picked, Picker};
 use crate::tui::popup::Question;
@@ -151,6 +152,11 @@ impl Load {
         self.picker.listed(directory, entries);
     }
 
+    /// Whether this folder is waited for.
+    pub fn awaits(&self, directory: &Path) -> bool {
+        self.picker.awaits(directory)
+    }
+
     fn list(&mut self) -> Action {
         let directory = self.picker.directory().to_path_buf();
         Action::ListFiles(self.picker.list(directory))
@@ -218,9 +224,12 @@ impl Load {
         self.loader
     }
 
-    /// Another unit: what was said of the loader was said of the one before.
-    pub fn begin_unit(&mut self) {
-        self.loader = None;
+    /// Another unit: what was said of the loader was said of the one before. A file that was judged for that loader is to
+    /// be checked again.
+    pub fn begin_unit(&mut self) -> Option<Action> {
+        self.loader.take()?;
+        let path = self.image()?.path.clone();
+        Some(self.check(path))
     }
 
     /// The next kind of loader; behind the last one the product's own again.
@@ -272,7 +281,7 @@ impl Load {
                 None
             }
             Stage::Report { facts, scrolled } => {
-                let (all, room) = (findings(facts, area.width).len(), findings_room(facts, view, self.loader, area));
+                let (all, room) = findings_shown(facts, view, (self.packed, self.loader), area);
                 let last = all.saturating_sub(room);
                 match cmd {
                     Cmd::Up => *scrolled = scrolled.saturating_sub(1),

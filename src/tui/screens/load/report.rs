@@ -10,19 +10,18 @@ use crate::device::{LoaderKind, Product};
 use crate::image::{DefectId, Misfit, Software};
 use crate::session::UnitState;
 use crate::time::Duration;
-use crate::tui::input::{Amount, ImageFacts};
+use crate::tui::image_facts::{Amount, ImageFacts};
 use crate::tui::screens::Scene;
-use crate::tui::theme::Theme;
+use crate::tui::theme::{Palette, Theme};
 use crate::tui::view::View;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
+use crate::version::Version;
 
 /// Lines of findings shown at once on a small screen before the plan takes its place.
 const LEAST_DEFECT_ROWS: usize = 3;
 /// Lines that say what the file is, with their heading.
 const REPORT_ROWS: usize = 5;
-/// Steps of the plan.
-const PLAN_STEPS: usize = 4;
 
 /// What speaks against sending this image to the unit that is there, besides that it may be another product.
 pub(super) fn misfits(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>) -> Vec<Misfit> {
@@ -84,13 +83,13 @@ pub(super) fn report(
         lines::labelled(theme, "Check", check_word(theme, facts)),
         loader_line(theme, facts, loader),
     ];
-    let plan = plan(scene, facts, (packed, loader), area.width);
+    let plan = plan(theme, scene.view, facts, (packed, loader), area.width);
     if !facts.defects.is_empty() {
         let all = findings(facts, area.width);
-        let room = findings_room(facts, scene.view, loader, area);
+        let room = room_beside(&plan, area).min(all.len());
         let first = scrolled.min(all.len() - room);
         let below = all.len() - first - room;
-        let range = if below > 0 { format!("↓ {} more lines", format::grouped(below)) } else { String::new() };
+        let range = if below > 0 { format!("↓ {}", format::counted(below, "more line")) } else { String::new() };
         rows.push(lines::rule(theme, area.width, "Findings", &range));
         rows.extend(all.into_iter().skip(first).take(room).map(Line::raw));
     }
@@ -105,7 +104,7 @@ fn amount(facts: &ImageFacts, packed: bool) -> Amount {
 
 fn to_send(facts: &ImageFacts, packed: bool) -> String {
     let Amount { records, characters, .. } = amount(facts, packed);
-    let told = format!("{} records, {} characters", format::grouped(records), format::grouped(characters));
+    let told = format!("{}, {}", format::counted(records, "record"), format::counted(characters, "character"));
     match packed {
         true if facts.ok => format!("{told}, packed from {}", format::grouped(facts.own.characters)),
         _ => told,
@@ -139,17 +138,21 @@ pub(super) fn findings(facts: &ImageFacts, columns: u16) -> Vec<String> {
     facts.defects.iter().flat_map(lines).collect()
 }
 
-/// How many lines of the findings have room beside the plan.
-pub(super) fn findings_room(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>, area: Rect) -> usize {
-    let others = REPORT_ROWS + 1 + plan_rows(facts, view, loader);
-    let room = usize::from(area.height).saturating_sub(others);
-    room.max(LEAST_DEFECT_ROWS).min(findings(facts, area.width).len())
+/// How many lines of the findings there are, and how many of them are shown at once beside the plan.
+pub(super) fn findings_shown(
+    facts: &ImageFacts,
+    view: &View,
+    sending: (bool, Option<LoaderKind>),
+    area: Rect,
+) -> (usize, usize) {
+    let all = findings(facts, area.width).len();
+    let plan = plan(Theme::new(Palette::Mono), view, facts, sending, area.width);
+    (all, room_beside(&plan, area).min(all))
 }
 
-/// Lines of the plan: what is going to happen, and what stands against it or how it is begun.
-fn plan_rows(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>) -> usize {
-    let steps = if facts.ok { PLAN_STEPS + 2 } else { 0 };
-    1 + steps + objections(facts, view, loader).len().max(1)
+/// Lines of findings that have room beside the plan.
+fn room_beside(plan: &[Line], area: Rect) -> usize {
+    usize::from(area.height).saturating_sub(REPORT_ROWS + 1 + plan.len()).max(LEAST_DEFECT_ROWS)
 }
 
 fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
@@ -171,13 +174,15 @@ fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
     }
 }
 
+/// What is going to happen, and what stands against it or how it is begun.
 fn plan(
-    scene: Scene,
+    theme: Theme,
+    view: &View,
     facts: &ImageFacts,
     (packed, loader): (bool, Option<LoaderKind>),
     columns: u16,
 ) -> Vec<Line<'static>> {
-    let (theme, view) = (scene.theme, scene.view);
+    let room = usize::from(columns).saturating_sub(2);
     let mut rows = vec![lines::rule(theme, columns, "Plan", "")];
     let product =
         facts.product.as_deref().map_or("the right product".into(), |name| format!("an {}", visible::text(name)));
@@ -189,7 +194,7 @@ fn plan(
         _ => "name what the file holds".into(),
     };
     if facts.ok {
-        let steps: [String; PLAN_STEPS] = [
+        let steps = [
             format!("Make sure that the unit is {product}."),
             match view.facts.state {
                 UnitState::Loader => "Send neither L nor a password: the unit waits in its loader already.".into(),
@@ -201,14 +206,15 @@ fn plan(
             ),
             format!("Wait for the banner of the new software: it must {expected}."),
         ];
-        let numbered = steps.into_iter().enumerate();
-        rows.extend(numbered.map(|(number, step)| Line::raw(format!("  {}. {step}", number + 1))));
+        for (number, step) in (1..).zip(steps) {
+            rows.extend(hanging(Span::raw(format!("  {number}. ")), &step, room));
+        }
         rows.push(lines::labelled(theme, "Unit now", unit_version(view)));
-        rows.push(lines::labelled(
-            theme,
-            "Afterwards",
-            format!("{} ({})", expected_version(facts), change(view, facts)),
-        ));
+        let change = Change::of(view, facts);
+        rows.push(lines::labelled(theme, "Afterwards", format!("{} ({})", expected_version(facts), change.words())));
+        rows.extend(
+            change.remark().map(|remark| lines::labelled(theme, "Note", Span::styled(remark, theme.warning()))),
+        );
     }
     let against = objections(facts, view, loader);
     if against.is_empty() {
@@ -221,13 +227,22 @@ fn plan(
             }),
         ]));
     } else {
-        rows.extend(
-            against
-                .into_iter()
-                .map(|objection| Line::from(vec![Span::styled("  Cannot start: ", theme.bad()), Span::raw(objection)])),
-        );
+        let refused = |objection: String| hanging(Span::styled("  Cannot start: ", theme.bad()), &objection, room);
+        rows.extend(against.into_iter().flat_map(refused));
     }
     rows
+}
+
+/// A text behind a label, broken where it has to be: what stands at its end may be what there is to do.
+fn hanging(label: Span<'static>, text: &str, columns: usize) -> Vec<Line<'static>> {
+    let indent = " ".repeat(label.width());
+    let broken = format::wrap(text, columns.saturating_sub(label.width())).into_iter().enumerate();
+    broken
+        .map(|(number, line)| {
+            let before = if number == 0 { label.clone() } else { Span::raw(indent.clone()) };
+            Line::from(vec![before, Span::raw(line)])
+        })
+        .collect()
 }
 
 fn unit_version(view: &View) -> String {
@@ -251,15 +266,58 @@ fn expected_version(facts: &ImageFacts) -> String {
     facts.version.map_or_else(|| product.clone(), |version| format!("{product} {version}"))
 }
 
-fn change(view: &View, facts: &ImageFacts) -> &'static str {
-    let unit = view.facts.product.as_ref().map(|known| known.value.to_ascii_lowercase());
-    if unit.is_none() || unit != facts.product.as_ref().map(|product| product.to_ascii_lowercase()) {
-        return "cannot be compared";
+/// What the file is against what the unit runs, or ran before an upload that was left in the middle.
+enum Change {
+    Newer,
+    Same,
+    Older,
+    /// Of another product, or of a unit that has not said what it is.
+    OtherUnit,
+    /// Nobody knows what the unit runs.
+    UnitUnknown,
+    /// The file does not say what it is.
+    FileUnknown,
+}
+
+impl Change {
+    fn of(view: &View, facts: &ImageFacts) -> Change {
+        let said = view.facts.product.as_ref().map(|known| known.value.as_str());
+        let unit = said.or(view.noted().map(|noted| noted.product.as_str()));
+        let is_of_unit = |file: &String| unit.is_some_and(|unit| unit.eq_ignore_ascii_case(file));
+        match (&facts.product, view.ran(), facts.version) {
+            // Its label will say which product it is, and nothing which version.
+            (Some(_), None, Some(_)) if view.needs_label() => Change::UnitUnknown,
+            (Some(file), ..) if !is_of_unit(file) => Change::OtherUnit,
+            (None, ..) if unit.is_none() => Change::OtherUnit,
+            (None, ..) | (_, _, None) => Change::FileUnknown,
+            (_, None, _) => Change::UnitUnknown,
+            (_, Some(now), Some(then)) => Change::between(now, then),
+        }
     }
-    match (view.facts.version.as_ref().map(|known| known.value), facts.version) {
-        (Some(now), Some(then)) if then > now => "newer",
-        (Some(now), Some(then)) if then < now => "older: a downgrade",
-        (Some(_), Some(_)) => "the same version again",
-        _ => "cannot be compared",
+
+    fn between(now: Version, then: Version) -> Change {
+        match then.cmp(&now) {
+            std::cmp::Ordering::Greater => Change::Newer,
+            std::cmp::Ordering::Equal => Change::Same,
+            std::cmp::Ordering::Less => Change::Older,
+        }
+    }
+
+    fn words(&self) -> &'static str {
+        match self {
+            Change::Newer => "newer",
+            Change::Same => "the same version again",
+            Change::Older => "older: a downgrade",
+            Change::OtherUnit | Change::UnitUnknown | Change::FileUnknown => "cannot be compared",
+        }
+    }
+
+    /// What nobody can find out before the file is sent.
+    fn remark(&self) -> Option<&'static str> {
+        match self {
+            Change::UnitUnknown => Some("Nobody knows which version the unit has: the file may be older."),
+            Change::FileUnknown => Some("The file does not say its version: it may be older than the unit's."),
+            Change::Newer | Change::Same | Change::Older | Change::OtherUnit => None,
+        }
     }
 }

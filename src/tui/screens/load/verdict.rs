@@ -8,6 +8,11 @@ use crate::tui::screens::Scene;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
+/// Rows beside what is told: heading, verdict, what Enter does, and blanks between them.
+const FRAME_ROWS: usize = 6;
+/// The label of the unit's last words.
+const HEARD: &str = "Heard";
+
 pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line<'static>> {
     let theme = scene.theme;
     let room = usize::from(area.width).saturating_sub(lines::LABEL_COLUMNS + 4);
@@ -37,11 +42,8 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
         Line::from(vec![Span::raw("  "), Span::styled(word, style)]),
         Line::default(),
     ];
-    let mut paragraph = |label: &str, text: &str| {
-        for (number, line) in format::wrap(&visible::text(text), room).into_iter().enumerate() {
-            rows.push(lines::labelled(theme, if number == 0 { label } else { "" }, line));
-        }
-    };
+    let mut told: Vec<(&str, Vec<String>)> = Vec::new();
+    let mut paragraph = |label, text: &str| told.push((label, format::wrap(&visible::text(text), room)));
     paragraph("Happened", &visible::sentence(&report.what));
     paragraph("Unit now", unit);
     let is_untouched = matches!(report.verdict, Verdict::Refused | Verdict::UnitRefused);
@@ -56,16 +58,32 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
         paragraph("Stopped at", &format!("{address:#08x}"));
     }
     if !report.heard.is_empty() {
-        paragraph("Heard", &report.heard);
+        paragraph(HEARD, &report.heard);
     }
     if let Some(remark) = &report.remark {
         paragraph("Note", remark);
     }
     paragraph("What next", &format!("{}.", visible::sentence(report.advice())));
+    shorten(&mut told, usize::from(area.height).saturating_sub(FRAME_ROWS));
+    for (label, broken) in told {
+        for (number, line) in broken.into_iter().enumerate() {
+            rows.push(lines::labelled(theme, if number == 0 { label } else { "" }, line));
+        }
+    }
     rows.push(Line::default());
     rows.push(Line::from(vec![
         Span::styled("  Enter", theme.key()),
         Span::raw(" goes back to the file and its plan."),
     ]));
     rows
+}
+
+/// A unit may say any number of words: what has no room must not be what there is to do next.
+fn shorten(told: &mut [(&str, Vec<String>)], room: usize) {
+    let over = told.iter().map(|(_, lines)| lines.len()).sum::<usize>().saturating_sub(room);
+    let Some((_, heard)) = told.iter_mut().find(|(label, _)| *label == HEARD).filter(|_| over > 0) else { return };
+    heard.truncate(heard.len().saturating_sub(over).max(1));
+    if let Some(last) = heard.last_mut() {
+        last.push_str(" …");
+    }
 }

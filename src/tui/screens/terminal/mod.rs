@@ -155,6 +155,13 @@ impl Terminal {
         self.after_prefix
     }
 
+    /// The record begins anew: what the hex view was stopped at is in the one before. The lines go on.
+    pub fn begin_record(&mut self) {
+        if let Mode::Hex(_) = self.mode {
+            self.mode = Mode::Hex(None);
+        }
+    }
+
     /// Back to the newest line, as after sending something.
     pub fn follow(&mut self) {
         self.mode = match self.mode {
@@ -247,14 +254,14 @@ impl Terminal {
             Mode::Hex(place) => ("Hexadecimal", place.is_none()),
         };
         let place = if following { "follows" } else { "stopped, End follows again" };
-        let received = format::grouped(scene.record.received());
+        let received = format::counted(scene.record.received(), "byte");
         let sent = format::grouped(scene.record.sent());
         let found = match (self.words.is_empty(), self.finds_nothing()) {
             (true, _) => String::new(),
             (false, true) => format!("'{}' is nowhere, ", visible::text(&self.words)),
             (false, false) => format!("'{}', ", visible::text(&self.words)),
         };
-        let longest = format!("{found}{received} bytes received, {sent} sent, {place}");
+        let longest = format!("{found}{received} received, {sent} sent, {place}");
         let room = usize::from(area.width).saturating_sub(format::width(name) + lines::BESIDE_HEADING);
         // Where it has been stopped is wanted before what has gone by.
         let remark = if format::width(&longest) <= room { longest } else { format!("{found}{place}") };

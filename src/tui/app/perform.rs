@@ -1,0 +1,234 @@
+//! What a screen or an answered question has asked for, done.
+
+use std::path::PathBuf;
+
+use super::App;
+use super::link::Next;
+use crate::session::{Command, Job, LoadOrder, Refusal};
+use crate::tui::action::Action;
+use crate::tui::input::{Effect, Noted};
+use crate::tui::picker::expanded;
+use crate::tui::popup::{Popup, Question, Wanted};
+use crate::tui::screens::{ScreenId, bench};
+use crate::tui::view::Tone;
+
+/// Begins the name of a recording as a link.
+const REPLAY: &str = "replay:";
+
+impl App {
+    pub(super) fn perform(&mut self, action: Action, effects: &mut Vec<Effect>) {
+        self.dirty = true;
+        match action {
+            Action::Go(screen) => {
+                if self.front != screen {
+                    // It was about what was done there, and stands before what is being done.
+                    self.view.notice = None;
+                }
+                self.front = screen;
+                match screen {
+                    ScreenId::Load => {
+                        if let Some(action) = self.load.entered() {
+                            self.perform(action, effects);
+                        }
+                    }
+                    ScreenId::Recordings => effects.push(Effect::ListRecordings),
+                    _ => {}
+                }
+            }
+            // A recording can be opened again as it was; whoever has a unit at the line is asked.
+            Action::Open(link) => {
+                let link = self.link_named(link);
+                match self.view.can_send() {
+                    true => self.ask(Question::Disconnect { then: Some(link) }),
+                    false => self.open(link, effects),
+                }
+            }
+            Action::Reconnect => {
+                if let Some(link) = self.view.link.name.clone() {
+                    self.open(link, effects);
+                }
+            }
+            Action::Disconnect { then } => self.leave(then.map_or(Next::Disconnect, Next::Open), effects),
+            Action::ListPorts => {
+                self.connect.listing();
+                effects.push(Effect::ListPorts);
+            }
+            Action::ListFiles(directory) => effects.push(Effect::ListFiles(directory)),
+            Action::CheckImage(path) => {
+                let path = self.expanded(path);
+                self.load.check(path.clone());
+                let (loader, allow) = (self.load.loader(), self.load.allowed().to_vec());
+                effects.push(Effect::CheckImage { path, loader, allow });
+            }
+            Action::Allow(error) => {
+                if let Some(action) = self.load.allow(error) {
+                    self.perform(action, effects);
+                }
+            }
+            Action::Tell(why) => self.view.tell(Tone::Quiet, why),
+            Action::Ask(question) => self.ask(question),
+            Action::Command(command) => {
+                let reads = matches!(command, Command::ReadDictionary);
+                if self.can_send() && self.command(command) && reads {
+                    self.view.entries_read = 0;
+                    self.front = ScreenId::Dictionary;
+                }
+            }
+            Action::ViewDictionary => {
+                if self.can_send() && self.command(Command::Keys(b"v".to_vec())) {
+                    self.front = ScreenId::Terminal;
+                    self.terminal.follow();
+                    self.view
+                        .tell(Tone::Quiet, "V is sent. Enter shows the next object, X leaves and lets scanning go on.");
+                }
+            }
+            Action::StartLoad { password, product } => {
+                if !self.can_send() {
+                    return;
+                }
+                let Some(facts) = self.load.image() else { return };
+                let Some(image) = facts.checked.clone() else { return };
+                let file = facts.path.display().to_string();
+                // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
+                let said = self.view.facts.product.as_ref().map(|known| known.value.clone());
+                let product = product.or_else(|| self.view.noted().map(|noted| noted.product.clone()));
+                let known = said.or(product.clone());
+                let ran = self.view.ran();
+                let packed = self.load.is_packed();
+                let (loader, allowed) = (self.load.loader(), self.load.allowed().to_vec());
+                let order = LoadOrder { product, ran, packed, loader, allowed, ..LoadOrder::new(image, password) };
+                if self.command(Command::Load(Box::new(order)))
+                    && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
+                {
+                    // Noted before the first byte leaves: what the session sends is drained behind this.
+                    let noted = Noted { product, image: file, ran };
+                    self.view.link.noted = Some(noted.clone());
+                    effects.push(Effect::UploadBegins { link, noted });
+                }
+            }
+            Action::DismissReport => self.view.load.report = None,
+            Action::RestartExtremes => self.view.restart_extremes(),
+            Action::Mark(at) => self.mark(at, effects),
+            Action::Find(words) => match self.front {
+                ScreenId::Terminal => {
+                    let area = self.screen_area();
+                    self.terminal.find(words, &self.view, &self.scrollback, area);
+                }
+                _ => self.dictionary.find(&words),
+            },
+            Action::ExportStream(path) => self.export_stream(self.expanded(path), effects),
+            Action::EndExport => self.end_export(None),
+            Action::ExportDictionary(path) => self.export_dictionary(self.expanded(path), effects),
+            Action::Compare(path) => effects.push(Effect::ReadFile(self.expanded(path))),
+            Action::Choose(Wanted::ToSend) if !self.may_send_file() => {}
+            Action::Choose(wanted) => {
+                self.ask(Question::choose(wanted, &self.folder));
+                effects.push(Effect::ListFiles(self.folder.clone()));
+            }
+            Action::ReadToSend(path) => effects.push(Effect::ReadBytes(self.expanded(path))),
+            Action::SendFile { name, bytes } => self.send_file(name, bytes, effects),
+            Action::Break if self.can_send() => effects.push(Effect::Break),
+            Action::Break => {}
+            Action::ListRecordings => effects.push(Effect::ListRecordings),
+            Action::Play(playback) => effects.push(Effect::Play(playback)),
+            Action::Order(line) if bench::emulated(&self.view).is_some() => {
+                self.bench.ordered(self.now, line.clone());
+                effects.push(Effect::Order(line));
+            }
+            Action::Order(_) => {}
+            Action::Quit => self.leave(Next::Quit, effects),
+        }
+    }
+
+    /// Gives a command to the session. Says whether it was taken; if not, the user knows why.
+    pub(super) fn command(&mut self, command: Command) -> bool {
+        let Some(session) = &mut self.session else { return false };
+        let job = match &command {
+            Command::Keys(_) | Command::Cancel => None,
+            Command::Identify => Some(Job::Identify),
+            Command::StreamOn { .. } => Some(Job::StreamOn),
+            Command::StreamOff => Some(Job::StreamOff),
+            Command::RestoreDefaults => Some(Job::RestoreDefaults),
+            Command::ReadDictionary => Some(Job::ReadDictionary),
+            Command::Diagnostics { .. } | Command::DiagnosticsOff => Some(Job::Diagnostics),
+            Command::Overhear => Some(Job::Overhear),
+            Command::Load(_) => Some(Job::Load),
+            Command::SendFile(_) => Some(Job::SendFile),
+        };
+        let period = match &command {
+            Command::StreamOn { period, .. } => Some(*period),
+            _ => None,
+        };
+        // What is typed at the unit's own prompts is not followed: it may set any other period.
+        let may_set = matches!(&command, Command::Keys(keys) if keys.iter().any(|key| b"TtDd".contains(key)));
+        let viewing = match &command {
+            Command::Keys(keys) if !session.password_open() => opens_view(keys),
+            _ => None,
+        };
+        // Whoever wants something else need not wait for minutes for a slow stream's first row.
+        if self.view.awaits_first_row() && !matches!(command, Command::Cancel) {
+            let _ = session.command(self.now, Command::Cancel);
+        }
+        match session.command(self.now, command) {
+            Ok(()) => {
+                if let Some(job) = job {
+                    self.view.job = Some(job);
+                    self.view.notice = None;
+                }
+                self.view.wanted_period = period.or(self.view.wanted_period.filter(|_| job.is_none()));
+                if may_set {
+                    self.view.monitor.stream.set_period(None);
+                }
+                if viewing == Some(true) {
+                    self.view.monitor.stream.interrupt();
+                }
+                if job == Some(Job::Load) {
+                    self.view.load = Default::default();
+                    self.front = ScreenId::Load;
+                }
+                self.view.viewing = viewing.unwrap_or(self.view.viewing);
+                true
+            }
+            Err(Refusal::Busy(job)) => {
+                self.view.tell(Tone::Bad, format!("Not sent: axcon is still {}.", job.doing()));
+                false
+            }
+            Err(refusal) => {
+                self.view.tell(Tone::Bad, format!("Not sent: {refusal}."));
+                false
+            }
+        }
+    }
+
+    /// A path with the user's home folder in place of `~`.
+    pub(super) fn expanded(&self, path: PathBuf) -> PathBuf {
+        expanded(path, self.options.home.as_deref())
+    }
+
+    /// The same for a link: the path of a port, or of a recording.
+    fn link_named(&self, name: String) -> String {
+        let (kind, path) = match name.strip_prefix(REPLAY) {
+            Some(path) => (REPLAY, path),
+            None => ("", name.as_str()),
+        };
+        match path.starts_with('~') {
+            true => format!("{kind}{}", self.expanded(path.into()).display()),
+            false => name,
+        }
+    }
+
+    pub(super) fn ask(&mut self, question: Question) {
+        // It was about something else.
+        self.view.notice = None;
+        self.popup = Some(Popup::Asking(question));
+    }
+}
+
+/// Whether keys typed at the unit's menu leave its view open (true), closed, or (`None`) as it was.
+fn opens_view(keys: &[u8]) -> Option<bool> {
+    keys.iter().rev().find_map(|key| match key.to_ascii_lowercase() {
+        b'v' => Some(true),
+        b'x' => Some(false),
+        _ => None,
+    })
+}

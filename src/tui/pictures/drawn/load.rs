@@ -1,0 +1,104 @@
+//! Loading software.
+
+use ratatui::crossterm::event::KeyCode;
+
+use crate::session::{Event, LoadReport, Outcome, Phase, UnitNow, Verdict};
+use crate::time::Duration;
+use crate::tui::pictures::stage::*;
+use crate::tui::{ImageFacts, Input};
+use crate::version::Version;
+
+pictures! {
+    load_report_other_loader: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.keys("gg").input(Input::ImageChecked(Box::new(good_image()))).keys("g");
+        stage.input(Input::ImageChecked(Box::new(good_image())));
+        stage
+    };
+    load_picker: |size| Stage::connected(size).picking();
+    load_cannot_list: |size| {
+        let mut stage = Stage::connected(size);
+        stage.keys("l").input(Input::FilesListed {
+            directory: "/home/service/images".into(),
+            entries: Err("permission denied".into()),
+        });
+        stage
+    };
+    load_report_good: |size| Stage::connected(size).with_image(good_image());
+    load_report_bad: |size| {
+        let mut stage = Stage::connected(size).with_image(bad_image());
+        stage.press(KeyCode::PageDown);
+        stage
+    };
+    load_report_other_product: |size| {
+        Stage::connected(size).with_image(ImageFacts { product: Some("AXRTD8CO".into()), ..good_image() })
+    };
+    load_running: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Progress(progress()));
+        stage
+    };
+    load_held: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Progress(progress())).fold(Event::Held(true)).wait(2400);
+        stage
+    };
+    load_cancel_question: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Progress(progress())).press(KeyCode::Esc);
+        stage
+    };
+    load_done: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        let report = LoadReport {
+            phase: Phase::Verify,
+            version_after: Some(Version::new(1, 2, 0)),
+            records: 3074,
+            duration: Duration::from_secs(24),
+            what: "The unit runs AXTC4CO 1.2.0: its new banner says so.".into(),
+            heard: "AXTC4CO 4 Thermocouple Scanner Software Version V1.2.0".into(),
+            ..report(Verdict::Done, UnitNow::Application)
+        };
+        stage.fold(Event::Finished(Outcome::Loaded(Box::new(report))));
+        stage
+    };
+    load_failed: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.fold(Event::Finished(Outcome::Loaded(Box::new(report(Verdict::Failed, UnitNow::Loader)))));
+        stage
+    };
+    load_link_lost: |size| {
+        let mut stage = Stage::loading(size);
+        stage.wait(1000).lost();
+        stage
+    };
+    load_in_loader_with_a_note: |size| {
+        Stage::in_loader(size, noted("AXTC4CO")).with_image(good_image())
+    };
+    load_in_loader_noted_for_another_product: |size| {
+        Stage::in_loader(size, noted("AXRTD8CO")).with_image(good_image())
+    };
+    label_question: |size| {
+        let mut stage = Stage::in_loader(size, None).with_image(good_image());
+        stage.press(KeyCode::Enter).keys("AXRTD8CO").press(KeyCode::Enter);
+        stage
+    };
+    password_question: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.press(KeyCode::Enter).keys("AXIO");
+        stage
+    };
+    load_path_of_nothing: |size| {
+        let mut stage = Stage::connected(size).picking();
+        stage.keys("pnew.S").press(KeyCode::Enter);
+        let path = "/home/service/images/new.S".into();
+        stage.input(Input::ImageUnreadable { path, why: "there is no such file".into() });
+        stage
+    };
+    load_report_nameless: |size| Stage::connected(size).with_image(nameless_image(&[]));
+    load_report_packed: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.keys("k");
+        stage
+    };
+}

@@ -1,0 +1,338 @@
+//! What each question says, and which keys answer it.
+
+use ratatui::crossterm::event::KeyCode;
+use ratatui::text::{Line, Span};
+
+use super::warnings::{consequence, in_the_middle, loses_rows, too_fast};
+use super::{ORDERS, Purpose, Question, Wanted};
+use crate::time::{BITS_PER_CHARACTER, Duration};
+use crate::tui::keymap::Press;
+use crate::tui::picker::Picker;
+use crate::tui::screens::bench::emulated;
+use crate::tui::theme::Theme;
+use crate::tui::view::View;
+use crate::tui::visible;
+use crate::tui::widgets::format;
+use crate::wire::stream::Source;
+
+/// Columns of the orders that are examples.
+const EXAMPLE_COLUMNS: usize = 33;
+/// The row of its content in which a list of files begins.
+pub(super) const LIST_ROW: usize = 3;
+/// What is said of a text that goes to the unit as it is.
+const MENU_KEYS: &str = "Every M, V, D, T, S and L in it is a key of the unit's menu.";
+
+/// A key and what it does here.
+pub(super) type Hint = (Press, &'static str);
+
+pub(super) const ENTER: Press = Press::Plain(KeyCode::Enter);
+const ESC: Press = Press::Plain(KeyCode::Esc);
+const BACKSPACE: Press = Press::Plain(KeyCode::Backspace);
+const CLEAR: Press = Press::Ctrl('u');
+
+pub(super) const fn letter(letter: char) -> Press {
+    Press::Plain(KeyCode::Char(letter))
+}
+
+/// Title, rows, and the keys that answer.
+pub(super) type Content = (String, Vec<Line<'static>>, Vec<Hint>);
+
+/// A file that is there, chosen in `room` rows.
+fn choose(wanted: Wanted, picker: &Picker, text: &str, theme: Theme, (columns, room): (usize, usize)) -> Content {
+    let (title, explained, key) = match wanted {
+        Wanted::Dump => {
+            ("Compare with a saved dictionary", "As E here or 'axcon dictionary dump' writes it, as JSON.", "compare")
+        }
+        Wanted::ToSend => ("Send a file as it is", "Byte for byte, as if typed. Software goes by screen 4.", "choose"),
+    };
+    let directory = visible::text(&picker.directory().to_string_lossy());
+    let above: [Line; LIST_ROW] =
+        [Line::raw(explained), Line::styled(format::keep_end(&directory, columns), theme.quiet()), Line::default()];
+    let mut rows = Vec::from(above);
+    let mut shown = picker.rows(theme, columns, room, "Type a path.");
+    // The popup keeps its height from folder to folder.
+    shown.resize(room, Line::default());
+    rows.extend(shown);
+    rows.extend([Line::default(), typed(theme, "or a path ", text, columns)]);
+    let clear = if text.is_empty() { (BACKSPACE, "folder above") } else { (CLEAR, "clear") };
+    (title.to_owned(), rows, vec![(ENTER, key), clear, (ESC, "back")])
+}
+
+/// What a question shows in so many columns; a list of files in it has so many rows.
+pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, usize)) -> Content {
+    let (title, rows, hints) = match question {
+        Question::Link(field) => (
+            "Connect to",
+            {
+                let text = "A serial port (/dev/ttyUSB0, COM3) or its adapter's serial number, an address in the network \
+                            (tcp://host:port), or an emulated unit (emu:axtc4co).";
+                with_field(theme, paragraphs(&[text], columns), field.text(), None, columns)
+            },
+            vec![(ENTER, "connect"), (ESC, "back")],
+        ),
+        Question::File { purpose, typed: field, directory, complaint } => {
+            let (title, text, key) = match purpose {
+                Purpose::Image => ("Image file", "A path, absolute or from this folder:", "check it"),
+                Purpose::ExportStream => (
+                    "Write rows to a CSV file",
+                    "A new file; the rows that are kept go first, then all that come until E ends it.",
+                    "begin",
+                ),
+                Purpose::ExportDictionary => (
+                    "Write the object dictionary to a file",
+                    "A new file. Its ending says how: .json (to compare with later), .csv, .dcf, .txt.",
+                    "write",
+                ),
+            };
+            let mut rows = paragraphs(&[text], columns);
+            if *purpose == Purpose::Image {
+                let directory = visible::text(&directory.to_string_lossy());
+                rows.push(Line::styled(format::keep_end(&directory, columns), theme.quiet()));
+            }
+            let rows = with_field(theme, rows, field.text(), complaint.as_deref(), columns);
+            (title, rows, vec![(ENTER, key), (CLEAR, "clear"), (ESC, "back")])
+        }
+        Question::Find(field) => {
+            ("Find", vec![typed(theme, "", field.text(), columns)], vec![(ENTER, "keep"), (ESC, "show everything")])
+        }
+        Question::Temperature { input, typed: field, complaint } => (
+            "Temperature of the sensor",
+            {
+                let label = format!("Input {input}, in °C");
+                with_field(theme, paragraphs(&[&label], columns), field.text(), *complaint, columns)
+            },
+            vec![(ENTER, "set"), (ESC, "back")],
+        ),
+        Question::Order { typed: field, complaint } => (
+            "Order to the emulated unit",
+            {
+                let example = |(orders, does): &(&[&str], &str)| {
+                    Line::from(vec![
+                        Span::raw(format::left(&orders.join(", "), EXAMPLE_COLUMNS)),
+                        Span::styled(format::keep_start(does, columns.saturating_sub(EXAMPLE_COLUMNS)), theme.quiet()),
+                    ])
+                };
+                with_field(theme, ORDERS.iter().map(example).collect(), field.text(), *complaint, columns)
+            },
+            vec![(ENTER, "do it"), (ESC, "back")],
+        ),
+        Question::Stream { source, millis, complaint, .. } => (
+            "Switch the data stream on",
+            {
+                let choice = |mine: Source, text: &'static str| match mine == *source {
+                    true => Line::styled(format!("› {text}"), theme.strong()),
+                    false => Line::raw(format!("  {text}")),
+                };
+                let mut rows = vec![
+                    choice(Source::FieldValue, "F  field value, object 6100h, in °C"),
+                    choice(Source::ProcessValue, "P  process value, object 7130h, in counts"),
+                    Line::default(),
+                    typed(theme, "Every, in ms: ", millis.text(), columns),
+                    Line::default(),
+                ];
+                rows.extend(paragraphs(
+                    &["The unit stores this: the stream comes back after every power cycle until T switches it off."],
+                    columns,
+                ));
+                for text in [too_fast(view, *source, millis.text()), loses_rows(view, *source)].into_iter().flatten() {
+                    rows.push(Line::default());
+                    rows.extend(format::wrap(&text, columns).into_iter().map(|row| Line::styled(row, theme.warning())));
+                }
+                rows.extend(complain(theme, *complaint, columns));
+                rows
+            },
+            vec![(letter('f'), "field"), (letter('p'), "process"), (ENTER, "switch on"), (ESC, "back")],
+        ),
+        Question::View => (
+            "View the object dictionary",
+            paragraphs(
+                &[
+                    "While the object dictionary is viewed, the unit halts temperature scanning and CAN. It has to be \
+                     pre-operational.",
+                    "axcon reads all of it, which takes some seconds, and leaves the view again; or look at it \
+                     yourself on the terminal: Enter shows the next object, X leaves.",
+                ],
+                columns,
+            ),
+            vec![(ENTER, "read all of it"), (letter('t'), "on the terminal"), (ESC, "back")],
+        ),
+        Question::Defaults { typed: field, complaint } => (
+            "Restore the default object dictionary",
+            {
+                let rows = paragraphs(
+                    &[
+                        "All settings of the object dictionary go back to the factory's. The unit applies them at once: \
+                         it restarts. Node-ID and bit rate stay as LSS has set them.",
+                        "Type Yes to do it.",
+                    ],
+                    columns,
+                );
+                with_field(theme, rows, field.text(), *complaint, columns)
+            },
+            vec![(ENTER, "restore"), (ESC, "back")],
+        ),
+        Question::Allow { typed: field, errors, complaint } => (
+            "Send in spite of an error?",
+            {
+                let names: Vec<&str> = errors.iter().map(|error| error.name()).collect();
+                let named = format!("Type the name of one: {}.", names.join(", "));
+                let consequence = "What is sent is not what was built, or not for this unit. It may not run, and the unit \
+                                   then waits in its loader, without scanning and CAN, for a file that is sound.";
+                let rows = paragraphs(&[consequence, named.as_str()], columns);
+                with_field(theme, rows, field.text(), *complaint, columns)
+            },
+            vec![(ENTER, "allow it and check again"), (ESC, "back")],
+        ),
+        Question::Label { typed: field, image, complaint, .. } => (
+            "Which product is the unit?",
+            {
+                let image = image.as_deref().map_or("not said".to_owned(), visible::text);
+                let text = "The unit cannot say what it is: a loader knows only how to take a file. A file for another \
+                            product would make the unit useless until the right one is sent.";
+                let named = format!("The file is for: {image}. Type the part number on the unit's label.");
+                let rows = paragraphs(&[text, named.as_str()], columns);
+                with_field(theme, rows, field.text(), *complaint, columns)
+            },
+            vec![(ENTER, "go on"), (ESC, "back")],
+        ),
+        Question::Password { field, complaint, .. } => (
+            "Password for loading software",
+            {
+                let is_emulated = view.link.name.as_deref().is_some_and(|name| name.starts_with("emu:"));
+                let origin = match is_emulated {
+                    true => "Emulated units take AXIO-2010.",
+                    false => "Your Axiomatic contact has it. Capital and small letters count.",
+                };
+                let rows = paragraphs(&[origin, "It is neither shown nor recorded."], columns);
+                with_field(theme, rows, &field.dots(), *complaint, columns)
+            },
+            vec![(ENTER, "start the upload"), (ESC, "back")],
+        ),
+        Question::CancelLoad => (
+            "Cancel the upload?",
+            paragraphs(&[consequence(view.load.progress.map(|progress| progress.phase))], columns),
+            vec![(letter('y'), "cancel the upload"), (letter('n'), "go on loading")],
+        ),
+        Question::Paste { bytes, left_out } => (
+            "Send the pasted text?",
+            {
+                let rows = bytes.iter().filter(|&&byte| byte == b'\r').count() + 1;
+                let lines = if rows == 1 { "one line".to_owned() } else { format!("{} lines", format::grouped(rows)) };
+                let go = if bytes.len() == 1 { "goes" } else { "go" };
+                let mut texts = vec![
+                    format!("{}, {lines}, {go} to the unit as if typed.", format::counted(bytes.len(), "character")),
+                    MENU_KEYS.to_owned(),
+                ];
+                if *left_out > 0 {
+                    let left_out = format::counted(*left_out, "character");
+                    texts.push(format!("Left out: {left_out} that a unit does not know; it takes ASCII only."));
+                }
+                paragraphs(&texts, columns)
+            },
+            vec![(letter('y'), "send"), (ESC, "do not send")],
+        ),
+        Question::Choose { wanted, picker, typed } => {
+            return choose(*wanted, picker, typed.text(), theme, (columns, room));
+        }
+        Question::SendFile { name, bytes, is_image } => (
+            "Send this file as it is?",
+            {
+                let name = visible::text(name);
+                let size = format::counted(bytes.len(), "byte");
+                let mut texts = vec![format!("{name}, {size}, goes to the unit as if typed.")];
+                texts.push(match is_image {
+                    true => {
+                        "It is a software image. The load screen (4) checks it first, waits where the unit needs time, \
+                             notices every error and proves the result; here nobody does. A unit in its loader may be \
+                             left without software, one in its menu takes every S and D for a key."
+                            .to_owned()
+                    }
+                    false => MENU_KEYS.to_owned(),
+                });
+                let time = bytes.len() as f64 * f64::from(BITS_PER_CHARACTER) / f64::from(view.link.baud.max(1));
+                texts.push(format!(
+                    "It takes {} or more. Esc stops it.",
+                    format::minutes(Duration::from_secs_f64(time.ceil()))
+                ));
+                paragraphs(&texts, columns)
+            },
+            match is_image {
+                true => {
+                    vec![(letter('l'), "load screen"), (letter('y'), "send all the same"), (ESC, "do not send")]
+                }
+                false => vec![(letter('y'), "send"), (ESC, "do not send")],
+            },
+        ),
+        Question::Disconnect { then } => (
+            "Close the link?",
+            {
+                let mut texts: Vec<String> = match view.is_in_the_middle() {
+                    true => in_the_middle(view).map(str::to_owned).to_vec(),
+                    false => {
+                        vec![format!("{} is connected.", visible::text(view.link.name.as_deref().unwrap_or("A unit")))]
+                    }
+                };
+                if emulated(view).is_some() {
+                    texts.push("The emulated unit is gone with its link, with all that was set and loaded.".into());
+                }
+                let is_same = *then == view.link.name;
+                texts.extend(then.as_deref().map(visible::text).map(|link| match is_same {
+                    true => format!("Then {link} is opened again."),
+                    false => format!("{link} is opened first: if that fails, the link stays."),
+                }));
+                paragraphs(&texts, columns)
+            },
+            vec![(letter('y'), "close the link"), (letter('n'), "stay connected")],
+        ),
+        Question::Quit => (
+            "Leave axcon?",
+            paragraphs(&in_the_middle(view), columns),
+            vec![(letter('y'), "leave"), (letter('n'), "stay")],
+        ),
+    };
+    (title.to_owned(), rows, hints)
+}
+
+/// Texts with a blank line between them.
+pub(super) fn paragraphs(texts: &[impl AsRef<str>], columns: usize) -> Vec<Line<'static>> {
+    let mut rows = Vec::new();
+    for text in texts {
+        if !rows.is_empty() {
+            rows.push(Line::default());
+        }
+        rows.extend(format::wrap(text.as_ref(), columns).into_iter().map(Line::raw));
+    }
+    rows
+}
+
+/// A field below what is asked, and below it what is wrong with what was typed.
+fn with_field(
+    theme: Theme,
+    mut asked: Vec<Line<'static>>,
+    text: &str,
+    complaint: Option<&str>,
+    columns: usize,
+) -> Vec<Line<'static>> {
+    asked.push(Line::default());
+    asked.push(typed(theme, "", text, columns));
+    asked.extend(complain(theme, complaint, columns));
+    asked
+}
+
+/// A field: its end is what one looks at while typing.
+fn typed(theme: Theme, label: &'static str, text: &str, columns: usize) -> Line<'static> {
+    let room = columns.saturating_sub(format::width(label) + 3);
+    let text = format::keep_end(&visible::text(text), room);
+    Line::from(vec![
+        Span::styled(label, theme.quiet()),
+        Span::styled("› ", theme.quiet()),
+        Span::styled(text, theme.strong()),
+        Span::styled(" ", theme.bar()),
+    ])
+}
+
+fn complain(theme: Theme, complaint: Option<&str>, columns: usize) -> Vec<Line<'static>> {
+    let Some(text) = complaint else { return Vec::new() };
+    let broken = format::wrap(text, columns).into_iter().map(|line| Line::styled(line, theme.bad()));
+    std::iter::once(Line::default()).chain(broken).collect()
+}

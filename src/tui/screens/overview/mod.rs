@@ -1,0 +1,211 @@
+//! What is known of the unit, its live values and its faults, on one page.
+
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::Rect;
+use ratatui::text::Line;
+
+mod diagnosed;
+mod faults;
+mod unit;
+mod values;
+
+use faults::fault_rows;
+use unit::unit;
+
+use super::{Scene, terminal};
+use crate::device::Product;
+use crate::monitor::{Channel, Stream};
+use crate::session::UnitState;
+use crate::tui::action::Action;
+use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::view::View;
+use crate::tui::widgets::chart::{self, Curve, Quantity};
+use crate::tui::widgets::lines;
+use crate::wire::stream::Source;
+
+/// Name on the tab.
+pub const TITLE: &str = "Overview";
+
+/// Keys of the screen.
+pub const BINDINGS: &[Binding] = &[
+    Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "channel above" },
+    Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "channel", long: "channel below" },
+    Binding { keys: &[Press::Plain(KeyCode::PageUp)], cmd: Cmd::PageUp, short: "", long: "faults above" },
+    Binding { keys: &[Press::Plain(KeyCode::PageDown)], cmd: Cmd::PageDown, short: "faults", long: "faults below" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('r'))],
+        cmd: Cmd::Restart,
+        short: "restart min/max",
+        long: "start minimum and maximum anew",
+    },
+];
+
+/// From this width on the raw terminal has room beside the values.
+const BESIDE_COLUMNS: u16 = 140;
+/// From this height on the chosen channel gets a chart.
+const CHART_ROWS: u16 = 32;
+/// Rows of the faults that the rest of the page leaves room for, with their heading, where there are any.
+const FAULT_ROWS: usize = 3;
+
+/// The page.
+#[derive(Debug, Default)]
+pub struct Overview {
+    cursor: usize,
+    /// Faults above those that are shown.
+    scrolled: usize,
+}
+
+/// Where the parts of the page stand.
+struct Parts {
+    unit: Vec<Line<'static>>,
+    values: Vec<Line<'static>>,
+    chart_rows: u16,
+    faults: Rect,
+}
+
+impl Overview {
+    /// What a command does here; `faults` is how many of them can stand above those that are shown, and how many are
+    /// shown at once.
+    pub fn on(&mut self, cmd: Cmd, channels: usize, (last, shown): (usize, usize)) -> Option<Action> {
+        self.scrolled = self.scrolled.min(last);
+        self.cursor = self.cursor.min(channels.saturating_sub(1));
+        match cmd {
+            Cmd::Up => self.cursor = self.cursor.saturating_sub(1),
+            Cmd::Down => self.cursor = (self.cursor + 1).min(channels.saturating_sub(1)),
+            Cmd::PageUp => self.scrolled = self.scrolled.saturating_sub(shown.max(1)),
+            Cmd::PageDown => self.scrolled = (self.scrolled + shown.max(1)).min(last),
+            Cmd::Restart => return Some(Action::RestartExtremes),
+            _ => {}
+        }
+        None
+    }
+
+    /// How many faults can stand above those that are shown, and how many are shown at once.
+    pub fn faults_at(&self, scene: Scene, area: Rect) -> (usize, usize) {
+        let room = usize::from(self.parts(scene, page(area)).faults.height.saturating_sub(1));
+        (fault_rows(scene).len().saturating_sub(room), room)
+    }
+
+    /// The picture.
+    pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let left = page(area);
+        if left == area {
+            return self.draw_page(scene, area, frame);
+        }
+        let right = Rect { x: area.x + left.width + 2, width: area.width - left.width - 2, ..area };
+        self.draw_page(scene, left, frame);
+        let (heading, text) = lines::split(right, 1);
+        lines::draw(frame, heading, [lines::rule(scene.theme, right.width, "On the line", "3 shows all of it")]);
+        lines::draw(frame, text, terminal::newest_lines(scene, text));
+    }
+
+    fn draw_page(&self, scene: Scene, area: Rect, frame: &mut Frame) {
+        let parts = self.parts(scene, area);
+        let (upper, rest) = lines::split(area, parts.unit.len() as u16);
+        lines::draw(frame, upper, parts.unit);
+        let (middle, rest) = lines::split(rest, parts.values.len() as u16);
+        lines::draw(frame, middle, parts.values);
+        let stream = &scene.view.monitor.stream;
+        if let Some(channel) = stream.channels.get(self.chosen(stream)).filter(|_| parts.chart_rows > 0) {
+            draw_chart(scene, channel, lines::split(rest, parts.chart_rows).0, frame);
+        }
+        lines::draw(frame, parts.faults, self.faults(scene, parts.faults));
+    }
+
+    fn parts(&self, scene: Scene, area: Rect) -> Parts {
+        let (mut unit, mut values) = (unit(scene, area.width), self.values(scene, area));
+        // Faults are what one looks for: the blank line and what stands below the values make room for them.
+        let least = if fault_rows(scene).is_empty() { 0 } else { FAULT_ROWS };
+        let too_many = |unit: &Vec<_>, values: &Vec<_>| unit.len() + values.len() + least > usize::from(area.height);
+        if too_many(&unit, &values) {
+            unit.pop();
+        }
+        if too_many(&unit, &values) && is_current(scene) {
+            values.pop();
+        }
+        let (_, rest) = lines::split(area, (unit.len() + values.len()) as u16);
+        let has_chart = area.height >= CHART_ROWS && !scene.view.monitor.stream.channels.is_empty();
+        let chart_rows = if has_chart { rest.height * 3 / 5 } else { 0 };
+        Parts { unit, values, chart_rows, faults: lines::split(rest, chart_rows).1 }
+    }
+
+    /// The number of the chosen channel: another unit may have fewer than the one before.
+    fn chosen(&self, stream: &Stream) -> usize {
+        self.cursor.min(stream.channels.len().saturating_sub(1))
+    }
+}
+
+/// The part of the screen that the page takes: where there is room, the terminal stands beside it.
+fn page(area: Rect) -> Rect {
+    if area.width < BESIDE_COLUMNS { area } else { Rect { width: area.width * 3 / 5, ..area } }
+}
+
+/// Whether the values are those of now, so that nothing has to be said about them.
+fn is_current(scene: Scene) -> bool {
+    scene.view.monitor.stream.source.is_some() && scene.view.why_old().is_none()
+}
+
+/// Digits behind the point, as the product prints them.
+pub fn decimals(view: &View, source: Source) -> usize {
+    // A row that has been understood is one of a product that we know, if the unit has named itself or not.
+    let channels = &view.monitor.stream.channels;
+    let has_these =
+        |product: &&Product| product.stream.channels.iter().eq(channels.iter().map(|channel| &channel.name));
+    view.product().or_else(|| Product::all().iter().find(has_these)).map_or_else(
+        || if source == Source::FieldValue { 3 } else { 0 },
+        |product| product.stream.format(source).decimals,
+    )
+}
+
+/// What to do to see values.
+pub fn without_values(scene: Scene) -> Vec<&'static str> {
+    if scene.view.link.name.is_none() {
+        return vec!["Not connected. Press 1 to choose a port or an emulated unit."];
+    }
+    let mut told = match (scene.view.facts.state, scene.view.facts.stream) {
+        (UnitState::Loader, _) => {
+            vec!["The unit waits in its loader and measures nothing. Press L to load software."]
+        }
+        (_, Some(_)) => vec!["The stream is on. Waiting for its first row."],
+        (UnitState::Silent, None) => vec![
+            "Nothing has been heard from the unit.",
+            "Check power and cable, then press M to ask again, or switch the unit off and on.",
+        ],
+        (UnitState::Unknown, None) => vec![
+            "Something talks, but nothing that is known. Press 3 to see what it says.",
+            "Signs like ‹9b› mean another baud rate: the units have 115200, 8 data bits, no parity.",
+        ],
+        (UnitState::Application, None) if !scene.view.stream_is_off => {
+            vec!["The unit has sent no values so far.", "Press T to switch its stream on."]
+        }
+        (UnitState::Application, None) => {
+            vec!["The stream is off, so the unit sends no values.", "Press T to switch it on."]
+        }
+    };
+    // What there is to do takes a unit; what signs mean is true of a recording, too.
+    if !scene.view.can_send() && scene.view.facts.state != UnitState::Unknown {
+        told.truncate(1);
+    }
+    told
+}
+
+fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
+    let (heading, canvas) = lines::split(area, 1);
+    let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
+    lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Trend of {}", channel.name), "")]);
+    let source = stream.source.unwrap_or(Source::FieldValue);
+    let samples: Vec<_> = channel.newest(usize::MAX).collect();
+    let ends = samples.first().zip(samples.last());
+    let curve = Curve {
+        window: ends.map(|(first, last)| (first.0, last.0)).unwrap_or_default(),
+        quantity: Quantity::of(source, decimals(scene.view, source)),
+        cursor: None,
+        marks: stream.marks.iter().copied().collect(),
+        without: super::stream::without_value(channel),
+        label_columns: 0,
+        samples,
+    };
+    let (canvas, _) = lines::split(canvas, canvas.height.saturating_sub(1));
+    chart::draw(theme, scene.start_of_day, &curve, canvas, frame);
+}
