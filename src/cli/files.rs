@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 use super::error::{CliError, Kind};
-use super::image::shown;
+pub use super::image::shown;
 use crate::host::save::{self, SaveError};
 
 /// Reads a text of no more bytes than that: whatever a name leads to need not have an end.

@@ -16,6 +16,7 @@ pub mod link;
 pub mod load;
 pub mod manual;
 pub mod names;
+pub mod numbers;
 pub mod output;
 pub mod password;
 pub mod playback;
@@ -24,6 +25,7 @@ pub mod report;
 pub mod stream;
 pub mod talk;
 pub mod terminal;
+pub mod waiting;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
