@@ -129,6 +129,7 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     talk.find_application()?;
     let ended = talk.run(Command::ReadDictionary, |_, _| Ok(()))?;
     let facts = talk.session().facts().clone();
+    let unix_millis = talk.calendar().at(talk.now()).as_millisecond();
     talk.close(output);
     let reading = match ended {
         Ended::Finished { outcome, interrupted: false } => talk.expect_reading(outcome)?,
@@ -146,7 +147,7 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
         Format::Table => dump.table(),
         Format::Csv => dump.csv(),
         Format::Dcf => match product {
-            Some(product) => dump::configuration(&reading, product, &facts),
+            Some(product) => dump::configuration(&reading, product, &facts, unix_millis),
             None => {
                 let message = "a DCF needs to know the product, and the unit does not say it";
                 return Err(
