@@ -48,7 +48,7 @@ struct ValueObject {
 /// # Errors
 /// If no unit answers, or shows no pages.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
-    let json = args.format.unwrap_or(if output.json { Format::Json } else { Format::Text }) == Format::Json;
+    let json = output.format(args.format, Format::Json, Format::Text)? == Format::Json;
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     let calendar = talk.calendar();

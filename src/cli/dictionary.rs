@@ -8,12 +8,13 @@ use serde::Serialize;
 use super::Global;
 use super::ask::confirm;
 use super::error::{CliError, Kind};
-use super::output::Output;
+use super::files::Destination;
+use super::output::{Closed, Output};
 use super::talk::{Ended, Talk};
 use super::{files, link, names};
 use crate::device::Product;
 use crate::dump::{self, Difference, Dump, DumpError};
-use crate::session::{Command, DictionaryReading, Facts, Outcome};
+use crate::session::Command;
 
 /// Arguments of `axcon dictionary`.
 #[derive(Debug, clap::Args)]
@@ -59,6 +60,16 @@ enum Format {
     Dcf,
 }
 
+impl Args {
+    /// Whether a unit is read, and not only what was read of one.
+    pub fn reads_a_unit(&self) -> bool {
+        match self.command {
+            Deed::Dump { .. } => true,
+            Deed::Diff { .. } => false,
+        }
+    }
+}
+
 impl Format {
     /// The format that a file's name promises.
     fn of_file(file: &Path) -> Option<Self> {
@@ -100,18 +111,17 @@ const LARGEST_DUMP: u64 = 4 << 20;
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     match args.command {
         Deed::Dump { format, out } => {
-            let by_name = out.as_deref().and_then(Format::of_file);
-            let format = format.or(by_name).unwrap_or(if output.json { Format::Json } else { Format::Table });
-            dump(format, out.as_deref(), global, output)
+            let format = match (format, out.as_deref().and_then(Format::of_file)) {
+                (None, Some(by_name)) => by_name,
+                (format, _) => output.format(format, Format::Json, Format::Table)?,
+            };
+            dump(format, Destination::admit(out.as_deref(), global.yes)?, global, output)
         }
         Deed::Diff { left, right, all } => diff(&left, &right, all, output),
     }
 }
 
-fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output) -> Result<(), CliError> {
-    if let Some(file) = out {
-        files::admit(file, global.yes)?;
-    }
+fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Output) -> Result<(), CliError> {
     if !link::is_recording(global) {
         confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
     }
@@ -119,16 +129,12 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
     talk.find_application()?;
     let ended = talk.run(Command::ReadDictionary, |_, _| Ok(()))?;
     let facts = talk.session().facts().clone();
+    let unix_millis = talk.calendar().at(talk.now()).as_millisecond();
     talk.close(output);
     let reading = match ended {
-        Ended::Finished { outcome: Outcome::DictionaryRead(reading), interrupted: false } => reading,
+        Ended::Finished { outcome, interrupted: false } => talk.expect_reading(outcome)?,
         Ended::Finished { interrupted: true, .. } => {
             return Err(CliError::message(Kind::Interrupted, "interrupted; the view has been left"));
-        }
-        Ended::Finished { outcome, interrupted: false } => {
-            return talk
-                .expect_done(&outcome)
-                .and_then(|()| Err(CliError::message(Kind::Failed, "the reading ended without a result")));
         }
         Ended::Lost { error, .. } => {
             return Err(error.hint("the unit may still stand in its view, with scanning halted: X leaves it"));
@@ -140,29 +146,28 @@ fn dump(format: Format, out: Option<&Path>, global: &Global, output: &mut Output
         Format::Json => dump.json(),
         Format::Table => dump.table(),
         Format::Csv => dump.csv(),
-        Format::Dcf => configuration(&reading, product, &facts)?,
+        Format::Dcf => match product {
+            Some(product) => dump::configuration(&reading, product, &facts, unix_millis),
+            None => {
+                let message = "a DCF needs to know the product, and the unit does not say it";
+                return Err(
+                    CliError::message(Kind::Failed, message).hint("--format json keeps everything that was read")
+                );
+            }
+        },
     };
-    match out {
-        None => output.data(text.as_bytes())?,
-        Some(file) => files::save(file, text.as_bytes(), global.yes)?,
-    }
+    let written = out.save(text.as_bytes(), output);
     if dump.complete {
-        return Ok(());
+        return written;
     }
+    // That it is not all of it counts, whoever still reads.
+    written.or_else(|error| if error.error.is::<Closed>() { Ok(()) } else { Err(error) })?;
     let message = match talk.is_recorded() {
         true => "the recording does not show the end of the object dictionary",
         false => "the unit stopped answering before the end of its object dictionary",
     };
-    Err(CliError::message(Kind::NoAnswer, format!("{message}; {} entries were read", dump.entries.len()))
+    Err(CliError::message(Kind::NoAnswer, format!("{message}; entries read: {}", dump.entries.len()))
         .hint("what was read is written all the same"))
-}
-
-fn configuration(reading: &DictionaryReading, product: Option<&Product>, facts: &Facts) -> Result<String, CliError> {
-    let product = product.ok_or_else(|| {
-        CliError::message(Kind::Failed, "a DCF needs to know the product, and the unit does not say it")
-            .hint("--format json keeps everything that was read")
-    })?;
-    Ok(dump::configuration(reading, product, facts))
 }
 
 fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), CliError> {
@@ -185,10 +190,7 @@ fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), C
             let Difference { index, subindex, name, .. } = difference;
             let side = |value: Option<String>| value.unwrap_or_else(|| "not there".into());
             let (left, right) = (side(difference.shown_left()), side(difference.shown_right()));
-            lines.push_str(&format!(
-                "{index}:{subindex:02X}  {name:<58} {left:>14}  {right:>14}
-"
-            ));
+            lines.push_str(&format!("{index}:{subindex:02X}  {name:<58} {left:>14}  {right:>14}\n"));
         }
         output.data(lines.as_bytes())
     };

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use super::error::CliError;
+use super::files::Destination;
 use super::output::Output;
-use super::{Global, files, names};
+use super::{Global, names};
 use crate::device::{Product, eds};
 
 /// Arguments of `axcon eds`.
@@ -25,9 +26,5 @@ pub struct Args {
 /// # Errors
 /// If it cannot be written, or the file is there already and nobody said yes.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
-    let text = eds::write(args.product);
-    match &args.out {
-        None => output.data(text.as_bytes()),
-        Some(file) => files::save(file, text.as_bytes(), global.yes),
-    }
+    Destination::admit(args.out.as_deref(), global.yes)?.save(eds::write(args.product).as_bytes(), output)
 }

@@ -1,11 +1,11 @@
 //! Files that commands read and write.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Read};
-use std::path::Path;
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
 
 use super::error::{CliError, Kind};
-use super::image::shown;
+use super::output::Output;
 use crate::host::save::{self, SaveError};
 
 /// Reads a text of no more bytes than that: whatever a name leads to need not have an end.
@@ -24,6 +24,114 @@ pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
     })
 }
 
+/// Where a command's data goes: standard output, or what `--out` names. A file that is there already is replaced only if
+/// the user has said `--yes`; a pipe or a device is written to as it is.
+#[derive(Debug)]
+pub struct Destination {
+    path: PathBuf,
+    overwrite: bool,
+    place: Place,
+}
+
+#[derive(Debug)]
+enum Place {
+    StandardOutput,
+    /// A pipe or a device.
+    Stream(File),
+    /// Made when there is something for it.
+    File(Option<File>),
+}
+
+impl Destination {
+    /// A place that may be written: to be asked before the unit is, and before signals are heard, since a pipe waits here
+    /// for its reader. `None`, `-` and the system's own names for it are standard output. `overwrite`: the user has said
+    /// `--yes`.
+    ///
+    /// # Errors
+    /// If something is there that should stay, there is no such folder, or the pipe or device does not open.
+    pub fn admit(path: Option<&Path>, overwrite: bool) -> Result<Self, CliError> {
+        let path = path.unwrap_or(Path::new("-"));
+        let place = if STANDARD_OUTPUT.iter().any(|name| path == Path::new(name)) {
+            Place::StandardOutput
+        } else if is_stream(path) {
+            let opened = File::options().write(true).open(path);
+            Place::Stream(opened.map_err(|error| save_error(path, SaveError::Io(error)))?)
+        } else {
+            admit(path, overwrite)?;
+            // Nobody shall work for what has no place in the end.
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let found = std::fs::metadata(folder).and_then(|found| match found.is_dir() {
+                true => Ok(()),
+                false => Err(ErrorKind::NotADirectory.into()),
+            });
+            found.map_err(|error| save_error(path, SaveError::Io(error)))?;
+            Place::File(None)
+        };
+        Ok(Destination { path: path.to_owned(), overwrite, place })
+    }
+
+    /// Whether it is standard output, where nothing else may come between then.
+    pub fn is_standard_output(&self) -> bool {
+        matches!(self.place, Place::StandardOutput)
+    }
+
+    /// The name, harmless on a terminal.
+    pub fn shown(&self) -> String {
+        shown(&self.path)
+    }
+
+    /// Writes all there is to write; of a file the old or the new one is there at any moment.
+    ///
+    /// # Errors
+    /// If a file has come that should stay, or it cannot be written.
+    pub fn save(&mut self, bytes: &[u8], output: &mut Output) -> Result<(), CliError> {
+        match &self.place {
+            Place::File(_) => {
+                save::save(&self.path, bytes, self.overwrite).map_err(|error| save_error(&self.path, error))
+            }
+            Place::StandardOutput | Place::Stream(_) => self.append(bytes, output),
+        }
+    }
+
+    /// Appends; a file is made with the first piece: until then yesterday's is there.
+    ///
+    /// # Errors
+    /// As [`save`](Destination::save).
+    pub fn append(&mut self, bytes: &[u8], output: &mut Output) -> Result<(), CliError> {
+        let written = match &mut self.place {
+            Place::StandardOutput => return output.data(bytes),
+            Place::Stream(open) | Place::File(Some(open)) => open.write_all(bytes),
+            Place::File(place @ None) => {
+                let mut options = File::options();
+                options.write(true).create(true).truncate(true).create_new(!self.overwrite);
+                options.open(&self.path).and_then(|file| place.insert(file).write_all(bytes))
+            }
+        };
+        written.map_err(|error| {
+            let exists = error.kind() == ErrorKind::AlreadyExists;
+            save_error(&self.path, if exists { SaveError::Exists } else { SaveError::Io(error) })
+        })
+    }
+}
+
+/// Names of standard output. Opened by one of the last three, a file behind it would be written from its beginning.
+const STANDARD_OUTPUT: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+
+/// Whether bytes go there one behind the other, and no file may take its place.
+#[cfg(unix)]
+fn is_stream(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+
+    let kind = std::fs::metadata(path).map(|found| found.file_type());
+    kind.is_ok_and(|kind| kind.is_fifo() || kind.is_char_device())
+}
+
+/// The same where devices are no files.
+#[cfg(not(unix))]
+fn is_stream(_path: &Path) -> bool {
+    false
+}
+
 /// Whether a command may write this file: to be asked before the unit is. `overwrite`: the user has said `--yes`.
 ///
 /// # Errors
@@ -32,17 +140,16 @@ pub fn admit(path: &Path, overwrite: bool) -> Result<(), CliError> {
     save::admit(path, overwrite).map_err(|error| save_error(path, error))
 }
 
-/// Writes a file so that the old or the new one is there at any moment. What is there already is replaced only if the
-/// user has said `--yes`.
-///
-/// # Errors
-/// If a file is there and should stay, or it cannot be written.
-pub fn save(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), CliError> {
-    save::save(path, bytes, overwrite).map_err(|error| save_error(path, error))
+/// A path for the screen: a name may hold anything, a terminal must not get it.
+pub fn shown(path: &Path) -> String {
+    if path == Path::new("-") {
+        return "standard input".into();
+    }
+    path.to_string_lossy().chars().map(|letter| if letter.is_control() { '?' } else { letter }).collect()
 }
 
 /// What it means that a file is not written.
-pub fn save_error(path: &Path, error: SaveError) -> CliError {
+fn save_error(path: &Path, error: SaveError) -> CliError {
     let shown = shown(path);
     match error {
         SaveError::Exists => CliError::message(Kind::NeedsYes, format!("{shown} exists already"))
@@ -58,6 +165,50 @@ pub fn save_error(path: &Path, error: SaveError) -> CliError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::output::Remarks;
+
+    fn nowhere() -> Output {
+        Output { json: false, out: Box::new(io::sink()), err: Remarks::to(io::sink()) }
+    }
+
+    #[test]
+    fn what_has_come_meanwhile_is_not_replaced_unasked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (path, output) = (folder.path().join("rows.csv"), &mut nowhere());
+        let place = |overwrite| Destination::admit(Some(&path), overwrite).expect("nothing is there, or may go");
+        let (mut rows, mut whole) = (place(false), place(false));
+        std::fs::write(&path, "somebody else's").expect("written");
+        let refused = [rows.append(b"row", output), whole.save(b"all", output)];
+        for refused in refused.map(|written| written.expect_err("refused")) {
+            assert_eq!(refused.kind, Kind::NeedsYes, "{refused}");
+        }
+        let mut rows = place(true);
+        assert_eq!(std::fs::read(&path).expect("there"), b"somebody else's", "no row has come");
+        rows.append(b"one\n", output).and_then(|()| rows.append(b"two\n", output)).expect("appended");
+        assert_eq!(std::fs::read(&path).expect("there"), b"one\ntwo\n");
+        assert!(Destination::admit(Some(folder.path()), true).is_err(), "a folder");
+        assert!(Destination::admit(Some(&folder.path().join("no/rows.csv")), true).is_err(), "no folder for it");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn devices_take_what_comes_and_stay_what_they_are() {
+        let output = &mut nowhere();
+        let null = || Destination::admit(Some(Path::new("/dev/null")), false).expect("a device");
+        null().save(b"all", output).and_then(|()| null().append(b"row", output)).expect("taken");
+        assert!(is_stream(Path::new("/dev/null")), "no file has taken its place");
+        let full = Destination::admit(Some(Path::new("/dev/full")), true);
+        let error = full.and_then(|mut full| full.save(b"x", output)).expect_err("there is no room");
+        assert!(error.to_string().starts_with("cannot write '/dev/full'"), "{error}");
+        for name in [None, Some(Path::new("-")), Some(Path::new("/dev/stdout"))] {
+            assert!(Destination::admit(name, false).expect("always there").is_standard_output());
+        }
+    }
+
+    #[test]
+    fn a_file_name_cannot_reach_the_terminal_as_control_codes() {
+        assert_eq!(shown(Path::new("a\x1b[31m.S")), "a?[31m.S");
+    }
 
     #[test]
     fn no_more_is_read_than_there_may_be_and_nothing_but_text() {

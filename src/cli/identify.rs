@@ -13,7 +13,7 @@ use super::output::Output;
 use super::talk::{Talk, no_answer_hints};
 use crate::canopen::ObjectAddress;
 use crate::host::journal::Note;
-use crate::session::{Command, Facts, Known, Origin, Outcome, UnitState};
+use crate::session::{Command, Facts, Known, Origin, UnitState};
 use crate::time::Duration;
 
 /// Arguments of `axcon identify`.
@@ -50,7 +50,15 @@ struct Object<'a> {
     can_kbps: Option<u16>,
     nmt_state: Option<&'a str>,
     unrecognised_lines: u64,
+    /// An upload that was begun on this port and has not ended well: what else the unit may be.
+    unfinished_upload: Option<UploadObject<'a>>,
     sources: Sources,
+}
+
+#[derive(Serialize)]
+struct UploadObject<'a> {
+    product: &'a str,
+    image: &'a str,
 }
 
 /// Where each fact comes from.
@@ -103,7 +111,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         UnitState::Silent | UnitState::Unknown => Err(talk.no_unit()),
     };
     let written = if output.json {
-        output.object(&object(&facts, &deep))
+        output.object(&object(&facts, &deep, unfinished.as_ref()))
     } else if found.is_ok() {
         output.data((text(&facts) + &deep.text()).as_bytes())
     } else {
@@ -125,14 +133,8 @@ struct Deep {
 
 impl Deep {
     fn read(talk: &mut Talk) -> Result<Self, CliError> {
-        let reading = match talk.ask(Command::ReadDictionary)? {
-            Outcome::DictionaryRead(reading) => reading,
-            outcome => {
-                return talk
-                    .expect_done(&outcome)
-                    .and_then(|()| Err(CliError::message(Kind::Failed, "the reading ended without a result")));
-            }
-        };
+        let outcome = talk.ask(Command::ReadDictionary)?;
+        let reading = talk.expect_reading(outcome)?;
         let entry = |index, sub| reading.entries.iter().find(|entry| entry.at == ObjectAddress::new(index, sub));
         let bits = |index, sub| entry(index, sub)?.value?.as_integer().and_then(|bits| u32::try_from(bits).ok());
         Ok(Deep {
@@ -169,23 +171,17 @@ fn wait_for_banner(talk: &mut Talk, output: &mut Output) -> Result<(), CliError>
     output.remark("axcon: switch the unit's power off and on; it says its version only then");
     let until = talk.now() + POWER_CYCLE;
     let mut said = false;
-    let undisturbed = talk.listen(until, |session, _| {
+    talk.hear(until, |session, _| {
         let facts = session.facts();
         said = facts.product.is_some() && facts.version.is_some() || facts.state == UnitState::Loader;
         Ok(if said { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     })?;
-    if !undisturbed {
-        return Err(CliError::interrupted());
-    }
     if !said {
         let message = format!("no power-up messages within {} s", POWER_CYCLE.as_secs());
         return Err(no_answer_hints(CliError::message(Kind::NoAnswer, message)));
     }
     let until = talk.now() + REST_OF_BANNER;
-    match talk.listen(until, |_, _| Ok(ControlFlow::Continue(())))? {
-        true => Ok(()),
-        false => Err(CliError::interrupted()),
-    }
+    talk.hear(until, |_, _| Ok(ControlFlow::Continue(())))
 }
 
 /// The state as JSON names it.
@@ -198,7 +194,7 @@ pub fn state_name(state: UnitState) -> &'static str {
     }
 }
 
-fn object<'a>(facts: &'a Facts, deep: &Deep) -> Object<'a> {
+fn object<'a>(facts: &'a Facts, deep: &Deep, unfinished: Option<&'a Note>) -> Object<'a> {
     Object {
         schema: "axcon.identify/1",
         state: state_name(facts.state),
@@ -212,6 +208,7 @@ fn object<'a>(facts: &'a Facts, deep: &Deep) -> Object<'a> {
         can_kbps: value(&facts.can_kbps),
         nmt_state: facts.nmt_state.as_ref().map(|known| known.value.as_str()),
         unrecognised_lines: facts.unrecognised_lines,
+        unfinished_upload: unfinished.map(|Note { product, image, .. }| UploadObject { product, image }),
         sources: Sources {
             product: source(&facts.product),
             version: source(&facts.version),

@@ -2,12 +2,11 @@
 
 use std::io::ErrorKind;
 use std::path::Path;
-use std::sync::mpsc::SyncSender;
+use std::sync::mpsc::{Receiver, SyncSender};
 
-use super::Global;
 use super::error::{CliError, Kind};
-use super::files;
 use super::output::Output;
+use super::{Global, files, waiting};
 use crate::host::Input;
 use crate::host::clock::Clock;
 use crate::host::link::{Cause, Connection, LinkError, LinkSpec, LinkSpecError, Options};
@@ -69,12 +68,26 @@ pub fn spec_error(error: LinkSpecError) -> CliError {
     CliError::new(Kind::Usage, anyhow::Error::new(error).context("--port"))
 }
 
-/// Opens a link as the command line says.
+/// Opens a link as the command line says. Signals come on `inputs` meanwhile: a server that does not answer may take
+/// seconds.
 ///
 /// # Errors
-/// If it does not open, with what to do about it.
-pub fn open(spec: &LinkSpec, global: &Global, clock: Clock, inputs: SyncSender<Input>) -> Result<Connection, CliError> {
-    Connection::open(spec, options(global), clock, inputs).map_err(link_error)
+/// If it does not open, with what to do about it, or the user interrupts.
+pub fn open(
+    spec: &LinkSpec,
+    global: &Global,
+    clock: Clock,
+    sender: SyncSender<Input>,
+    inputs: &Receiver<Input>,
+) -> Result<Connection, CliError> {
+    let options = options(global);
+    if !spec.is_network() {
+        return Connection::open(spec, options, clock, sender).map_err(link_error);
+    }
+    let server = spec.clone();
+    let dialled = waiting::begin(sender.clone(), move || Connection::dial(&server, options, clock))?;
+    let dialled = waiting::end(inputs, &dialled)?.map_err(link_error)?;
+    Connection::over(spec, dialled, options, clock, sender).map_err(link_error)
 }
 
 /// What the journal of uploads calls the port: the adapter's serial number where it has one, since its name may be
@@ -113,6 +126,19 @@ pub fn recording(global: &Global) -> Result<Plan, CliError> {
         _ if global.no_record => Ok(Plan::Nothing),
         Some(file) => files::admit(file, global.yes).map(|()| Plan::File(file.clone())),
         None => Ok(Plan::Unasked),
+    }
+}
+
+/// Refuses to record what is a recording already.
+///
+/// # Errors
+/// If the user named a file for it.
+pub fn not_recorded_again(global: &Global) -> Result<(), CliError> {
+    match &global.record {
+        None => Ok(()),
+        Some(_) => {
+            Err(CliError::message(Kind::Usage, "a recording is not recorded again: --record has no meaning there"))
+        }
     }
 }
 
@@ -257,6 +283,9 @@ pub fn recording_error(error: RecordingError) -> CliError {
         Some(_) | None => error,
     }
 }
+
+/// What is said of a recording that was read to its end, if it did not end as recordings do.
+pub const CUT_SHORT: &str = "axcon: the recording ends in the middle of a line: whoever wrote it was killed";
 
 /// Whether the command line names a recording.
 pub fn is_recording(global: &Global) -> bool {

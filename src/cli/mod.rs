@@ -16,6 +16,7 @@ pub mod link;
 pub mod load;
 pub mod manual;
 pub mod names;
+pub mod numbers;
 pub mod output;
 pub mod password;
 pub mod playback;
@@ -24,11 +25,13 @@ pub mod report;
 pub mod stream;
 pub mod talk;
 pub mod terminal;
+pub mod waiting;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use error::CliError;
 use output::Output;
@@ -68,7 +71,9 @@ const EXIT_CODES: &str = "Exit codes:
   8    the upload failed and nobody can say what the unit is now
   9    the unit runs, but not what was sent
   130  interrupted, by a key or a signal (SIGINT, SIGTERM, SIGHUP)
-If `load` to several ports fails: the code that all failures share, else 1.";
+If `load` to several ports fails: the code that all failures share, else 1.
+A reader that closes our output is no failure; nor is an output that was closed before we began (>&-), which the system's
+runtime replaces with /dev/null and nobody can see.";
 
 /// What every command understands.
 #[derive(Debug, Clone, Args)]
@@ -81,7 +86,7 @@ pub struct Global {
     /// Line rate in baud; the units have 115200.
     #[arg(long, value_name = "RATE", default_value_t = 115_200, global = true, value_parser = clap::value_parser!(u32).range(50..=12_000_000))]
     pub baud: u32,
-    /// Data and errors as JSON.
+    /// Data and errors as JSON; `terminal`, whose data is bytes, has none.
     #[arg(long, global = true)]
     pub json: bool,
     /// Answer yes to every question, and replace files that are there.
@@ -134,6 +139,28 @@ enum Command {
     Man(manual::ManArgs),
 }
 
+impl Command {
+    /// Whether it matters to the command where a unit is.
+    fn looks_at_a_unit(&self) -> bool {
+        match self {
+            Command::Identify(_)
+            | Command::Terminal(_)
+            | Command::Stream(_)
+            | Command::Diagnostics(_)
+            | Command::Report(_)
+            | Command::Load(_)
+            | Command::Defaults(_) => true,
+            Command::Dictionary(args) => args.reads_a_unit(),
+            Command::Ports(_)
+            | Command::Image(_)
+            | Command::Eds(_)
+            | Command::Emulate(_)
+            | Command::Completions(_)
+            | Command::Man(_) => false,
+        }
+    }
+}
+
 /// The commands by what they are for, in the order in which the help lists them.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Find a unit and talk to it", &["ports", "identify", "terminal"]),
@@ -169,9 +196,10 @@ fn listed(command: &clap::Command) -> String {
 /// Runs the program and gives its exit code.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args: Vec<OsString> = args.into_iter().collect();
-    let parsed = command().try_get_matches_from(&args).and_then(|matches| Cli::from_arg_matches(&matches));
-    let mut cli = match parsed {
-        Ok(cli) => cli,
+    let parsed = command().try_get_matches_from(&args);
+    let parsed = parsed.and_then(|matches| Cli::from_arg_matches(&matches).map(|cli| (cli, matches)));
+    let (mut cli, matches) = match parsed {
+        Ok(parsed) => parsed,
         // Who asked for JSON gets the complaint as JSON; help and version are no complaints.
         Err(error) if error.use_stderr() && args.iter().any(|arg| arg == "--json") => {
             let text = error.render().to_string();
@@ -190,7 +218,9 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         cli.global.ports.retain(|port| !port.is_empty());
     }
     let mut output = Output::standard(cli.global.json);
-    let result = all_ports(&cli.global, &args).and_then(|()| dispatch(cli, &mut output));
+    let result = all_ports(&cli.global, &args)
+        .and_then(|()| all_of_use(&cli, &matches))
+        .and_then(|()| dispatch(cli, &mut output));
     output::conclude(&mut output, result)
 }
 
@@ -204,6 +234,21 @@ fn all_ports(global: &Global, args: &[OsString]) -> Result<(), CliError> {
     }
     Err(CliError::message(error::Kind::Usage, "--port stands both before the command and behind it")
         .hint("name all links behind the command"))
+}
+
+/// Makes sure that no option for the link to a unit is given to a command that looks at none; a default in the environment
+/// is given to all.
+fn all_of_use(cli: &Cli, matches: &ArgMatches) -> Result<(), CliError> {
+    let Some((name, given)) = matches.subcommand() else { return Ok(()) };
+    if cli.command.as_ref().is_none_or(Command::looks_at_a_unit) {
+        return Ok(());
+    }
+    let of_a_link = [("ports", "--port"), ("baud", "--baud"), ("record", "--record")];
+    let is_given = |(id, _): &(&str, &str)| given.value_source(id) == Some(ValueSource::CommandLine);
+    let Some((_, option)) = of_a_link.into_iter().find(is_given) else { return Ok(()) };
+    let deed = given.subcommand_name().map(|deed| format!(" {deed}")).unwrap_or_default();
+    let message = format!("'axcon {name}{deed}' looks at no unit: {option} has no meaning there");
+    Err(CliError::message(error::Kind::Usage, message))
 }
 
 fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {

@@ -3,9 +3,11 @@
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use clap::ValueEnum;
 use serde::Serialize;
 
 use super::error::{CliError, Kind};
+use crate::wire::visible;
 
 /// Where a command's data and remarks go.
 pub struct Output {
@@ -52,6 +54,23 @@ impl Output {
     /// The process's own streams.
     pub fn standard(json: bool) -> Self {
         Output { json, out: Box::new(io::stdout()), err: Remarks::to(io::stderr()) }
+    }
+
+    /// The format of a command's data: the one that was named, else the one that `--json` means, or the usual one.
+    ///
+    /// # Errors
+    /// If another one was named than `--json` means.
+    pub fn format<F: ValueEnum + PartialEq>(&self, named: Option<F>, json: F, usual: F) -> Result<F, CliError> {
+        match named {
+            Some(named) if self.json && named != json => {
+                let name = named.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
+                let message = format!("--json and --format {name} contradict each other");
+                Err(CliError::message(Kind::Usage, message).hint("leave one of them away"))
+            }
+            Some(named) => Ok(named),
+            None if self.json => Ok(json),
+            None => Ok(usual),
+        }
     }
 
     /// One JSON object on a line of its own.
@@ -113,10 +132,41 @@ pub fn conclude(output: &mut Output, result: Result<(), CliError>) -> u8 {
             output.remark(&line);
         }
     } else {
-        output.remark(&format!("axcon: {error}"));
+        output.remark(&harmless(&format!("axcon: {error}")));
         for hint in &error.hints {
-            output.remark(&format!("  {hint}"));
+            output.remark(&harmless(&format!("  {hint}")));
         }
     }
     code
+}
+
+/// A text of several lines in which nothing acts on a terminal: messages quote names, files, and what somebody has said.
+fn harmless(text: &str) -> String {
+    text.split('\n').map(|line| visible::line(line.as_bytes())).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_told_line_by_line_and_acts_on_no_terminal() {
+        assert_eq!(harmless("cannot open 'a\x1b[2J':\n  \u{9b}1m °C"), "cannot open 'a^[[2J':\n  ‹9b›1m °C");
+    }
+
+    #[test]
+    fn json_and_another_format_contradict_each_other() {
+        #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+        enum Format {
+            Csv,
+            Json,
+        }
+        let chosen = |json, named| {
+            let output = Output { json, out: Box::new(io::sink()), err: Remarks::to(io::sink()) };
+            output.format(named, Format::Json, Format::Csv).map_err(|error| error.to_string())
+        };
+        assert_eq!([chosen(false, None), chosen(true, None)], [Ok(Format::Csv), Ok(Format::Json)]);
+        assert_eq!(chosen(false, Some(Format::Json)), Ok(Format::Json));
+        assert_eq!(chosen(true, Some(Format::Csv)), Err("--json and --format csv contradict each other".into()));
+    }
 }

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use zeroize::Zeroizing;
 
-use super::ask;
 use super::error::{CliError, Kind};
 use super::talk::Talk;
+use super::{ask, files};
 use crate::host::terminal::KeptTerminal;
 use crate::secret::Secret;
 
@@ -56,7 +56,7 @@ pub fn ask(talk: Option<&mut Talk>) -> Result<Secret, CliError> {
 }
 
 fn read(path: &Path) -> Result<Secret, CliError> {
-    let shown = super::image::shown(path);
+    let shown = files::shown(path);
     let failed = |error: std::io::Error| {
         CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the password file {shown}")))
     };

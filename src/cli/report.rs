@@ -6,14 +6,13 @@ use std::path::PathBuf;
 use jiff::tz::TimeZone;
 use serde::Serialize;
 
-use super::Global;
 use super::ask::confirm;
 use super::error::CliError;
-use super::image::shown;
+use super::files::Destination;
 use super::output::Output;
 use super::stream::{leave_as_found, watch};
 use super::talk::{Ended, Talk};
-use super::{files, link};
+use super::{Global, link};
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::host::clock;
@@ -67,7 +66,7 @@ struct Object<'a> {
 /// in the report, which says so.
 pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let is_recording = link::is_recording(global);
-    files::admit(&args.out, global.yes)?;
+    let mut out = Destination::admit(Some(&args.out), global.yes)?;
     if !is_recording && !args.no_dictionary {
         confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
     }
@@ -101,8 +100,11 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
         transcript: &transcript,
         start_of_day: clock::time_of_day(start.as_millisecond()),
     };
-    files::save(&args.out, contents.html().as_bytes(), global.yes)?;
-    let file = shown(&args.out);
+    out.save(contents.html().as_bytes(), output)?;
+    if out.is_standard_output() {
+        return Ok(());
+    }
+    let file = out.shown();
     if output.json {
         return output.object(&Object {
             schema: "axcon.report/1",
@@ -147,11 +149,10 @@ impl Findings {
 
     fn listen(&mut self, talk: &mut Talk, seconds: u64) -> Result<(), CliError> {
         let until = talk.now() + Duration::from_secs(seconds);
-        let whole = talk.listen(until, |session, event| {
+        talk.hear(until, |session, event| {
             self.fold(session, event);
             Ok(ControlFlow::Continue(()))
-        })?;
-        if whole { Ok(()) } else { Err(CliError::interrupted()) }
+        })
     }
 
     /// Asks for something that the report can do without: `None` if the unit does not show it.

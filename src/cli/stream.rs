@@ -1,7 +1,5 @@
 //! `axcon stream`: the unit's data stream as CSV, JSON lines or as it is.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -9,12 +7,11 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::error::{CliError, Kind};
-use super::link;
+use super::files::Destination;
 use super::output::{Closed, Output};
 use super::talk::{Calendar, Ended, Talk};
-use super::{Global, files};
+use super::{Global, link};
 use crate::device::Product;
-use crate::host::save::SaveError;
 use crate::session::{Command, Event, Outcome};
 use crate::time::{BITS_PER_CHARACTER, Duration, Instant};
 use crate::wire::stream::{Layout, Reading, Row, Source};
@@ -80,7 +77,7 @@ const LISTEN_FIRST: Duration = Duration::from_millis(1200);
 /// If the link does not open, no unit answers, or the unit does not do as asked.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let duration = args.duration.map(seconds).transpose()?;
-    let format = args.format.unwrap_or(if output.json { Format::Jsonl } else { Format::Csv });
+    let format = output.format(args.format, Format::Jsonl, Format::Csv)?;
     let wanted = args.source.map(|source| match source {
         SourceName::Fv => Source::FieldValue,
         SourceName::Pv => Source::ProcessValue,
@@ -88,7 +85,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if link::is_recording(global) && (args.off || args.period.is_some() || args.keep) {
         return Err(link::read_only("change its stream"));
     }
-    let file = args.out.map(|path| OutFile::admit(path, global.yes)).transpose()?;
+    let out = Destination::admit(args.out.as_deref(), global.yes)?;
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     if args.off {
@@ -101,15 +98,14 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         output.remark("axcon: the stream is off");
         return Ok(());
     }
-    let sink = Sink { file, format, source: wanted, calendar: talk.calendar(), channels: None, rows: 0 };
+    let sink = Sink { out, format, source: wanted, calendar: talk.calendar(), channels: None, rows: 0 };
     let period = args.period.map(Duration::from_millis);
     let limits = Limits { count: args.count, duration };
-    let mut stream = Stream { talk, sink, limits, until: Instant::NEVER, setting: None, was_on: false };
+    let mut stream = Stream { talk, sink, limits, until: Instant::NEVER, setting: None, was_on: false, is_known: true };
     if stream.talk.is_recorded() {
         let written = stream.write_rows(output);
-        let flushed = stream.sink.flush();
         stream.talk.close(output);
-        return written.and(flushed);
+        return written;
     }
     let found = watch(&mut stream.talk)?;
     let joins = found.is_some_and(|found| period.is_none() && wanted.is_none_or(|wanted| wanted == found.source));
@@ -123,22 +119,24 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         stream.switch_on(source, period, output)
     };
     let written = begun.and_then(|()| stream.keep_writing(Duration::from_secs(args.reconnect), output));
-    let Stream { mut talk, mut sink, setting, was_on, .. } = stream;
+    let Stream { mut talk, setting, was_on, is_known, .. } = stream;
     // However it ended, and also if the first row never came: what has been changed is changed back.
     let is_gone = written.as_ref().is_err_and(|error| error.kind == Kind::PortGone || error.error.is::<AnotherUnit>());
-    let left = if setting.is_some() && !args.keep && !is_gone {
+    let left = if setting.is_none() || args.keep || is_gone {
+        Ok(())
+    } else if is_known {
         leave_as_found(&mut talk, was_on, found, output)
     } else {
+        output.remark("axcon: the unit has not shown itself again, so no key is pressed: its stream is left as it is");
         Ok(())
     };
-    let flushed = sink.flush();
     talk.close(output);
     let written = match written {
         // Whoever read our output has enough: that is a way to end.
         Err(error) if error.error.is::<Closed>() => Ok(()),
         written => written,
     };
-    written.and(left).and(flushed)
+    written.and(left)
 }
 
 /// When it is enough.
@@ -158,6 +156,9 @@ struct Stream {
     setting: Option<(Source, Duration)>,
     /// Whether it was on before, as far as is known.
     was_on: bool,
+    /// Whether the unit has shown itself since the link was opened: another one, or something else, may be behind a
+    /// cable that is back, and takes every key for its own.
+    is_known: bool,
 }
 
 /// How long the rows of a unit that was on all the time may take to come behind a cable that is back, beside their
@@ -197,6 +198,7 @@ impl Stream {
                 Err(error) if error.kind == Kind::PortGone => error,
                 ended => return ended,
             };
+            self.is_known = false;
             let is_back = self.talk.reconnect(lost, patience, output)?;
             if !(is_back && self.ask_again(output)?) {
                 return Ok(());
@@ -209,15 +211,14 @@ impl Stream {
     fn ask_again(&mut self, output: &mut Output) -> Result<bool, CliError> {
         let Some((source, period)) = self.setting else { return Ok(true) };
         let until = self.talk.now() + ROWS_AGAIN + period;
-        let mut runs = false;
-        let sink = &mut self.sink;
+        let (sink, is_known) = (&mut self.sink, &mut self.is_known);
         let undisturbed = self.talk.listen(until, |session, event| {
             let Event::Row { at, span, row } = event else { return Ok(ControlFlow::Continue(())) };
-            runs = true;
             sink.row(*at, row, &session.record().bytes(*span), output)?;
+            *is_known = true;
             Ok(ControlFlow::Break(()))
         })?;
-        if undisturbed && !runs {
+        if undisturbed && !self.is_known {
             let product = |talk: &Talk| talk.session().facts().product.as_ref().map(|known| known.value.clone());
             let before = product(&self.talk);
             self.talk.find_application()?;
@@ -227,6 +228,7 @@ impl Stream {
             {
                 return Err(another_unit(format!("the unit is an {now} now and was an {before}")));
             }
+            self.is_known = true;
             self.switch_on(source, period, output)?;
         }
         Ok(undisturbed)
@@ -269,22 +271,19 @@ pub struct Found {
 /// # Errors
 /// If the link is lost or the user interrupts.
 pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
-    let mut first: Option<(Instant, Source)> = None;
+    let mut first: Option<Instant> = None;
     let mut last = None;
     let mut rows = 0u32;
     let until = talk.now() + LISTEN_FIRST;
-    let undisturbed = talk.listen(until, |_, event| {
+    talk.hear(until, |_, event| {
         if let Event::Row { at, row, .. } = event {
-            first.get_or_insert((*at, row.source));
+            first.get_or_insert(*at);
             last = Some((*at, row.source));
             rows += 1;
         }
         Ok(ControlFlow::Continue(()))
     })?;
-    if !undisturbed {
-        return Err(CliError::interrupted());
-    }
-    Ok(first.zip(last).map(|((begun, _), (ended, source))| {
+    Ok(first.zip(last).map(|(begun, (ended, source))| {
         let period = (rows > 1).then(|| ended.since(begun) / (rows - 1));
         // Rows come at whole milliseconds; the clock that saw them is not that exact.
         let period =
@@ -342,7 +341,7 @@ fn layout(talk: &Talk) -> Option<&'static Layout> {
 
 /// Where rows go.
 struct Sink {
-    file: Option<OutFile>,
+    out: Destination,
     format: Format,
     /// Rows of another source are left out.
     source: Option<Source>,
@@ -375,14 +374,14 @@ struct ValueObject<'a> {
 
 impl Sink {
     fn row(&mut self, at: Instant, row: &Row, raw: &[u8], output: &mut Output) -> Result<(), CliError> {
+        let now = row.readings.len();
+        if let Some(before) = self.channels.filter(|&before| before != now) {
+            return Err(another_unit(format!("the unit's rows have {now} values now and had {before}")));
+        }
         if self.source.is_some_and(|source| source != row.source) {
             return Ok(());
         }
         let channels = channels_of(row);
-        if let Some(before) = self.channels.filter(|&before| before != row.readings.len()) {
-            let now = row.readings.len();
-            return Err(another_unit(format!("the unit's rows have {now} values now and had {before}")));
-        }
         let time = self.calendar.text(at);
         let mut text = Vec::new();
         match self.format {
@@ -401,64 +400,9 @@ impl Sink {
             }
         }
         text.push(b'\n');
-        self.channels = Some(row.readings.len());
+        self.channels = Some(now);
         self.rows += 1;
-        match &mut self.file {
-            None => output.data(&text),
-            Some(file) => file.write(&text),
-        }
-    }
-
-    fn flush(&mut self) -> Result<(), CliError> {
-        self.file.as_mut().map_or(Ok(()), OutFile::flush)
-    }
-}
-
-/// A file that is made with the first row: until then yesterday's is there.
-struct OutFile {
-    path: PathBuf,
-    overwrite: bool,
-    file: Option<BufWriter<File>>,
-}
-
-impl OutFile {
-    /// A file that may be written. What is no file, a pipe or a device, is written to as it is.
-    fn admit(path: PathBuf, overwrite: bool) -> Result<Self, CliError> {
-        if path.is_dir() {
-            return Err(files::save_error(&path, SaveError::NotAFile));
-        }
-        if path.is_file() {
-            files::admit(&path, overwrite)?;
-        }
-        Ok(OutFile { path, overwrite, file: None })
-    }
-
-    fn write(&mut self, text: &[u8]) -> Result<(), CliError> {
-        let written = self.opened().and_then(|file| file.write_all(text).and_then(|()| file.flush()));
-        written.map_err(|error| self.failed(error))
-    }
-
-    fn flush(&mut self) -> Result<(), CliError> {
-        let flushed = self.file.as_mut().map_or(Ok(()), BufWriter::flush);
-        flushed.map_err(|error| self.failed(error))
-    }
-
-    fn opened(&mut self) -> io::Result<&mut BufWriter<File>> {
-        let file = match self.file.take() {
-            Some(file) => file,
-            None => {
-                let mut options = File::options();
-                options.write(true);
-                let is_new = !self.overwrite && !self.path.exists();
-                options.create_new(is_new).create(true).truncate(true);
-                BufWriter::new(options.open(&self.path)?)
-            }
-        };
-        Ok(self.file.insert(file))
-    }
-
-    fn failed(&self, error: io::Error) -> CliError {
-        files::save_error(&self.path, SaveError::Io(error))
+        self.out.append(&text, output)
     }
 }
 

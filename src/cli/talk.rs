@@ -6,11 +6,10 @@ use std::sync::mpsc::{Receiver, SyncSender};
 
 use jiff::Timestamp;
 
-use super::Global;
 use super::error::{CliError, Kind};
-use super::link;
 use super::output::{Output, Remarks};
 use super::playback::Playback;
+use super::{Global, link, waiting};
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::LinkSpec;
@@ -18,8 +17,8 @@ use crate::host::pump::{Pump, PumpError};
 use crate::host::replay::Recording;
 use crate::host::signal::Signals;
 use crate::host::{self, Input};
-use crate::record::{Ending, Span};
-use crate::session::{Awaited, Command, Event, FileEnd, Outcome, Session, UnitState};
+use crate::record::{Ending, LINK_BACK, LINK_LOST, Span};
+use crate::session::{Awaited, Command, DictionaryReading, Event, FileEnd, Outcome, Session, UnitState};
 use crate::time::{Duration, Instant};
 use crate::wire::visible;
 
@@ -95,26 +94,28 @@ impl Talk {
     /// Opens the link that the command line names and starts recording, or opens the recording it names.
     ///
     /// # Errors
-    /// If there is no such link, or it does not open.
+    /// If there is no such link, it does not open, or the user interrupts.
     pub fn open(global: &Global, output: &mut Output) -> Result<Self, CliError> {
         let spec: LinkSpec = link::spec(global)?;
         let (sender, inputs) = host::channel();
         let mut comeback = None;
-        let (line, session) = if let LinkSpec::Replay(path) = &spec {
+        let (line, session, signals) = if let LinkSpec::Replay(path) = &spec {
+            link::not_recorded_again(global)?;
+            // Before signals are heard: nobody hears them while a pipe waits for its writer.
             let recording = Recording::open(path).map_err(link::recording_error)?;
+            let signals = waiting::hear_signals(sender.clone())?;
             let line = Line::Recorded(Box::new(Playback::new(recording, inputs)));
-            (line, Session::of_recording(global.baud))
+            (line, Session::of_recording(global.baud), signals)
         } else {
             let clock = Clock::start();
             let plan = link::recording(global)?;
-            let connection = link::open(&spec, global, clock, sender.clone())?;
+            let signals = waiting::hear_signals(sender.clone())?;
+            let connection = link::open(&spec, global, clock, sender.clone(), &inputs)?;
             comeback = Comeback::of(&spec, link::options(global));
             let recorder = link::start_recording(&plan, &connection, clock, output)?;
             let line = Line::Live(Box::new(Pump::new(connection, inputs, clock, recorder)));
-            (line, Session::new(global.baud))
+            (line, Session::new(global.baud), signals)
         };
-        // Not before: until then there is nothing to leave in order, and a server that does not answer may take seconds.
-        let signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
         let (port, remarks) = (spec.to_string(), output.err.clone());
         Ok(Talk { line, session, port, spec, comeback, inputs: sender, remarks, _signals: signals })
     }
@@ -217,15 +218,27 @@ impl Talk {
         }
     }
 
+    /// Listens where an interrupt is the end of the command.
+    ///
+    /// # Errors
+    /// As [`listen`](Talk::listen), and if the user interrupts.
+    pub fn hear(
+        &mut self,
+        until: Instant,
+        news: impl FnMut(&Session, &Event) -> Result<ControlFlow<()>, CliError>,
+    ) -> Result<(), CliError> {
+        match self.listen(until, news)? {
+            true => Ok(()),
+            false => Err(CliError::interrupted()),
+        }
+    }
+
     /// Listens to a recording to its end.
     ///
     /// # Errors
     /// If the recording cannot be read to its end, or the user interrupts.
     pub fn hear_out(&mut self) -> Result<(), CliError> {
-        match self.listen(Instant::NEVER, |_, _| Ok(ControlFlow::Continue(())))? {
-            true => Ok(()),
-            false => Err(CliError::interrupted()),
-        }
+        self.hear(Instant::NEVER, |_, _| Ok(ControlFlow::Continue(())))
     }
 
     /// Listens until somebody who was asked has answered.
@@ -283,7 +296,7 @@ impl Talk {
         let clock = pump.clock();
         let gone = clock.now();
         self.session.link_lost(gone);
-        pump.recorder_mut().mark(gone, "link lost");
+        pump.recorder_mut().mark(gone, LINK_LOST);
         output.remark(&format!("axcon: {lost}; waiting {} s for it to come back", patience.as_secs()));
         let deadline = gone + patience;
         let connection = loop {
@@ -297,7 +310,7 @@ impl Talk {
             }
         };
         let away = clock.now().since(gone).as_secs_f64();
-        let text = format!("link back after {away:.1} s as {}", connection.port());
+        let text = format!("{LINK_BACK}after {away:.1} s as {}", connection.port());
         output.remark(&format!("axcon: {text}"));
         pump.recorder_mut().mark(clock.now(), &text);
         pump.replace(connection);
@@ -345,7 +358,7 @@ impl Talk {
                 }
             }
             Line::Recorded(playback) if playback.recording().ending() == Some(Ending::CutShort) => {
-                output.remark("axcon: the recording ends in the middle of a line: whoever wrote it was killed");
+                output.remark(link::CUT_SHORT);
             }
             Line::Recorded(_) => {}
         }
@@ -417,6 +430,20 @@ impl Talk {
             }
             None => error,
         })
+    }
+
+    /// What was read of the object dictionary, by the job that reads it.
+    ///
+    /// # Errors
+    /// If the outcome is another.
+    pub fn expect_reading(&self, outcome: Outcome) -> Result<Box<DictionaryReading>, CliError> {
+        match outcome {
+            Outcome::DictionaryRead(reading) => Ok(reading),
+            outcome => {
+                self.expect_done(&outcome)?;
+                Err(CliError::message(Kind::Failed, "the reading ended without a result"))
+            }
+        }
     }
 
     /// The end of what the unit has said, on one line.

@@ -6,14 +6,18 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use jiff::Timestamp;
+
 use super::Product;
 use super::dictionary::{Access, Bound, Entry, Object, ObjectKind};
 use crate::canopen::{ObjectAddress, Value};
 
 /// Vendor's name as the manuals print it.
 const VENDOR: &str = "Axiomatic Technologies Corporation";
-/// When this description was made; constant, so that the same program always writes the same file.
-const CREATED: [&str; 2] = ["11-24-2026", "12:00PM"];
+/// When the data sheets were made: 24 November 2026, noon. Constant, so that the same program always writes the same file.
+const MADE: i64 = 1_795_521_600_000;
+/// The identity object's revision of a unit (CiA 301).
+const REVISION: ObjectAddress = ObjectAddress::new(0x1018, 3);
 /// Objects every CANopen node has (CiA 301, section 7.4.4).
 const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 /// Objects that no configuration is written back to: their values are commands (CiA 306, ObjFlags).
@@ -26,6 +30,8 @@ pub struct Configuration {
     pub node_id: u8,
     /// Its bit rate in kbit/s.
     pub kbps: u16,
+    /// When it was read, in milliseconds since 1970.
+    pub unix_millis: i64,
     /// The values of its entries, where they are known.
     pub values: BTreeMap<ObjectAddress, Value>,
 }
@@ -49,12 +55,12 @@ fn file(product: &Product, configuration: Option<&Configuration>) -> String {
     eds.line("FileRevision", "0");
     eds.line("EDSVersion", "4.0");
     eds.line("Description", format!("{name}, {}", product.title));
-    eds.line("CreationTime", CREATED[1]);
-    eds.line("CreationDate", CREATED[0]);
-    eds.line("CreatedBy", "axcon");
-    eds.line("ModificationTime", CREATED[1]);
-    eds.line("ModificationDate", CREATED[0]);
-    eds.line("ModifiedBy", "axcon");
+    let (date, time) = date_and_time(configuration.map_or(MADE, |configuration| configuration.unix_millis));
+    for (deed, by) in [("Creation", "CreatedBy"), ("Modification", "ModifiedBy")] {
+        eds.line(&format!("{deed}Time"), &time);
+        eds.line(&format!("{deed}Date"), &date);
+        eds.line(by, "axcon");
+    }
     if let Some(Configuration { node_id, kbps, .. }) = configuration {
         eds.line("LastEDS", format!("{name}.eds"));
         eds.section("DeviceComissioning");
@@ -70,7 +76,8 @@ fn file(product: &Product, configuration: Option<&Configuration>) -> String {
     eds.line("VendorNumber", format!("0x{:08X}", product.can.vendor_id));
     eds.line("ProductName", name);
     eds.line("ProductNumber", format!("0x{:08X}", product.can.product_code));
-    eds.line("RevisionNumber", "0");
+    let revision = configuration.and_then(|configuration| configuration.values.get(&REVISION)?.as_integer());
+    eds.line("RevisionNumber", revision.map_or_else(|| "0".to_owned(), |revision| format!("0x{revision:08X}")));
     eds.line("OrderCode", name);
     for kbps in super::BIT_RATES_KBPS {
         eds.line(&format!("BaudRate_{kbps}"), 1);
@@ -102,6 +109,12 @@ fn file(product: &Product, configuration: Option<&Configuration>) -> String {
         eds.object(object);
     }
     eds.text
+}
+
+/// A moment in UTC as the format has it: `11-24-2026`, `12:00PM`.
+fn date_and_time(unix_millis: i64) -> (String, String) {
+    let moment = Timestamp::from_millisecond(unix_millis).unwrap_or(Timestamp::UNIX_EPOCH);
+    (moment.strftime("%m-%d-%Y").to_string(), moment.strftime("%I:%M%p").to_string())
 }
 
 fn pdos(product: &Product, first: u16) -> usize {
@@ -276,9 +289,16 @@ mod tests {
             (ObjectAddress::new(0x6126, 2), Value::Real32(18.5)),
             (ObjectAddress::new(0x6100, 1), Value::NOT_A_NUMBER),
             (ObjectAddress::new(0x1800, 1), Value::Unsigned32(0x4000_01A0)),
+            (REVISION, Value::Unsigned32(0x0001_0002)),
         ];
-        let configuration = Configuration { node_id: 32, kbps: 250, values: values.into_iter().collect() };
+        // 31 January 2026, a quarter past one in the afternoon.
+        let unix_millis = 1_769_865_300_123;
+        let configuration = Configuration { node_id: 32, kbps: 250, unix_millis, values: values.into_iter().collect() };
         let sections = sections(&write_configuration(product, &configuration));
+        let info = &sections["FileInfo"];
+        assert_eq!((info["CreationDate"].as_str(), info["CreationTime"].as_str()), ("01-31-2026", "01:15PM"));
+        assert_eq!((&info["ModificationDate"], &info["LastEDS"]), (&info["CreationDate"], &"AXTC4CO.eds".to_owned()));
+        assert_eq!(sections["DeviceInfo"]["RevisionNumber"], "0x00010002");
         assert_eq!(sections["DeviceComissioning"]["NodeID"], "32");
         assert_eq!(sections["DeviceComissioning"]["Baudrate"], "250");
         assert_eq!(sections["6126sub2"]["ParameterValue"], "18.5");
@@ -291,6 +311,9 @@ mod tests {
     fn the_details_that_readers_stumble_over_are_right() {
         let text = write(Product::named("AXTC4CO").expect("built in"));
         let sections = sections(&text);
+        let info = &sections["FileInfo"];
+        assert_eq!((info["CreationDate"].as_str(), info["CreationTime"].as_str()), ("11-24-2026", "12:00PM"));
+        assert_eq!(sections["DeviceInfo"]["RevisionNumber"], "0", "each unit has its own");
         assert_eq!(sections["6126sub1"]["DefaultValue"], "16.0");
         assert_eq!(sections["1800sub1"]["DefaultValue"], "$NODEID+0x40000180");
         assert_eq!((sections["1010"]["ObjFlags"].as_str(), sections["1011sub1"]["ObjFlags"].as_str()), ("0x3", "0x3"));

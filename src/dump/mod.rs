@@ -347,12 +347,13 @@ fn number(value: Value) -> Option<serde_json::Number> {
     }
 }
 
-/// The reading as a device configuration file (DCF) for this product.
-pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Facts) -> String {
+/// The reading as a device configuration file (DCF) for this product, read at this moment since 1970.
+pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Facts, unix_millis: i64) -> String {
     let values = reading.entries.iter().filter_map(|read| Some((read.at, read.value?))).collect::<BTreeMap<_, _>>();
     let configuration = eds::Configuration {
         node_id: facts.node_id.as_ref().map_or(product.can.node_id, |known| known.value),
         kbps: facts.can_kbps.as_ref().map_or(product.can.kbps, |known| known.value),
+        unix_millis,
         values,
     };
     eds::write_configuration(product, &configuration)

@@ -7,7 +7,10 @@ impl Dump {
     pub fn table(&self) -> String {
         let mut text = String::new();
         let compared = match self.product {
-            Some(_) => format!("{} differ from the factory's (*)", self.deviations()),
+            Some(_) => match self.deviations() {
+                1 => "1 differs from the factory's (*)".to_owned(),
+                number => format!("{number} differ from the factory's (*)"),
+            },
             None => "compared with nothing: the unit does not say which product it is".to_owned(),
         };
         for entry in &self.entries {
@@ -20,7 +23,8 @@ impl Dump {
             let factory = if entry.deviates { format!("  (factory {})", entry.shown_default()) } else { String::new() };
             text.push_str(&format!("{mark} {index}:{subindex:02X}  {name:<58} {value:>14}{unit}{meaning}{factory}\n"));
         }
-        text.push_str(&format!("{} entries, {compared}\n", self.entries.len()));
+        let entries = if self.entries.len() == 1 { "entry" } else { "entries" };
+        text.push_str(&format!("{} {entries}, {compared}\n", self.entries.len()));
         if !self.missing.is_empty() {
             let list: Vec<String> = self.missing.iter().map(|at| format!("{}:{:02X}", at.index, at.subindex)).collect();
             text.push_str(&format!("not shown by the unit: {}\n", list.join(", ")));
@@ -73,5 +77,6 @@ mod tests {
             "{}",
             dump.table()
         );
+        assert!(dump.table().ends_with("\n1 entry, 1 differs from the factory's (*)\n"), "{}", dump.table());
     }
 }

@@ -35,9 +35,7 @@ impl Clock {
         let ago = self.now().since(at);
         Timestamp::now().checked_sub(ago).unwrap_or(Timestamp::UNIX_EPOCH)
     }
-}
 
-impl Clock {
     /// Local time of day at the start of this clock; UTC where the system does not say its zone.
     pub fn time_of_day(&self) -> Duration {
         time_of_day(self.wall(Instant::ZERO).as_millisecond())
@@ -83,5 +81,13 @@ mod tests {
         assert!(early <= later);
         assert!(later.as_second() > 1_700_000_000);
         assert_eq!(clock.until(Instant::ZERO), Duration::ZERO);
+    }
+
+    #[test]
+    fn the_time_of_day_goes_back_over_midnight_as_often_as_it_has_to() {
+        let hours = |hours: u64| Duration::from_secs(hours * 3600);
+        for (now, ago, then) in [(13, 1, 12), (1, 2, 23), (0, 0, 0), (5, 24, 5), (1, 50, 23)] {
+            assert_eq!(day_before(hours(now), hours(ago)), hours(then), "{now} less {ago}");
+        }
     }
 }

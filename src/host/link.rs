@@ -449,7 +449,7 @@ impl Connection {
             return answered(Err("there is no emulated unit at the other end".into()));
         };
         match Verb::read(line, product) {
-            Err(error) => answered(Err(format!("column {}: {}", error.column, error.message))),
+            Err(error) => answered(Err(error.to_string())),
             // An order that is not taken is never answered: what waits is a person, who sees that.
             Ok(verb) => {
                 unit.order(verb, answered);

@@ -1,7 +1,9 @@
 //! From an address to a connection, and a remote serial port set up on it.
 
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::thread;
 
 use super::address::Address;
 use super::clock::Clock;
@@ -62,6 +64,10 @@ fn missing(awaited: Awaited) -> &'static str {
     }
 }
 
+/// How long the system may take to find the addresses of a name: its resolver asks a second server when the first has been
+/// silent for 5 s.
+pub const LOOK_UP_PATIENCE: Duration = Duration::from_secs(8);
+
 /// How long the other side may take to accept a connection, all its addresses together: three lost packets on a slow
 /// network, and as long as a person believes that something happens.
 pub const CONNECT_PATIENCE: Duration = Duration::from_secs(4);
@@ -84,11 +90,12 @@ const QUOTED: usize = 80;
 /// If the name leads nowhere, or nobody there accepts.
 pub fn connect(address: &Address, clock: Clock) -> Result<TcpStream, NetworkError> {
     let unknown = |error| NetworkError::UnknownHost { host: address.host().to_owned(), error };
-    let found = (address.host(), address.port()).to_socket_addrs().map_err(unknown)?;
-    let found: Vec<_> = found.take(ADDRESSES).collect();
+    let name = (address.host().to_owned(), address.port());
+    let found = look_up(move || name.to_socket_addrs().map(Iterator::collect), LOOK_UP_PATIENCE).map_err(unknown)?;
+    let found = &found[..found.len().min(ADDRESSES)];
     let deadline = clock.now() + CONNECT_PATIENCE;
     let mut failure = unknown(io::Error::new(ErrorKind::NotFound, "it has no address"));
-    for (left, address) in (1..=found.len() as u32).rev().zip(&found) {
+    for (left, address) in (1..=found.len() as u32).rev().zip(found) {
         // An address that does not answer must not take the time of those behind it. Nothing is no timeout.
         let share = (clock.until(deadline) / left).max(Duration::from_millis(1));
         failure = match TcpStream::connect_timeout(address, share) {
@@ -104,6 +111,27 @@ pub fn connect(address: &Address, clock: Clock) -> Result<TcpStream, NetworkErro
         };
     }
     Err(failure)
+}
+
+/// Asks the system for the addresses of a name. Nothing calls its resolver off, so one that takes too long is left to
+/// itself, in its thread.
+fn look_up(
+    ask: impl FnOnce() -> io::Result<Vec<SocketAddr>> + Send + 'static,
+    patience: Duration,
+) -> io::Result<Vec<SocketAddr>> {
+    let (answer, answered) = sync_channel(1);
+    thread::Builder::new().name("resolver".into()).spawn(move || {
+        let _ = answer.send(ask());
+    })?;
+    answered.recv_timeout(patience).unwrap_or_else(|error| {
+        Err(match error {
+            RecvTimeoutError::Timeout => {
+                let what = format!("the system has not found its address within {} s", patience.as_secs());
+                io::Error::new(ErrorKind::TimedOut, what)
+            }
+            RecvTimeoutError::Disconnected => io::Error::other("the system's resolver has failed"),
+        })
+    })
 }
 
 fn set_up(socket: &TcpStream) -> io::Result<()> {
@@ -196,4 +224,23 @@ fn quoted(said: &[u8]) -> Option<String> {
         text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|w| !w.is_empty()).collect();
     let line: String = words.join(" ").chars().take(QUOTED).collect();
     (!line.is_empty()).then_some(line)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resolver_that_does_not_answer_is_not_waited_for() {
+        let (never, ends) = std::sync::mpsc::channel::<()>();
+        let stuck = move || {
+            let _ = ends.recv();
+            Ok(Vec::new())
+        };
+        let error = look_up(stuck, Duration::from_millis(1)).expect_err("no answer");
+        assert_eq!(error.kind(), ErrorKind::TimedOut);
+        drop(never);
+        let found = look_up(|| Ok(vec![([127, 0, 0, 1], 2000).into()]), Duration::from_secs(60));
+        assert_eq!(found.ok(), Some(vec![([127, 0, 0, 1], 2000).into()]));
+    }
 }

@@ -54,8 +54,8 @@ pub struct Dialled {
 }
 
 /// Connects, and sets the port up where there is one to set up. `name` is the link as the user wrote it. Takes as long
-/// as the other side lets it wait, within [`network::CONNECT_PATIENCE`] and [`network::SET_UP_PATIENCE`], and what the
-/// system needs to find the host.
+/// as the resolver and the other side let it wait, within [`network::LOOK_UP_PATIENCE`], [`network::CONNECT_PATIENCE`] and
+/// [`network::SET_UP_PATIENCE`].
 pub fn dial(
     name: String,
     (protocol, address): (Protocol, &Address),

@@ -202,10 +202,10 @@ pub fn may_read_standard_input() -> bool {
     true
 }
 
-/// Columns of the user's terminal, where it says.
-pub fn columns() -> Option<usize> {
-    let (columns, _) = ratatui::crossterm::terminal::size().ok()?;
-    (columns > 0).then(|| columns.into())
+/// Columns and rows of the user's terminal, where it says.
+pub fn size() -> Option<(usize, usize)> {
+    let (columns, rows) = ratatui::crossterm::terminal::size().ok()?;
+    (columns > 0 && rows > 0).then(|| (columns.into(), rows.into()))
 }
 
 fn take_screen() -> io::Result<()> {

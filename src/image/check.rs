@@ -158,6 +158,22 @@ mod tests {
     }
 
     #[test]
+    fn one_of_a_kind_is_said_as_one() {
+        let (one, end) = ("S307000000001122C5\n", "S70500000000FA\n");
+        let said = |file: String, id| {
+            let report = report(file.as_bytes());
+            report.defects.into_iter().find(|defect| defect.id == id).map(|defect| defect.message)
+        };
+        let behind = |rest: &str| said(format!("{HEAD}S307000000001122C5{rest}\n{end}"), DefectId::TrailingCharacters);
+        assert_eq!(behind("X").as_deref(), Some("1 character follows the checksum"));
+        assert_eq!(behind("XY").as_deref(), Some("2 characters follow the checksum"));
+        let odd = said(format!("{HEAD}{one}S3060000000133C5\n{end}"), DefectId::OddLength);
+        assert_eq!(odd.as_deref(), Some("1 data byte: the last word has no high byte"));
+        let short = said(format!("{HEAD}{one}S3\n{end}"), DefectId::ShortRecord);
+        assert_eq!(short.as_deref(), Some("the length says 1 byte, the line ends after 0"));
+    }
+
+    #[test]
     fn the_size_and_the_records_of_a_file_are_those_it_has() {
         let hex = ":040000001122334452\n:040002005566778840\n:0400000500000000F7\n:00000001FF\n";
         let records = format!("{HEAD}S307000000001122C5\nS70500000000FA\n");

@@ -40,7 +40,7 @@ pub enum ConvertError {
     },
     /// Records of this size cannot be.
     #[error(
-        "records of {bytes} data bytes cannot be written: it takes 1 to {MOST_BLOCK_BYTES}, even where addresses count words"
+        "records take 1 to {MOST_BLOCK_BYTES} data bytes, an even number where addresses count words; {bytes} cannot be"
     )]
     RecordBytes {
         /// What was asked for.

@@ -427,6 +427,11 @@ impl Findings {
     }
 }
 
+/// `1 byte`, `3 bytes`.
+pub(super) fn counted(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
 /// Nobody reads more, and a file of junk must not fill the memory with complaints.
 pub(super) const MOST_LISTED: u64 = 1000;
 

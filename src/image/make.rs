@@ -29,7 +29,7 @@ pub struct Recipe<'a> {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MakeError {
     /// There is no room for vectors, identity block and a few instructions, or for a flaw behind them.
-    #[error("{words} words are too few, an image needs {FEWEST_WORDS} at least")]
+    #[error("an image needs {FEWEST_WORDS} words at least, not {words}")]
     TooSmall {
         /// What was asked for.
         words: u32,

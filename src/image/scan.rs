@@ -7,7 +7,7 @@
 use std::io::{self, Read};
 
 use super::content::{Content, MOST_BYTES, MOST_PIECES, Steps};
-use super::defect::{DefectId, Findings};
+use super::defect::{DefectId, Findings, counted};
 use super::lines::{self, LineEnd, Lines, RawLine};
 use super::report::{Facts, Format, Report};
 use super::whole;
@@ -161,7 +161,8 @@ impl Scan {
             self.blanks_behind.seen(self.line, characters + 1);
         } else {
             self.findings.note(DefectId::TrailingCharacters, self.line, characters + 1, || {
-                format!("{} characters follow the checksum", rest.len())
+                let follow = if rest.len() == 1 { "follows" } else { "follow" };
+                format!("{} {follow} the checksum", counted(rest.len(), "character"))
             });
         }
     }

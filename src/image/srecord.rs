@@ -7,6 +7,7 @@
 
 use std::fmt;
 
+use super::defect::counted;
 use super::digits::{self, INVALID, LOWER, digit};
 
 /// What a record is for, and how wide its address is.
@@ -154,7 +155,7 @@ pub enum LineError {
         found: u8,
     },
     /// The line ends before the record does.
-    #[error("the length says {says} bytes, the line ends after {holds}")]
+    #[error("the length says {}, the line ends after {holds}", counted(*says, "byte"))]
     Short {
         /// Bytes that should follow the length.
         says: usize,

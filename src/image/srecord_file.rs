@@ -141,7 +141,7 @@ impl SRecordFile {
         scan.findings.note(DefectId::CountRecord, scan.line, 1, || format!("an {kind} record; not sent"));
         if says != counted {
             scan.findings.note(DefectId::WrongCount, scan.line, ADDRESS_COLUMN, || {
-                format!("it counts {says} data records, there are {counted} before it")
+                format!("its number of data records is {says}, and {counted} stand before it")
             });
         }
     }

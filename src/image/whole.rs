@@ -1,7 +1,7 @@
 //! Rules about an image as a whole: where its data lies, whether it fits the unit, and what it says it is.
 
 use super::content::{Content, MOST_BYTES, Piece, Steps};
-use super::defect::{DefectId, Findings, Severity};
+use super::defect::{DefectId, Findings, Severity, counted};
 use super::identity::{self, Identity, IdentityError};
 use super::report::{AddressRange, Facts, Format};
 use super::{AddressUnit, Outside, Target};
@@ -215,7 +215,7 @@ fn odd_lengths(content: &Content, column: usize, findings: &mut Findings) {
     }
     for piece in content.pieces.iter().filter(|piece| piece.length() % 2 == 1) {
         findings.note(DefectId::OddLength, piece.line, column, || {
-            format!("{} data bytes: the last word has no high byte", piece.length())
+            format!("{}: the last word has no high byte", counted(piece.length(), "data byte"))
         });
     }
 }

@@ -66,14 +66,19 @@ pub struct Entry {
     pub bytes: Vec<u8>,
 }
 
+/// Xon, "go on" (AXTC4CO manual, appendix A: flow control Xon/Xoff).
+pub const XON: u8 = 0x11;
+/// Xoff, "stop".
+pub const XOFF: u8 = 0x13;
+
 /// What stands in the record for a secret byte.
 pub const REDACTED: u8 = b'*';
 
 /// What a recording notes when the link is lost.
 pub const LINK_LOST: &str = "link lost";
 
-/// How the note begins that it is back; the name of its port follows.
-pub const LINK_BACK: &str = "link back as ";
+/// How the note begins that it is back: `link back as /dev/ttyUSB0`, perhaps with `after 2.8 s` in between.
+pub const LINK_BACK: &str = "link back ";
 
 /// Memory kept at most: hours of ordinary talk, seconds of a flood.
 pub const KEPT_BYTES: usize = 8 << 20;

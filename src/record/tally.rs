@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Direction;
+use super::{Direction, XOFF, XON};
 use crate::time::{Duration, Instant};
 
 /// Numbers of one session.
@@ -18,10 +18,6 @@ pub struct Tally {
     last_received: Option<Instant>,
     longest_silence: Duration,
 }
-
-/// Xon and Xoff (AXTC4CO manual, appendix A).
-const XON: u8 = 0x11;
-const XOFF: u8 = 0x13;
 
 impl Tally {
     /// Counts bytes that came or went.
@@ -50,8 +46,11 @@ impl Tally {
         let Tally { received, sent, xoff, xon, .. } = self;
         let (hold, silence) = (self.longest_hold(now).as_secs_f64(), self.longest_silence.as_secs_f64());
         format!(
-            "{received} bytes received, {sent} sent; XOFF {xoff} times, XON {xon} times; longest hold {hold:.3} s, \
-             longest silence of the unit {silence:.3} s"
+            "{received} {} received, {sent} sent; XOFF {xoff} {}, XON {xon} {}; longest hold {hold:.3} s, \
+             longest silence of the unit {silence:.3} s",
+            plural(*received, "byte"),
+            plural(*xoff, "time"),
+            plural(*xon, "time")
         )
     }
 
@@ -66,6 +65,10 @@ impl Tally {
             }
         }
     }
+}
+
+fn plural(number: u64, what: &str) -> String {
+    format!("{what}{}", if number == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]
@@ -84,7 +87,7 @@ mod tests {
         assert_eq!(tally.longest_hold(ms(150)), Duration::from_millis(100));
         assert_eq!(
             tally.summary(ms(150)).to_string(),
-            "5 bytes received, 2 sent; XOFF 3 times, XON 1 times; longest hold 0.100 s, longest silence of the unit 0.030 s"
+            "5 bytes received, 2 sent; XOFF 3 times, XON 1 time; longest hold 0.100 s, longest silence of the unit 0.030 s"
         );
     }
 }

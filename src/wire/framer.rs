@@ -7,12 +7,7 @@
 //! What has no line end yet is the [`Framer::pending`] text. Whether that is a prompt is a question of time, and the
 //! session's.
 
-use crate::record::Span;
-
-/// Xon, "go on" (AXTC4CO manual, appendix A: flow control Xon/Xoff).
-pub const XON: u8 = 0x11;
-/// Xoff, "stop".
-pub const XOFF: u8 = 0x13;
+use crate::record::{Span, XOFF, XON};
 
 /// Characters of a line at most. Longer ones are cut into pieces, so that a device without line ends cannot make us
 /// keep everything; the longest row of any product has 55.

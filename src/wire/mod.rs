@@ -14,8 +14,9 @@ pub mod stream;
 pub mod visible;
 mod words;
 
+pub use crate::record::{XOFF, XON};
 pub use boot::{LoaderError, LoaderText};
-pub use framer::{Framer, Item, LONGEST_LINE, Text, XOFF, XON};
+pub use framer::{Framer, Item, LONGEST_LINE, Text};
 pub use menu::{Confidence, MenuKey, Network, NmtState, SoftwareName};
 pub use prompt::{Prompt, SourceKeys};
 

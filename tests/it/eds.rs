@@ -21,6 +21,17 @@ fn a_data_sheet_goes_to_standard_output_or_to_a_file() {
     assert_eq!(std::fs::read_to_string(world.path("unit.eds")).expect("written"), ran.out);
     let again = world.run(&["eds", "axtc4co", "--out", "unit.eds"], b"");
     assert_eq!(again.code, Some(2), "{}", again.err);
+    // Standard output by its names is standard output, also where a file is behind it.
+    for name in ["-", "/dev/stdout"] {
+        let named = world.run(&["eds", "axtc4co", "--out", name], b"");
+        assert_eq!((named.code, &named.out), (Some(0), &ran.out), "{name}: {}", named.err);
+    }
+    let script = "echo before > all; \"$0\" eds axtc4co --out /dev/stdout >> all";
+    let args = ["-c", script, env!("CARGO_BIN_EXE_axcon")];
+    let appended = Running::start(world.command_of(Path::new("/bin/sh"), &args)).wait();
+    assert_eq!(appended.code, Some(0), "{}", appended.err);
+    let all = std::fs::read_to_string(world.path("all")).expect("written");
+    assert_eq!(all, "before\n".to_owned() + &ran.out);
     let unknown = world.run(&["eds", "axtc5co"], b"");
     assert_eq!(unknown.code, Some(2));
     assert!(unknown.err.contains("axtc4co") || unknown.err.contains("AXTC4CO"), "{}", unknown.err);

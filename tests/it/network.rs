@@ -204,7 +204,43 @@ fn whoever_waits_for_a_server_can_interrupt_that() {
     let running = world.start(&["identify", "--no-record", "--port", &server.link(RFC2217)]);
     is_asked.recv().expect("it connects");
     running.signal(rustix::process::Signal::INT);
-    assert_eq!(running.wait().code, None, "the signal itself ends it: there is nothing to leave in order");
+    assert_eq!(running.wait().code, Some(130));
+}
+
+#[test]
+fn an_interrupt_is_heard_behind_a_question_and_by_every_upload_that_waits_for_its_server() {
+    let (asked, is_asked) = mpsc::channel();
+    let silent = || {
+        let asked = asked.clone();
+        Server::start(move |mut client| {
+            read_to(&mut client, ASKED);
+            asked.send(()).expect("somebody waits");
+            let _ = client.read_to_end(&mut Vec::new());
+        })
+    };
+    let world = World::new();
+    let server = silent();
+    let command = world.command(&["defaults", "--no-record", "--port", &server.link(RFC2217)]);
+    let mut screen = Screen::start(command, 24, 80);
+    screen.wait("Type yes to go on: ");
+    screen.keys("yes\r");
+    is_asked.recv_timeout(PATIENCE).expect("it connects");
+    screen.keys("\x03");
+    assert_eq!(screen.wait_end(), Some(130), "{}", screen.text());
+
+    let image = world.path("new.S").display().to_string();
+    let make = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "600", "--out", &image];
+    assert_eq!(world.run(&make, b"").code, Some(0));
+    std::fs::write(world.path("pw"), "AXIO-2010").expect("written");
+    let (one, other) = (silent(), silent());
+    let (one, other) = (one.link(RFC2217), other.link(RFC2217));
+    let args = ["load", &image, "--yes", "--password-file", "pw", "--no-record", "--port", &one, "--port", &other];
+    let loading = world.start(&args);
+    (0..2).for_each(|_| is_asked.recv_timeout(PATIENCE).expect("both connect"));
+    loading.signal(rustix::process::Signal::INT);
+    let ran = loading.wait();
+    assert_eq!(ran.code, Some(130), "{}", ran.err);
+    assert!(ran.err.contains("0 of 2 units"), "{}", ran.err);
 }
 
 #[test]

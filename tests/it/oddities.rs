@@ -248,29 +248,22 @@ fn an_echo_of_the_password_is_quoted_in_no_form() {
     assert!(!kept.to_lowercase().contains("axio"), "{kept}");
 }
 
-#[test]
-fn an_answer_of_a_waiting_loader_that_comes_late_is_not_the_first_records() {
-    let (mut line, mut asked, mut data) = (String::new(), 0, 0);
-    let complaint = "Error # 0002\r\nRestarting.\r\nWaiting for application S-Record.\r\n";
-    let unit = Odd::new(move |key| match key {
-        b'm' => said(complaint),
+/// What a loader says that was asked something while it waits for a file.
+const COMPLAINT: &str = "Error # 0002\r\nRestarting.\r\nWaiting for application S-Record.\r\n";
+
+/// A unit that waits in its loader, and complains so late of the first Enter that stands alone. `takes` is what it says to a
+/// record, given the record's first two characters.
+fn found_waiting(late_ms: u64, mut takes: impl FnMut(&str) -> Says + 'static) -> Odd {
+    let (mut line, mut asked) = (String::new(), 0);
+    Odd::new(move |key| match key {
+        b'm' => said(COMPLAINT),
         b'\r' => {
             let record = std::mem::take(&mut line);
             asked += u32::from(record.is_empty());
             match record.get(..2) {
-                // The first Enter that stands alone: its answer comes when the header has left.
-                None if asked == 1 => vec![(450, complaint.into())],
-                Some("S7") => vec![(40, "\r\nAXTC4CO V1.2.0\r\n".into()), (60, MENU.replace("1.1.0", "1.2.0"))],
-                Some("S0") => {
-                    data = 0;
-                    Vec::new()
-                }
-                Some("S3") => {
-                    data += 1;
-                    // Behind each record that crosses into another page of 256 words.
-                    if data % 16 == 1 && data > 1 { said("\u{13}.\u{11}") } else { Vec::new() }
-                }
-                _ => Vec::new(),
+                Some(kind) => takes(kind),
+                None if asked == 1 => vec![(late_ms, COMPLAINT.into())],
+                None => Vec::new(),
             }
         }
         b'S' | b'0'..=b'9' | b'A'..=b'F' => {
@@ -278,12 +271,42 @@ fn an_answer_of_a_waiting_loader_that_comes_late_is_not_the_first_records() {
             Vec::new()
         }
         _ => Vec::new(),
-    });
+    })
+}
+
+/// Uploads to it, well and without a remark.
+fn save(unit: Odd, order: LoadOrder) -> Visit<Odd> {
     let mut bench = Visit::to(unit);
-    let order = LoadOrder { product: Some("AXTC4CO".into()), ..order(small_image("AXTC4CO", "1.2.0")) };
     let Outcome::Loaded(report) = bench.ask(Command::Load(Box::new(order))) else { panic!("an upload") };
     assert_eq!(report.verdict, Verdict::Done, "{report:?}");
     assert!(report.found_in_loader && report.remark.is_none(), "{report:?}");
+    bench
+}
+
+/// The banner and the menu of new software.
+fn starts(product: &str) -> Says {
+    let menu = MENU.replace("AXTC4CO V1.1.0", &format!("{product} V1.2.0"));
+    vec![(40, format!("\r\n{product} V1.2.0\r\n")), (60, menu)]
+}
+
+#[test]
+fn an_answer_of_a_waiting_loader_that_comes_late_is_not_the_first_records() {
+    let mut data = 0;
+    // The complaint comes when the header has left.
+    let unit = found_waiting(450, move |kind| match kind {
+        "S7" => starts("AXTC4CO"),
+        "S0" => {
+            data = 0;
+            Vec::new()
+        }
+        "S3" => {
+            data += 1;
+            // Behind each record that crosses into another page of 256 words.
+            if data % 16 == 1 && data > 1 { said("\u{13}.\u{11}") } else { Vec::new() }
+        }
+        _ => Vec::new(),
+    });
+    let bench = save(unit, LoadOrder { product: Some("AXTC4CO".into()), ..order(small_image("AXTC4CO", "1.2.0")) });
     let headers = bench.wire.windows(2).filter(|start| start == b"S0").count();
     assert_eq!(headers, 2, "it was sent anew");
 }
@@ -292,42 +315,18 @@ fn an_answer_of_a_waiting_loader_that_comes_late_is_not_the_first_records() {
 fn silence_before_a_late_answer_says_nothing_of_how_the_loader_stops_its_sender() {
     // It has a ring, and is found waiting. Its complaint of what it was asked comes when its silence behind the header has
     // made another kind of loader of it; once it has begun anew it erases, and an adapter shows that late.
-    let (mut line, mut asked, mut headers) = (String::new(), 0, 0);
-    let complaint = "Error # 0002\r\nRestarting.\r\nWaiting for application S-Record.\r\n";
-    let unit = Odd::new(move |key| match key {
-        b'm' => said(complaint),
-        b'\r' => {
-            let record = std::mem::take(&mut line);
-            asked += u32::from(record.is_empty());
-            match record.get(..2) {
-                None if asked == 1 => vec![(1_600, complaint.into())],
-                Some("S7") => vec![
-                    (40, "\r\nAXRTD8CO V1.2.0\r\n".into()),
-                    (60, MENU.replace("AXTC4CO V1.1.0", "AXRTD8CO V1.2.0")),
-                ],
-                Some("S0") => {
-                    headers += 1;
-                    if headers == 1 {
-                        vec![(5, "*".into())]
-                    } else {
-                        vec![(200, "\u{13}".into()), (1_500, "\u{11}".into())]
-                    }
-                }
-                Some("S3") if headers == 2 => said("\u{13}\u{11}"),
-                _ => Vec::new(),
-            }
+    let mut headers = 0;
+    let unit = found_waiting(1_600, move |kind| match kind {
+        "S7" => starts("AXRTD8CO"),
+        "S0" => {
+            headers += 1;
+            if headers == 1 { vec![(5, "*".into())] } else { vec![(200, "\u{13}".into()), (1_500, "\u{11}".into())] }
         }
-        b'S' | b'0'..=b'9' | b'A'..=b'F' => {
-            line.push(key.into());
-            Vec::new()
-        }
+        "S3" if headers == 2 => said("\u{13}\u{11}"),
         _ => Vec::new(),
     });
-    let mut bench = Visit::to(unit);
-    let order = LoadOrder { product: Some("AXRTD8CO".into()), packed: true, ..order(small_image("AXRTD8CO", "1.2.0")) };
-    let Outcome::Loaded(report) = bench.ask(Command::Load(Box::new(order))) else { panic!("an upload") };
-    assert_eq!(report.verdict, Verdict::Done, "{report:?}");
-    assert!(report.found_in_loader && report.remark.is_none(), "{report:?}");
+    let image = small_image("AXRTD8CO", "1.2.0");
+    let bench = save(unit, LoadOrder { product: Some("AXRTD8CO".into()), packed: true, ..order(image) });
     let sent: Vec<(Instant, &[u8])> =
         bench.session.record().entries().map(|entry| (entry.at, &entry.bytes[..])).collect();
     let begins = |kind: &[u8]| sent.iter().filter(|(_, bytes)| bytes.starts_with(kind)).collect::<Vec<_>>();

@@ -331,6 +331,36 @@ fn another_unit_behind_a_cable_that_is_back_is_left_as_it_is() {
 }
 
 #[test]
+fn no_key_is_pressed_on_what_has_not_shown_itself_behind_a_cable_that_is_back() {
+    // One for each: the user has enough before it says anything, and it never says anything.
+    for (interrupted, code) in [(true, 0), (false, 4)] {
+        let world = World::new();
+        let link = world.path("unit");
+        let emulator = world.start(&["emulate", "axtc4co", "--link", "u0", "--line-rate", "off"]);
+        emulator.wait_out("serial: ");
+        symlink(world.path("u0"), &link).expect("a link");
+        let port = link.to_str().expect("UTF-8");
+        let running = world.start(&["stream", "--port", port, "--period", "200", "--baud", "3000000"]);
+        running.wait_out(",fv,");
+        drop(emulator);
+        running.wait_err("waiting 10 s for it to come back");
+        fs::remove_file(&link).expect("pulled out");
+        let other = Puppet::silent();
+        symlink(other.path(), &link).expect("plugged in again");
+        running.wait_err("link back after");
+        if interrupted {
+            running.signal(rustix::process::Signal::INT);
+        }
+        let ran = running.wait();
+        assert_eq!(ran.code, Some(code), "{}", ran.err);
+        assert!(ran.err.contains("its stream is left as it is"), "{}", ran.err);
+        let heard = other.heard();
+        assert!(!heard.contains(&b't'), "{}", heard.escape_ascii());
+        assert!(!interrupted || heard.is_empty(), "{}", heard.escape_ascii());
+    }
+}
+
+#[test]
 fn a_cable_that_stays_away_is_exit_code_3() {
     let world = World::new();
     let link = world.path("unit");

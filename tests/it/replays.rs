@@ -477,6 +477,19 @@ fn what_the_facts_say_of_a_link_that_was_lost_is_what_it_was_when_it_is_back() {
 }
 
 #[test]
+fn each_way_to_note_that_a_link_is_back_is_understood() {
+    for back in ["link back as /dev/ttyUSB0", "link back after 2.8 s as /dev/ttyUSB1"] {
+        let mut session = Session::of_recording(115_200);
+        let at = Instant::from_millis(1);
+        session.handle_bytes(at, b"\x13");
+        session.handle_mark(at, "link lost");
+        assert_eq!(session.held_since(), Some(at));
+        session.handle_mark(at, back);
+        assert_eq!(session.held_since(), None, "{back}");
+    }
+}
+
+#[test]
 fn a_recording_of_an_upload_ends_with_what_the_unit_was_then() {
     let mut bench = Bench::with(flash_with(&small_image("AXTC4CO", "1.1.0")), Duration::ZERO);
     bench.run_for(Duration::from_secs(4));

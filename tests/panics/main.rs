@@ -7,7 +7,6 @@
 //! that, as a process has one panic hook and one terminal; hence no harness, whose hook and threads would come between.
 
 #[cfg(unix)]
-#[allow(dead_code, reason = "the stories in `it` do more with a screen")]
 mod support;
 
 /// First argument of the program that panics.

@@ -3,15 +3,17 @@
 //! What is written is checked like any other image before it takes its place, so a conversion cannot make a bad file of
 //! a good one.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 
 use super::report::contents;
-use super::{allowable, checked, grouped, read, report_text, shown, targets};
+use super::{allowable, checked, read, report_text, targets};
+use crate::cli::Global;
 use crate::cli::error::{CliError, Kind};
+use crate::cli::files::{Destination, shown};
+use crate::cli::numbers::counted;
 use crate::cli::output::Output;
-use crate::cli::{Global, files};
 use crate::image::{self, AddressUnit, ConvertError, DefectId, LineEnd, Report, Shape};
 
 /// Arguments.
@@ -94,19 +96,20 @@ pub(super) fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(
     if !written.is_ok() {
         return refuse(&written, &shown(&args.out), "would have errors, so it is not written", output);
     }
-    if args.out == Path::new("-") {
-        return output.data(&bytes);
+    let mut out = Destination::admit(Some(&args.out), global.yes)?;
+    out.save(&bytes, output)?;
+    if out.is_standard_output() {
+        return Ok(());
     }
-    files::save(&args.out, &bytes, global.yes)?;
-    let out = shown(&args.out);
+    let out = out.shown();
     if output.json {
         return output.object(&super::ImageObject::new(&written, &out));
     }
     let unit = shape.address_unit.name();
     output.remark(&format!(
-        "{out}: {}, addresses count {unit}s, {} bytes written",
+        "{out}: {}, addresses count {unit}s, {} written",
         contents(&written),
-        grouped(bytes.len() as u64)
+        counted(bytes.len() as u64, "byte")
     ));
     Ok(())
 }

@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::report::{contents, counted, grouped};
-use super::{read, report_text, shown};
+use super::report::contents;
+use super::{read, report_text};
 use crate::cli::error::{CliError, Kind};
+use crate::cli::files::shown;
+use crate::cli::numbers::counted;
 use crate::cli::output::Output;
 use crate::image::{self, Change, CheckedImage, DefectId, Difference, Differing, Report};
 
@@ -82,8 +84,8 @@ fn text(a: &Side, b: &Side, found: &Difference) -> String {
         let _ = writeln!(text, "0x{:04X} to 0x{:04X}  {number} {how}", words.start, words.end - 1);
     }
     if found.ranges.len() > RANGES_SHOWN {
-        let more = grouped((found.ranges.len() - RANGES_SHOWN) as u64);
-        let _ = writeln!(text, "and {more} more ranges; --json lists them");
+        let more = counted((found.ranges.len() - RANGES_SHOWN) as u64, "more range");
+        let _ = writeln!(text, "and {more}; --json lists them");
     }
     if found.entry {
         let (a, b) = (a.image.image(), b.image.image());

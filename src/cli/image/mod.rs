@@ -14,15 +14,17 @@ use std::path::{Path, PathBuf};
 use clap::Subcommand;
 
 use super::error::{CliError, Kind};
+use super::files::{Destination, shown};
+use super::numbers::counted;
 use super::output::Output;
-use super::{Global, files, names};
+use super::{Global, names};
 use crate::device::{LoaderKind, Product};
 use crate::image::make::{self, Recipe};
 use crate::image::{self, DefectId, Report, Severity, Target};
 use crate::version::Version;
 
 pub use report::{DefectObject, ImageObject, defect_objects, report_text};
-use report::{contents, facts_text, grouped};
+use report::{contents, facts_text};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -129,17 +131,18 @@ fn make(args: &MakeArgs, global: &Global, output: &mut Output) -> Result<(), Cli
     let recipe = Recipe { target: &target, version: args.version, words, flaw: args.defect };
     let bytes = make::make(&recipe).map_err(|error| CliError::new(Kind::Usage, error))?;
     let path = args.out.clone().unwrap_or_else(|| args.product.file_name(args.version).into());
-    if path == Path::new("-") {
-        return output.data(&bytes);
+    let mut out = Destination::admit(Some(&path), global.yes)?;
+    out.save(&bytes, output)?;
+    if out.is_standard_output() {
+        return Ok(());
     }
-    files::save(&path, &bytes, global.yes)?;
     let report =
         image::check(&bytes[..], None, &targets(), None, &[]).map_err(|error| CliError::new(Kind::Failed, error))?;
-    let name = shown(&path);
+    let name = out.shown();
     if output.json {
         return output.object(&ImageObject::new(&report, &name));
     }
-    output.remark(&format!("{name}: {}, {} bytes written", contents(&report), grouped(bytes.len() as u64)));
+    output.remark(&format!("{name}: {}, {} written", contents(&report), counted(bytes.len() as u64, "byte")));
     Ok(())
 }
 
@@ -236,22 +239,4 @@ fn flaw(name: &str) -> Result<DefectId, String> {
         let known: Vec<&str> = make::flaws().map(DefectId::name).collect();
         format!("no such defect can be made; possible: {}", known.join(", "))
     })
-}
-
-/// A path for the screen: a name may hold anything, a terminal must not get it.
-pub fn shown(path: &Path) -> String {
-    if path == Path::new("-") {
-        return "standard input".into();
-    }
-    path.to_string_lossy().chars().map(|letter| if letter.is_control() { '?' } else { letter }).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_name_cannot_reach_the_terminal_as_control_codes() {
-        assert_eq!(shown(Path::new("a\x1b[31m.S")), "a?[31m.S");
-    }
 }

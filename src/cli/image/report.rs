@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use crate::cli::numbers::{counted, counted_all, grouped};
 use crate::image::{self, Defect, DefectId, Report};
 
 /// The report as text: a line for each defect, then the verdict.
@@ -14,7 +15,8 @@ pub fn report_text(report: &Report, file: &str) -> String {
         let _ = writeln!(text, "{file}:{line}:{column}: {severity} {id}: {message}");
     }
     if report.unlisted() > 0 {
-        let _ = writeln!(text, "{file}: {} more defects are not listed", grouped(report.unlisted()));
+        let are = if report.unlisted() == 1 { "is" } else { "are" };
+        let _ = writeln!(text, "{file}: {} {are} not listed", counted(report.unlisted(), "more defect"));
     }
     // Sound as a file; but nobody could tell what runs then, so somebody has to answer for it ('axcon load').
     let is_nameless = report.defects.iter().any(|defect| defect.id == DefectId::NoIdentity && !defect.allowed);
@@ -23,13 +25,9 @@ pub fn report_text(report: &Report, file: &str) -> String {
         true => "may be sent",
         false => "must not be sent",
     };
-    let mut counts = vec![
-        counted(report.errors - report.allowed, "error"),
-        counted(report.warnings, "warning"),
-        counted(report.allowed, "allowed error"),
-    ];
-    counts.retain(|count| !count.is_empty());
-    let counts = if counts.is_empty() { "no defects".into() } else { counts.join(", ") };
+    let errors = report.errors - report.allowed;
+    let counts = counted_all(&[(errors, "error"), (report.warnings, "warning"), (report.allowed, "allowed error")]);
+    let counts = counts.unwrap_or_else(|| "no defects".into());
     let _ = writeln!(text, "{file}: {}: {verdict}, {counts}", contents(report));
     text
 }
@@ -41,10 +39,10 @@ pub(super) fn facts_text(report: &Report, file: &str) -> String {
     let mut row = |name: &str, value: &str| {
         let _ = writeln!(text, "{name:<13} {value}");
     };
-    row("File", &format!("{file}, {} bytes", grouped(facts.size)));
+    row("File", &format!("{file}, {}", counted(facts.size, "byte")));
     let ends = facts.line_end.map_or(String::new(), |end| format!(", line ends {}", end.name()));
     match facts.format {
-        Some(format) => row("Format", &format!("{}, {} records{ends}", format.title(), grouped(facts.records))),
+        Some(format) => row("Format", &format!("{}, {}{ends}", format.title(), counted(facts.records, "record"))),
         None => row("Format", "none that is known"),
     }
     if let Some(header) = &facts.header {
@@ -64,22 +62,19 @@ pub(super) fn facts_text(report: &Report, file: &str) -> String {
         row(name, &format!("0x{:04X} to 0x{:04X}", range.start, range.end - 1));
     }
     if facts.ranges.len() > RANGES_SHOWN {
-        row("", &format!("and {} more ranges", facts.ranges.len() - RANGES_SHOWN));
+        row("", &format!("and {}", counted((facts.ranges.len() - RANGES_SHOWN) as u64, "more range")));
     }
     if let Some(entry) = facts.entry {
         row("Entry point", &format!("0x{entry:04X}"));
     }
     if facts.data_bytes > 0 {
         let seconds = facts.characters as f64 / CHARACTERS_PER_SECOND;
-        row("Data", &format!("{} bytes{}", grouped(facts.data_bytes), share(report)));
+        row("Data", &format!("{}{}", counted(facts.data_bytes, "byte"), share(report)));
         row("To send", &format!("{} characters, {seconds:.1} s at 115200 baud", grouped(facts.characters)));
     }
-    let counts = [counted(report.errors, "error"), counted(report.warnings, "warning")];
-    let counts: Vec<&str> = counts.iter().map(String::as_str).filter(|count| !count.is_empty()).collect();
-    if counts.is_empty() {
-        row("Defects", "none");
-    } else {
-        row("Defects", &format!("{}; `axcon image check` lists them", counts.join(", ")));
+    match counted_all(&[(report.errors, "error"), (report.warnings, "warning")]) {
+        None => row("Defects", "none"),
+        Some(counts) => row("Defects", &format!("{counts}; `axcon image check` lists them")),
     }
     text
 }
@@ -100,7 +95,7 @@ pub(super) fn contents(report: &Report) -> String {
     let records = counted(report.facts.records, "record");
     match &report.facts.identity {
         Some(identity) => format!("{} V{}, {records}", identity.product, identity.version),
-        None if records.is_empty() => "no image".into(),
+        None if report.facts.records == 0 => "no image".into(),
         None => format!("an image without a name, {records}"),
     }
 }
@@ -193,42 +188,7 @@ pub fn defect_objects(report: &Report) -> Vec<DefectObject<'_>> {
         .collect()
 }
 
-/// `2 errors`; nothing if there are none.
-pub(super) fn counted(number: u64, what: &str) -> String {
-    match number {
-        0 => String::new(),
-        1 => format!("1 {what}"),
-        _ => format!("{} {what}s", grouped(number)),
-    }
-}
-
-/// A number with its thousands apart.
-pub(super) fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut grouped = String::new();
-    for (at, digit) in digits.chars().enumerate() {
-        if at > 0 && (digits.len() - at).is_multiple_of(3) {
-            grouped.push(',');
-        }
-        grouped.push(digit);
-    }
-    grouped
-}
-
 /// 115200 baud, ten bits a character.
 const CHARACTERS_PER_SECOND: f64 = 11_520.0;
 /// A program is one range, rarely two or three.
 const RANGES_SHOWN: usize = 8;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_grouped() {
-        let table = [(0, "0"), (999, "999"), (1000, "1,000"), (1_234_567, "1,234,567")];
-        for (number, text) in table {
-            assert_eq!(grouped(number), text);
-        }
-    }
-}

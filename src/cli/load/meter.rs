@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use serde::Serialize;
 
-use super::phase_name;
+use super::verdict::phase_name;
 use crate::cli::output::Output;
 use crate::host::terminal;
 use crate::session::{Phase, Progress};
@@ -45,8 +45,8 @@ struct ProgressObject<'a> {
 /// Characters of the bar at most, and so few that it shows nothing.
 const LONGEST_BAR: usize = 30;
 const SHORTEST_BAR: usize = 4;
-/// Columns where nobody says how many there are.
-const COLUMNS: usize = 80;
+/// Columns and rows where nobody says how many there are.
+const SIZE: (usize, usize) = (80, 24);
 /// A hold that lasts so long is told.
 const LONG_HOLD: Duration = Duration::from_secs(1);
 
@@ -74,7 +74,7 @@ impl Meter {
                 let _ = output.object(&self.object(progress));
             }
             Style::Bar => {
-                let line = format!("\r{}\x1b[K", text(progress, columns()));
+                let line = format!("\r{}\x1b[K", text(progress, size().0));
                 let _ = output.err.write_all(line.as_bytes()).and_then(|()| output.err.flush());
             }
             Style::Phases if is_new_phase => output.remark(&format!("{} ...", phase_name(progress.phase))),
@@ -108,9 +108,9 @@ impl Meter {
     }
 }
 
-/// Columns of the terminal.
-fn columns() -> usize {
-    terminal::columns().unwrap_or(COLUMNS)
+/// Columns and rows of the terminal.
+fn size() -> (usize, usize) {
+    terminal::size().unwrap_or(SIZE)
 }
 
 /// One line of fewer than so many columns: a line that fills its terminal wraps on many. What is left of them is the bar.
@@ -146,37 +146,39 @@ fn cut(line: &str, columns: usize) -> String {
     line.chars().take(columns).collect()
 }
 
-/// A line for each of several uploads: repainted in place on a terminal, printed anew elsewhere when its phase changes.
+/// A line for each of several uploads: repainted in place on a terminal that has room for all of them, printed anew
+/// elsewhere when its phase changes.
 pub struct Board {
     state: Mutex<State>,
     names: Vec<String>,
-    in_place: bool,
-    columns: fn() -> usize,
+    on_terminal: bool,
+    size: fn() -> (usize, usize),
 }
 
 struct State {
     lines: Vec<String>,
+    /// The lines stand right above the cursor.
     painted: bool,
     to: Box<dyn Write + Send>,
 }
 
 impl Board {
     /// A board for uploads on these ports.
-    pub fn new(ports: &[String], to: Box<dyn Write + Send>, in_place: bool) -> Self {
-        Board::of_columns(ports, to, in_place, columns)
+    pub fn new(ports: &[String], to: Box<dyn Write + Send>, on_terminal: bool) -> Self {
+        Board::of_size(ports, to, on_terminal, size)
     }
 
-    fn of_columns(ports: &[String], to: Box<dyn Write + Send>, in_place: bool, columns: fn() -> usize) -> Self {
+    fn of_size(ports: &[String], to: Box<dyn Write + Send>, on_terminal: bool, size: fn() -> (usize, usize)) -> Self {
         let lines = vec!["waits".to_owned(); ports.len()];
         let width = ports.iter().map(|port| port.chars().count()).max().unwrap_or_default();
         let names = ports.iter().map(|port| format!("{port:<width$}")).collect();
-        Board { state: Mutex::new(State { lines, painted: false, to }), names, in_place, columns }
+        Board { state: Mutex::new(State { lines, painted: false, to }), names, on_terminal, size }
     }
 
     /// Columns of a line behind its name.
     pub fn room(&self) -> usize {
         let name = self.names.first().map_or(0, |name| name.chars().count() + 2);
-        (self.columns)().saturating_sub(name)
+        (self.size)().0.saturating_sub(name)
     }
 
     /// What a line says now.
@@ -185,9 +187,12 @@ impl Board {
         let first_word = |text: &str| text.split_whitespace().next().map(str::to_owned);
         let is_news = first_word(&state.lines[line]) != first_word(&text);
         state.lines[line] = text;
-        let painted = if self.in_place {
+        let (columns, rows) = (self.size)();
+        // The cursor stands below the lines, and goes up to no line that has left the screen.
+        let in_place = self.on_terminal && self.names.len() < rows;
+        let painted = if in_place {
             let up = if state.painted { format!("\x1b[{}A", state.lines.len()) } else { String::new() };
-            let room = (self.columns)().saturating_sub(1);
+            let room = columns.saturating_sub(1);
             let lines = self.names.iter().zip(&state.lines);
             let lines = lines.map(|(name, line)| format!("\r{}\x1b[K\r\n", cut(&format!("{name}  {line}"), room)));
             up + &lines.collect::<String>()
@@ -196,7 +201,7 @@ impl Board {
         } else {
             return;
         };
-        state.painted = true;
+        state.painted = in_place;
         let _ = state.to.write_all(painted.as_bytes()).and_then(|()| state.to.flush());
     }
 }
@@ -219,10 +224,10 @@ mod tests {
         }
     }
 
-    fn board(in_place: bool) -> (Board, Shared) {
+    fn board(on_terminal: bool, size: fn() -> (usize, usize)) -> (Board, Shared) {
         let shared = Shared::default();
         let ports = ["/dev/ttyUSB0".to_owned(), "u1".to_owned()];
-        (Board::of_columns(&ports, Box::new(shared.clone()), in_place, || 40), shared)
+        (Board::of_size(&ports, Box::new(shared.clone()), on_terminal, size), shared)
     }
 
     fn said(shared: &Shared) -> String {
@@ -230,17 +235,20 @@ mod tests {
     }
 
     #[test]
-    fn each_upload_has_its_line_and_a_pipe_gets_only_what_is_new() {
-        let (board, shared) = board(false);
-        board.set(1, "transfer   1 %".into());
-        board.set(1, "transfer   2 %".into());
-        board.set(0, "check".into());
-        assert_eq!(said(&shared), "u1            transfer   1 %\n/dev/ttyUSB0  check\n");
+    fn a_pipe_and_a_terminal_without_room_for_all_lines_get_only_what_is_new() {
+        let roomy: fn() -> (usize, usize) = || (40, 24);
+        for (on_terminal, size) in [(false, roomy), (true, || (40, 2))] {
+            let (board, shared) = board(on_terminal, size);
+            board.set(1, "transfer   1 %".into());
+            board.set(1, "transfer   2 %".into());
+            board.set(0, "check".into());
+            assert_eq!(said(&shared), "u1            transfer   1 %\n/dev/ttyUSB0  check\n");
+        }
     }
 
     #[test]
     fn a_terminal_gets_all_lines_in_place() {
-        let (board, shared) = board(true);
+        let (board, shared) = board(true, || (40, 3));
         board.set(0, "check".into());
         board.set(1, "done".into());
         let text = said(&shared);
@@ -249,7 +257,7 @@ mod tests {
 
     #[test]
     fn a_line_that_is_repainted_never_fills_its_terminal() {
-        let (board, shared) = board(true);
+        let (board, shared) = board(true, || (40, 24));
         board.set(0, "x".repeat(100));
         assert!(said(&shared).contains(&format!("\r/dev/ttyUSB0  {}\x1b[K", "x".repeat(39 - 14))));
         assert_eq!(board.room(), 40 - 14);

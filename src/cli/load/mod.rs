@@ -2,23 +2,24 @@
 
 mod meter;
 mod several;
+mod verdict;
 
 use std::path::PathBuf;
 
-use serde::Serialize;
-
 use super::error::{CliError, Kind};
-use super::image::{self as image_cli, DefectObject};
+use super::image as image_cli;
 use super::journal::Desk;
+use super::numbers::counted;
 use super::output::Output;
 use super::talk::{Ended, Talk, no_answer_hints};
-use super::{Global, ask, link, names, password};
+use super::{Global, ask, files, link, names, password};
 use crate::device::{self, LoaderKind, Product};
 use crate::host::journal::Note;
 use crate::image::{CheckedImage, DefectId, Report, Software};
 use crate::secret::Secret;
-use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, Phase, UnitNow, UnitState, Verdict};
+use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, UnitState};
 use meter::Meter;
+use verdict::{conclude, planned, refuse};
 
 /// Arguments of `axcon load`.
 ///
@@ -57,11 +58,11 @@ pub struct Args {
 /// As the exit codes say: see the report.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     if let (Some(file), [_, _, ..]) = (&global.record, global.ports.as_slice()) {
-        let message = format!("several units cannot be recorded to one file, {}", image_cli::shown(file));
+        let message = format!("several units cannot be recorded to one file, {}", files::shown(file));
         return Err(CliError::message(Kind::Usage, message)
             .hint("leave --record away: each upload has its own recording in the state directory"));
     }
-    let name = image_cli::shown(&args.image);
+    let name = files::shown(&args.image);
     let expected = args.product.map(|product| product.name.as_str());
     let report = image_cli::read_for(&args.image, &image_cli::targets_with(args.loader), expected, &args.allow)?;
     let Some(image) = report.image() else {
@@ -95,7 +96,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         several if prepared.args.dry_run => several::plan(several, &prepared, global, output),
         several => {
             if !global.yes && !ask::is_yes(&format!("Upload to {} units? Type yes: ", several.len()), None, output)? {
-                return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
+                return Err(not_confirmed());
             }
             let password = prepared.password.take().map_or_else(|| password::ask(None), Ok)?;
             prepared.password = Some(password);
@@ -113,23 +114,34 @@ struct Prepared {
     password: Option<Secret>,
 }
 
-/// Uploads to one unit.
-fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut Output) -> Result<(), CliError> {
-    let Prepared { args, name, report, image, password } = prepared;
+/// Uploads to one unit, or says what that would do.
+fn upload(prepared: &Prepared, global: &Global, meter: Meter, output: &mut Output) -> Result<(), CliError> {
     if link::is_recording(global) {
         return Err(link::read_only("take new software"));
     }
     let mut talk = Talk::open(global, output)?;
+    let result = upload_over(&mut talk, prepared, global, meter, output);
+    talk.close(output);
+    result
+}
+
+fn upload_over(
+    talk: &mut Talk,
+    prepared: &Prepared,
+    global: &Global,
+    meter: Meter,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    let Prepared { args, name, report, image, password } = prepared;
     talk.ask(Command::Identify)?;
-    let journal = Desk::of(&talk);
-    find_product(&mut talk, args, global, output)?;
+    let journal = Desk::of(talk);
+    find_product(talk, args, global, output)?;
     let facts = talk.session().facts().clone();
     plan(report, image, name, args.loader, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
     if let Some(product) = args.product
         && let Some(note) = journal.against(&facts, &product.name)
         && !args.allow.contains(&DefectId::WrongProduct)
     {
-        talk.close(output);
         return Err(contradicted(note, product));
     }
     let noted = journal.note.as_ref().map(|note| note.product.clone());
@@ -141,30 +153,15 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         output.remark("axcon: which version the unit ran is not known, so nobody can say whether the image is older");
     }
     if args.dry_run {
-        let port = talk.port().to_owned();
-        talk.close(output);
         let product = check_fit(image, &facts, &journal, args)?;
-        return planned(report, Some((&facts, &port)), Some(&product.name), output);
+        return planned(report, Some((&facts, talk.port())), Some(&product.name), output);
     }
+    let password = consent(talk, password.as_ref(), &facts, global, output)?;
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
     let product = args.product.map(|product| product.name.clone()).or(noted);
-    let needs_password = facts.state != UnitState::Loader;
-    if needs_password && password.is_none() && !ask::somebody() {
-        talk.close(output);
-        return Err(CliError::message(Kind::Usage, "the password is missing")
-            .hint("give it with --password-file FILE or in AXCON_PASSWORD"));
-    }
-    if !global.yes && !ask::is_yes("Upload? Type yes: ", Some(&mut talk), output)? {
-        talk.close(output);
-        return Err(CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent"));
-    }
-    let password = match password {
-        None if needs_password => Some(password::ask(Some(&mut talk))?),
-        password => password.clone(),
-    };
     // Whom nobody but the note has told of the product has to learn how a wrong note is corrected.
     let doubt = journal.note.as_ref().filter(|_| args.product.is_none() && facts.product.is_none()).map(doubt);
-    let mut note = journal.compose(&facts, product.as_deref(), name, &talk);
+    let note = journal.compose(&facts, product.as_deref(), name, talk);
     let order = LoadOrder {
         product,
         ran,
@@ -173,35 +170,71 @@ fn upload(prepared: &Prepared, global: &Global, mut meter: Meter, output: &mut O
         allowed: args.allow.clone(),
         ..LoadOrder::new(image.clone(), password)
     };
+    let (result, lost) = send(talk, order, note, &journal, meter, output)?;
+    journal.end(&result, output);
+    let is_wrong_product = result.misfit == Some(DefectId::WrongProduct);
+    let concluded = conclude(&result, lost, report, talk.port(), output);
+    match doubt.filter(|_| is_wrong_product) {
+        Some(doubt) => concluded.map_err(|error| error.hint(doubt)),
+        None => concluded,
+    }
+}
+
+/// The user's word that it shall be done, and the password where the unit will want it.
+fn consent(
+    talk: &mut Talk,
+    password: Option<&Secret>,
+    facts: &Facts,
+    global: &Global,
+    output: &mut Output,
+) -> Result<Option<Secret>, CliError> {
+    let needs_password = facts.state != UnitState::Loader;
+    if needs_password && password.is_none() && !ask::somebody() {
+        return Err(CliError::message(Kind::Usage, "the password is missing")
+            .hint("give it with --password-file FILE or in AXCON_PASSWORD"));
+    }
+    if !global.yes && !ask::is_yes("Upload? Type yes: ", Some(&mut *talk), output)? {
+        return Err(not_confirmed());
+    }
+    match password {
+        None if needs_password => password::ask(Some(talk)).map(Some),
+        password => Ok(password.cloned()),
+    }
+}
+
+fn not_confirmed() -> CliError {
+    CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent")
+}
+
+/// Does what was ordered and shows how far it is. The note is written when the unit has been found to be the right one.
+fn send(
+    talk: &mut Talk,
+    order: LoadOrder,
+    mut note: Option<Note>,
+    journal: &Desk,
+    mut meter: Meter,
+    output: &mut Output,
+) -> Result<(Box<LoadReport>, Option<CliError>), CliError> {
     // Until the unit has been found to be the right one the session has nothing to tell of.
     meter.show(&order.at_its_beginning(), output);
     let ended = talk.run(Command::Load(Box::new(order)), |_, event| {
         if let Event::Progress(progress) = event {
-            // The unit has been found to be the right one, and L or the first record is about to leave.
+            // L or the first record is about to leave.
             if let Some(note) = note.take() {
                 journal.begin(note, output);
             }
             meter.show(progress, output);
         }
         Ok(())
-    })?;
+    });
     meter.end(output);
-    let (outcome, lost) = match ended {
-        Ended::Finished { outcome, .. } => (outcome, None),
-        Ended::Lost { outcome, error } => (outcome, Some(error)),
-    };
-    let Outcome::Loaded(result) = outcome else {
-        return Err(CliError::message(Kind::Failed, "the upload ended without a report"));
-    };
-    journal.end(&result, output);
-    let is_wrong_product = result.misfit == Some(DefectId::WrongProduct);
-    let result = conclude(&result, lost, report, talk.port(), output);
-    let result = match doubt.filter(|_| is_wrong_product) {
-        Some(doubt) => result.map_err(|error| error.hint(doubt)),
-        None => result,
-    };
-    talk.close(output);
-    result
+    match ended? {
+        Ended::Finished { outcome: Outcome::Loaded(report), .. } => Ok((report, None)),
+        Ended::Lost { outcome: Outcome::Loaded(report), error } => Ok((report, Some(error))),
+        Ended::Finished { .. } | Ended::Lost { .. } => {
+            Err(CliError::message(Kind::Failed, "the upload ended without a report"))
+        }
+    }
 }
 
 /// Finds out the product of a unit whose menu does not name it: its object dictionary does.
@@ -271,76 +304,6 @@ fn check_fit(image: &CheckedImage, facts: &Facts, journal: &Desk, args: &Args) -
     }
 }
 
-/// A dry run has come to its end without an objection.
-fn planned(
-    report: &Report,
-    unit: Option<(&Facts, &str)>,
-    product: Option<&str>,
-    output: &mut Output,
-) -> Result<(), CliError> {
-    if !output.json {
-        return Ok(());
-    }
-    let state = match unit.map(|(facts, _)| facts.state) {
-        Some(UnitState::Loader) => UnitNow::Loader,
-        Some(_) => UnitNow::Application,
-        None => UnitNow::Unknown,
-    };
-    let version = unit.and_then(|(facts, _)| facts.version.as_ref());
-    output.object(&LoadObject {
-        schema: "axcon.load/1",
-        port: unit.map(|(_, port)| port),
-        exit_code: 0,
-        verdict: "planned",
-        unit: unit_name(state),
-        phase: phase_name(Phase::Check),
-        product,
-        version_before: version.map(|known| known.value.to_string()),
-        version_after: None,
-        records: 0,
-        records_total: report.facts.records as usize,
-        address: None,
-        seconds: 0.0,
-        what: "a dry run: nothing has been sent",
-        heard: "",
-        remark: None,
-        next: "run the same command without --dry-run",
-        defects: image_cli::defect_objects(report),
-    })
-}
-
-/// The image has errors: report, nothing else.
-fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliError> {
-    let written = if output.json {
-        let identity = report.facts.identity.as_ref();
-        output.object(&LoadObject {
-            schema: "axcon.load/1",
-            port: None,
-            exit_code: Kind::ImageRefused.exit_code(),
-            verdict: "refused",
-            unit: "unknown",
-            phase: phase_name(Phase::Check),
-            product: identity.map(|identity| identity.product.as_str()),
-            version_before: None,
-            version_after: None,
-            records: 0,
-            records_total: report.facts.records as usize,
-            address: None,
-            seconds: 0.0,
-            what: "the image has errors; nothing has been sent",
-            heard: "",
-            remark: None,
-            next: "use an image without errors",
-            defects: image_cli::defect_objects(report),
-        })
-    } else {
-        let written = output.data(image_cli::report_text(report, name).as_bytes());
-        output.remark("axcon: the image is refused; nothing has been sent");
-        written
-    };
-    CliError::found(Some(Kind::ImageRefused), written)
-}
-
 /// Says what is going to happen.
 fn plan(
     report: &Report,
@@ -357,7 +320,7 @@ fn plan(
         || "it does not say what it is".to_owned(),
         |identity| format!("{} V{}", identity.product, identity.version),
     );
-    output.remark(&format!("image  {name}: {contents}, {} records", report.facts.records));
+    output.remark(&format!("image  {name}: {contents}, {}", counted(report.facts.records, "record")));
     if let Some((facts, port, note)) = unit {
         let version = facts.version.as_ref().map_or_else(String::new, |known| format!(" V{}", known.value));
         let unit = match (&facts.product, facts.state) {
@@ -392,143 +355,4 @@ fn plan(
         report.facts.characters
     ));
     Ok(())
-}
-
-#[derive(Serialize)]
-struct LoadObject<'a> {
-    schema: &'static str,
-    port: Option<&'a str>,
-    exit_code: u8,
-    verdict: &'static str,
-    unit: &'static str,
-    phase: &'static str,
-    product: Option<&'a str>,
-    version_before: Option<String>,
-    version_after: Option<String>,
-    records: usize,
-    records_total: usize,
-    address: Option<u32>,
-    seconds: f64,
-    what: &'a str,
-    heard: &'a str,
-    remark: Option<&'a str>,
-    next: &'a str,
-    defects: Vec<DefectObject<'a>>,
-}
-
-/// Says how it went, and what to do next.
-fn conclude(
-    report: &LoadReport,
-    lost: Option<CliError>,
-    image: &Report,
-    port: &str,
-    output: &mut Output,
-) -> Result<(), CliError> {
-    let kind = exit_kind(report, lost.is_some());
-    let next = report.advice();
-    if output.json {
-        let written = output.object(&LoadObject {
-            schema: "axcon.load/1",
-            port: Some(port),
-            exit_code: kind.map_or(0, Kind::exit_code),
-            verdict: verdict_name(report.verdict),
-            unit: unit_name(report.unit),
-            phase: phase_name(report.phase),
-            product: report.product.as_deref(),
-            version_before: report.version_before.map(|version| version.to_string()),
-            version_after: report.version_after.map(|version| version.to_string()),
-            records: report.records,
-            records_total: report.records_total,
-            address: report.address,
-            seconds: (report.duration.as_secs_f64() * 1000.0).round() / 1000.0,
-            what: &report.what,
-            heard: &report.heard,
-            remark: report.remark.as_deref(),
-            next,
-            defects: image_cli::defect_objects(image),
-        });
-        return CliError::found(kind, written);
-    }
-    let Some(kind) = kind else {
-        let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));
-        let seconds = report.duration.as_secs_f64();
-        if let Some(remark) = &report.remark {
-            output.remark(&format!("note: {remark}"));
-        }
-        return output
-            .data(format!("done: {}{before}; {} records in {seconds:.1} s\n", report.what, report.records).as_bytes());
-    };
-    let mut error = CliError::message(kind, report.what.clone());
-    if report.records > 0 && report.verdict != Verdict::WrongApplication {
-        let address = report.address.map_or_else(String::new, |address| format!(", address {address:#06x}"));
-        error = error.hint(format!("sent: {} of {} records{address}", report.records, report.records_total));
-    }
-    if !report.heard.is_empty() {
-        error = error.hint(format!("last heard: \"{}\"", report.heard));
-    }
-    if let Some(remark) = &report.remark {
-        error = error.hint(remark.clone());
-    }
-    if let Some(misfit) = report.misfit {
-        error = error.hint(format!("if it is wanted all the same: --allow {misfit}"));
-    }
-    if let Some(lost) = lost {
-        error = error.hint(format!("the port: {lost}"));
-    }
-    if report.verdict == Verdict::NoAnswer {
-        error = no_answer_hints(error);
-    }
-    if report.verdict == Verdict::Refused && report.product.is_none() {
-        error = error.hint("say it with --product, for example: --product AXTC4CO");
-    }
-    Err(error.hint(next))
-}
-
-/// The exit code's kind; `None` is success.
-fn exit_kind(report: &LoadReport, link_lost: bool) -> Option<Kind> {
-    Some(match report.verdict {
-        Verdict::Done => return None,
-        Verdict::Refused if report.product.is_none() => Kind::Usage,
-        Verdict::Refused => Kind::ImageRefused,
-        Verdict::UnitRefused => Kind::UnitRefused,
-        Verdict::NoAnswer => Kind::NoAnswer,
-        Verdict::Failed if link_lost && report.records == 0 => Kind::PortGone,
-        Verdict::Failed => match report.unit {
-            UnitNow::Loader => Kind::UploadFailedLoader,
-            UnitNow::Unknown => Kind::UploadFailedUnknown,
-            UnitNow::Application => Kind::WrongApplication,
-        },
-        Verdict::WrongApplication => Kind::WrongApplication,
-        Verdict::Interrupted => Kind::Interrupted,
-    })
-}
-
-fn verdict_name(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Done => "done",
-        Verdict::Refused => "refused",
-        Verdict::UnitRefused => "unit-refused",
-        Verdict::NoAnswer | Verdict::Failed => "failed",
-        Verdict::WrongApplication => "wrong-application",
-        Verdict::Interrupted => "interrupted",
-    }
-}
-
-fn unit_name(unit: UnitNow) -> &'static str {
-    match unit {
-        UnitNow::Application => "application",
-        UnitNow::Loader => "loader",
-        UnitNow::Unknown => "unknown",
-    }
-}
-
-fn phase_name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Check => "check",
-        Phase::EnterLoader => "enter-loader",
-        Phase::Erase => "erase",
-        Phase::Transfer => "transfer",
-        Phase::Finish => "finish",
-        Phase::Verify => "verify",
-    }
 }

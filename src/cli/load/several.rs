@@ -72,8 +72,8 @@ impl Write for Shared {
 /// # Errors
 /// If one of them failed: with its exit code where all failures share one, else 1.
 pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut Output) -> Result<(), CliError> {
-    let in_place = std::io::stderr().is_terminal();
-    let board = Arc::new(Board::new(ports, Box::new(std::io::stderr()), in_place));
+    let on_terminal = std::io::stderr().is_terminal();
+    let board = Arc::new(Board::new(ports, Box::new(std::io::stderr()), on_terminal));
     let json = output.json;
     let ended: Vec<(u8, Vec<u8>, Vec<u8>)> = std::thread::scope(|scope| {
         let uploads: Vec<_> = ports

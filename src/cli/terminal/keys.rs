@@ -50,7 +50,7 @@ pub enum Deed {
 #[derive(Debug, Default)]
 pub struct Keys {
     stage: Stage,
-    /// A file is being sent: keys for the unit wait for its end, and Ctrl-C ends it.
+    /// A file is being sent: keys for the unit are not taken until its end, and Ctrl-C ends it.
     sending: bool,
 }
 

@@ -14,21 +14,21 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 
 use jiff::tz::TimeZone;
 
-use super::Global;
 use super::error::{CliError, Kind};
 use super::link;
+use super::numbers::counted;
 use super::output::Output;
 use super::talk::Calendar;
+use super::{Global, files, waiting};
 use crate::endpoint::Endpoint;
 use crate::host::clock::Clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::{Connection, LinkSpec};
 use crate::host::recorder::Recorder;
 use crate::host::replay::Recording;
-use crate::host::signal::Signals;
 use crate::host::terminal::RawMode;
 use crate::host::{self, Input};
-use crate::record::{Direction, Ending, LINK_LOST, Piece};
+use crate::record::{Direction, Ending, LINK_BACK, LINK_LOST, Piece};
 use crate::session::{Command, Session};
 use crate::time::{Duration, Instant};
 use keys::{Deed, Keys};
@@ -88,6 +88,13 @@ const LONG_HOLD: Duration = Duration::from_secs(2);
 /// # Errors
 /// If the port does not open or goes away, or a signal ends the command.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    if output.json {
+        return Err(CliError::message(
+            Kind::Usage,
+            "a terminal shows the bytes that come: --json has no meaning there",
+        )
+        .hint("'axcon stream --json' and 'axcon diagnostics --json' write what the unit says as objects"));
+    }
     let look = match (args.raw, args.hex) {
         (true, _) => Look::Raw,
         (false, true) => Look::Hex,
@@ -98,6 +105,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         if args.send.is_some() {
             return Err(link::read_only("take a file"));
         }
+        link::not_recorded_again(global)?;
         return replay(path, look, &args, output);
     }
     let clock = Clock::start();
@@ -105,9 +113,8 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let log = args.log.map(open_log).transpose()?;
     let sending = args.send.as_deref().map(|path| Sending::open(path, args.newline_out)).transpose()?;
     let plan = link::recording(global)?;
-    let connection = link::open(&spec, global, clock, sender.clone())?;
-    // Not before: until then there is nothing to leave in order, and a server that does not answer may take seconds.
-    let _signals = Signals::start(sender.clone()).map_err(|error| CliError::new(Kind::Failed, error))?;
+    let _signals = waiting::hear_signals(sender.clone())?;
+    let connection = link::open(&spec, global, clock, sender.clone(), &inputs)?;
     let recorder = link::start_recording(&plan, &connection, clock, output)?;
     let interactive = io::stdin().is_terminal();
     let comeback = Comeback::of(&spec, link::options(global)).filter(|_| interactive);
@@ -308,7 +315,7 @@ impl Conversation {
                 Deed::Cancel => match self.sending.take() {
                     Some(sending) => {
                         self.keys.set_sending(false);
-                        self.say(&format!("ended behind {} bytes", sending.sent()), output)?;
+                        self.say(&format!("ended behind {}", counted(sending.sent(), "byte")), output)?;
                     }
                     None => output.data(b"\r\x1b[K")?,
                 },
@@ -411,7 +418,7 @@ impl Conversation {
             let Some(sending) = &mut self.sending else { return Ok(()) };
             let piece = sending.next()?;
             if piece.is_empty() {
-                let text = format!("sent {} bytes", sending.sent());
+                let text = format!("sent {}", counted(sending.sent(), "byte"));
                 self.sending = None;
                 self.keys.set_sending(false);
                 self.last = now;
@@ -443,7 +450,7 @@ impl Conversation {
         let connection = comeback.and_then(|it| it.open(self.clock, self.inputs.clone()));
         match connection {
             Some(connection) => {
-                let text = format!("link back as {}", connection.port());
+                let text = format!("{LINK_BACK}as {}", connection.port());
                 self.recorder.mark(now, &text);
                 self.session.link_back(now);
                 self.connection = Some(connection);
@@ -486,7 +493,7 @@ fn replay(path: &Path, look: Look, args: &Args, output: &mut Output) -> Result<(
     shown.finish(&time_of, &mut out);
     output.data(&out)?;
     if recording.ending() == Some(Ending::CutShort) {
-        output.remark("axcon: the recording ends in the middle of a line: whoever wrote it was killed");
+        output.remark(link::CUT_SHORT);
     }
     Ok(())
 }
@@ -536,7 +543,10 @@ fn open_log(path: PathBuf) -> Result<(PathBuf, File), CliError> {
 }
 
 fn log_error(path: &Path, error: io::Error) -> CliError {
-    CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot write the log '{}'", path.display())))
+    CliError::new(
+        Kind::Failed,
+        anyhow::Error::new(error).context(format!("cannot write the log '{}'", files::shown(path))),
+    )
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use crate::cli::error::{CliError, Kind};
+use crate::cli::files::shown;
 
 /// What Enter is on the line, and the line ends of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -41,7 +42,7 @@ impl NewLine {
 /// A file being sent.
 pub struct Sending {
     path: PathBuf,
-    file: Box<dyn Read + Send>,
+    file: File,
     new_line: NewLine,
     /// The last byte of the piece before was a CR: an LF at the beginning of the next belongs to it.
     after_return: bool,
@@ -55,14 +56,19 @@ impl Sending {
     /// A file from its beginning.
     ///
     /// # Errors
-    /// If it cannot be opened.
+    /// If it cannot be opened, or is no plain file: whoever waits for a pipe hears neither the unit nor the user.
     pub fn open(path: &Path, new_line: NewLine) -> Result<Self, CliError> {
-        let file = File::open(path).and_then(|file| match file.metadata()?.is_dir() {
-            true => Err(ErrorKind::IsADirectory.into()),
-            false => Ok(file),
-        });
-        let file = file.map_err(|error| failed(path, error))?;
-        Ok(Sending { path: path.to_owned(), file: Box::new(file), new_line, after_return: false, sent: 0 })
+        match std::fs::metadata(path) {
+            Ok(found) if found.is_dir() => return Err(failed(path, ErrorKind::IsADirectory.into())),
+            Ok(found) if !found.is_file() => {
+                let message = format!("cannot send '{}': it is not a file", shown(path));
+                return Err(CliError::message(Kind::Failed, message)
+                    .hint("what a program writes is sent from standard input: PROGRAM | axcon terminal"));
+            }
+            Ok(_) | Err(_) => {}
+        }
+        let file = File::open(path).map_err(|error| failed(path, error))?;
+        Ok(Sending { path: path.to_owned(), file, new_line, after_return: false, sent: 0 })
     }
 
     /// The next bytes for the line; none at the end.
@@ -108,7 +114,7 @@ impl Sending {
 }
 
 fn failed(path: &Path, error: std::io::Error) -> CliError {
-    CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot send '{}'", path.display())))
+    CliError::new(Kind::Failed, anyhow::Error::new(error).context(format!("cannot send '{}'", shown(path))))
 }
 
 #[cfg(test)]
@@ -139,6 +145,8 @@ mod tests {
             }
         }
         assert!(Sending::open(folder.path(), NewLine::Cr).is_err(), "a folder is no file");
+        #[cfg(unix)]
+        assert!(Sending::open(Path::new("/dev/zero"), NewLine::Cr).is_err(), "nor is what has no end");
     }
 
     #[test]

@@ -398,24 +398,8 @@ mod tests {
     fn a_record_sent_at_once_reaches_the_unit_without_a_gap_however_late_the_slices_come() {
         let pty = Pty::open(BAUD).expect("a pseudo-terminal");
         let mut client = std::fs::OpenOptions::new().write(true).open(pty.path()).expect("it opens");
-        let mut host = Host {
-            plugged: Plugged::new(Ear::default(), Line::new(character_time(BAUD), Duration::ZERO)),
-            pty,
-            clock: UnitClock { clock: Clock::start(), overslept: Duration::ZERO },
-            at: Instant::ZERO,
-            line_rate: LineRate::Real,
-            power: Power::AtStart,
-            state: None,
-            replugged: None,
-            cable_is_in: true,
-            garbage: Rng::new(1),
-            attended: true,
-            client: ClientSettings { baud: BAUD, obeys_xoff: false },
-            backlog: false,
-            leaving: false,
-            heard: Vec::new(),
-            counts: Arc::default(),
-        };
+        let mut host = Host::new(Ear::default(), Hosting::default(), pty, Arc::default());
+        host.attended = true;
         client.write_all(&[b'S'; 200]).expect("written");
         // The first slice is not before the system has carried them over.
         let begun = Clock::start();

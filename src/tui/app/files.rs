@@ -209,7 +209,11 @@ impl App {
             ("json", _) => read.dump.json(),
             ("csv", _) => read.dump.csv(),
             ("txt", _) => read.dump.table(),
-            ("dcf", Some(product)) => dump::configuration(&read.reading, product, &self.view.facts),
+            ("dcf", Some(product)) => {
+                let since_start = i64::try_from(read.at.since_start().as_millis()).unwrap_or_default();
+                let unix_millis = self.view.link.start_millis.saturating_add(since_start);
+                dump::configuration(&read.reading, product, &self.view.facts, unix_millis)
+            }
             ("dcf", None) => {
                 return self.view.tell(Tone::Bad, "A DCF needs to know the product; .json keeps everything.");
             }

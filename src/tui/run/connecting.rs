@@ -122,7 +122,7 @@ impl Console {
         };
         self.retry = None;
         let name = connection.port().to_owned();
-        self.recorder.mark(self.now(), &format!("{LINK_BACK}{name}"));
+        self.recorder.mark(self.now(), &format!("{LINK_BACK}as {name}"));
         self.link = Some(connection);
         self.handle(Input::LinkBack(name));
     }

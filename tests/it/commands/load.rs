@@ -455,7 +455,10 @@ fn what_a_killed_upload_has_left_is_said_by_whoever_identifies_the_unit() {
     let said = "an upload of new.S to the AXTC4CO on this port has not ended well";
     let left = bench.run(&["identify", "--json"]);
     assert!(left.err.contains(said), "{}", left.err);
+    let noted = serde_json::json!({"product": "AXTC4CO", "image": "new.S"});
+    assert_eq!(json(&left.out)["unfinished_upload"], noted, "{}", left.out);
     assert_eq!(bench.load("new.S", &[]).code, Some(0));
     let saved = bench.run(&["identify", "--json"]);
     assert_eq!((saved.code, saved.err.as_str()), (Some(0), ""));
+    assert!(json(&saved.out)["unfinished_upload"].is_null(), "{}", saved.out);
 }

@@ -304,8 +304,37 @@ fn what_is_no_text_on_standard_input_ends_no_emulator() {
 }
 
 #[test]
-fn a_log_that_cannot_be_written_is_said_before_the_port_is_looked_at() {
+fn an_option_that_would_be_ignored_is_refused() {
     let world = World::new();
+    for (args, complaint) in [
+        (&["ports", "--port", "u0"][..], "'axcon ports' looks at no unit: --port has no meaning there"),
+        (&["--port", "u0", "ports"], "'axcon ports' looks at no unit: --port has no meaning there"),
+        (&["eds", "axtc4co", "--record", "it.cast"], "'axcon eds' looks at no unit: --record has no meaning there"),
+        (&["image", "info", "x.S", "--baud", "9600"], "'axcon image info' looks at no unit: --baud"),
+        (&["dictionary", "diff", "a", "b", "--port", "u0"], "'axcon dictionary diff' looks at no unit: --port"),
+        (&["terminal", "--json", "--port", "u0"], "--json has no meaning there"),
+        (&["stream", "--format", "csv", "--json", "--port", "u0"], "--json and --format csv contradict each other"),
+        (&["diagnostics", "--json", "--format", "text", "--port", "u0"], "--json and --format text contradict"),
+        (&["dictionary", "dump", "--json", "--format", "dcf", "--port", "u0"], "--json and --format dcf contradict"),
+    ] {
+        let ran = world.run(args, b"");
+        assert_eq!(ran.code, Some(2), "{args:?}: {}", ran.err);
+        assert!(ran.err.contains(complaint), "{args:?}: {}", ran.err);
+    }
+    // What the environment says is said to all commands.
+    let mut command = world.command(&["ports"]);
+    command.env("AXCON_PORT", "u0");
+    assert_eq!(Running::start(command).wait().code, Some(0));
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_said_before_the_port_is_looked_at() {
+    let world = World::new();
+    for command in [&["stream"][..], &["dictionary", "dump", "--yes"], &["report", "--yes"]] {
+        let ran = world.run(&[command, &["--out", "nowhere/it", "--port", "no-such-port"]].concat(), b"");
+        assert_eq!(ran.code, Some(1), "{}", ran.err);
+        assert!(ran.err.starts_with("axcon: cannot write 'nowhere/it': "), "{}", ran.err);
+    }
     let ran = world.run(&["terminal", "--log", "nowhere/log", "--port", "no-such-port"], b"");
     assert_eq!(ran.code, Some(1), "{}", ran.err);
     assert!(ran.err.starts_with("axcon: cannot write the log 'nowhere/log': "), "{}", ran.err);

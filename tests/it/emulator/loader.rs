@@ -58,6 +58,16 @@ fn a_whole_program_is_loaded_and_started() {
     assert!(text.contains("V1.3.0") && !text.contains("First Start"), "the first start is over: {text}");
 }
 
+/// Files of one program in several forms, each to a unit that waits for it.
+pub(super) fn each_is_taken(in_loader: fn() -> Bench, files: &[Vec<String>], program: &[u8]) {
+    for records in files {
+        let mut bench = in_loader();
+        let text = upload(&mut bench, records);
+        assert!(text.contains("V1.3.0") && !text.contains("Error"), "{text:?}");
+        assert_eq!(&bench.unit().flash()[..program.len()], program);
+    }
+}
+
 #[test]
 fn long_records_and_lower_case_and_crlf_are_taken_as_well() {
     let program = new_program();
@@ -66,12 +76,7 @@ fn long_records_and_lower_case_and_crlf_are_taken_as_well() {
         file(&program).iter().map(|record| record.replace('\r', "\r\n")).collect(),
         file(&program).iter().map(|record| record[..1].to_owned() + &record[1..].to_lowercase()).collect(),
     ];
-    for records in variants {
-        let mut bench = in_loader();
-        let text = upload(&mut bench, &records);
-        assert!(text.contains("V1.3.0") && !text.contains("Error"), "{text:?}");
-        assert_eq!(bench.unit().flash()[..program.len()], program);
-    }
+    each_is_taken(in_loader, &variants, &program);
 }
 
 #[test]

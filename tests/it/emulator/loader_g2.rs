@@ -6,7 +6,7 @@ use axcon::emulator::{Running, Setup};
 use axcon::time::{Duration, Instant, character_time};
 use axcon::version::Version;
 
-use super::loader::{PROMPT, cut_and_save_at_any_moment, enter_loader, new_program};
+use super::loader::{PROMPT, cut_and_save_at_any_moment, each_is_taken, enter_loader, new_program};
 use super::sender::{S0, S7, data_records, file, s3, send_obeying, talk_over, upload, without_flow_control};
 use super::{BAUD, Bench, flash_with, old_program, program, setup};
 
@@ -66,12 +66,7 @@ fn any_line_end_any_case_both_headers_and_long_records_are_taken() {
         [vec!["S0030000FC\r".to_owned()], data_records(&program, 250), vec![S7.to_owned()]].concat(),
         [vec![S0.to_owned()], data_records(&program, 64), vec![S7.to_owned()]].concat(),
     ];
-    for records in variants {
-        let mut bench = in_loader();
-        let text = upload(&mut bench, &records);
-        assert!(text.contains("V1.3.0") && !text.contains("Error"), "{text:?}");
-        assert_eq!(bench.unit().flash()[..program.len()], program);
-    }
+    each_is_taken(in_loader, &variants, &program);
 }
 
 #[test]

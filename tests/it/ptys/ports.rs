@@ -15,7 +15,7 @@ fn what_is_no_port_is_refused_with_its_kind_and_exit_code() {
         ("file", "port-gone", "cannot open file: a regular file, not a serial port"),
         ("/dev/null", "port-gone", "cannot open /dev/null: some other device, not a serial port"),
     ] {
-        let ran = world.run(&["terminal", "--json", "--port", port], b"");
+        let ran = world.run(&["identify", "--json", "--port", port], b"");
         assert_eq!(ran.code, Some(3), "{port}: {}", ran.err);
         let error: serde_json::Value = serde_json::from_str(&ran.err).expect("one object");
         assert_eq!((&error["kind"], &error["message"]), (&kind.into(), &message.into()));
@@ -69,7 +69,7 @@ fn a_second_opener_is_told_who_has_the_port() {
     let world = World::new();
     let unit = host(echo());
     let (connection, received) = connect(unit.serial(), 115_200);
-    let ran = world.run(&["terminal", "--json", "--port", text(unit.serial())], b"");
+    let ran = world.run(&["identify", "--json", "--port", text(unit.serial())], b"");
     assert_eq!(ran.code, Some(3), "{}", ran.err);
     let error: serde_json::Value = serde_json::from_str(&ran.err).expect("one object");
     assert_eq!(error["kind"], "port-busy");

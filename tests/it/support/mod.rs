@@ -3,6 +3,8 @@
 pub mod bench;
 #[cfg(unix)]
 pub mod connection;
+#[cfg(unix)]
+pub mod disturbed;
 pub mod flashed;
 #[cfg(unix)]
 pub mod puppet;

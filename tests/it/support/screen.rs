@@ -1,4 +1,4 @@
-//! The real program on a terminal of its own: keys in, picture out.
+//! The real program on a terminal of its own: keys in, picture out. What else may happen to a terminal is `disturbed`'s.
 
 use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
@@ -14,11 +14,11 @@ use super::shell::PATIENCE;
 
 /// A terminal with a program on it. The program is killed when dropped.
 pub struct Screen {
-    master: Arc<OwnedFd>,
+    pub(super) master: Arc<OwnedFd>,
     /// The program's side, kept open so that its settings can be looked at after its end.
     slave: OwnedFd,
-    child: Child,
-    picture: Arc<Mutex<vt100::Parser>>,
+    pub(super) child: Child,
+    pub(super) picture: Arc<Mutex<vt100::Parser>>,
 }
 
 impl Screen {
@@ -77,18 +77,6 @@ impl Screen {
         }
     }
 
-    /// Something else writes over what is on the screen.
-    pub fn spoil(&self) {
-        self.picture.lock().expect("no panic").process(b"\x1b[2J\x1b[Hsomething else");
-    }
-
-    /// Gives the terminal another size; the program is told by a signal.
-    pub fn resize(&self, rows: u16, columns: u16) {
-        tcsetwinsize(&*self.master, size(rows, columns)).expect("sized");
-        let (rows, columns) = (rows.try_into().expect("rows"), columns.try_into().expect("columns"));
-        self.picture.lock().expect("no panic").screen_mut().set_size(rows, columns);
-    }
-
     /// Whether the terminal edits lines and echoes, as a shell expects it.
     pub fn is_as_the_shell_left_it(&self) -> bool {
         let modes = tcgetattr(&self.slave).expect("settings").local_modes;
@@ -106,11 +94,6 @@ impl Screen {
             thread::sleep(Duration::from_millis(2));
         }
         self.is_as_the_shell_left_it()
-    }
-
-    pub fn signal(&self, signal: rustix::process::Signal) {
-        let pid = i32::try_from(self.child.id()).ok().and_then(rustix::process::Pid::from_raw).expect("a process");
-        rustix::process::kill_process(pid, signal).expect("the signal goes out");
     }
 
     /// Waits for the program's end and gives its exit code.
@@ -133,6 +116,6 @@ impl Drop for Screen {
     }
 }
 
-fn size(rows: u16, columns: u16) -> Winsize {
+pub(super) fn size(rows: u16, columns: u16) -> Winsize {
     Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 }
 }

@@ -136,8 +136,7 @@ impl Running {
     }
 
     pub fn signal(&self, signal: rustix::process::Signal) {
-        let pid = i32::try_from(self.child.id()).ok().and_then(rustix::process::Pid::from_raw).expect("a process");
-        rustix::process::kill_process(pid, signal).expect("the signal goes out");
+        send_signal(&self.child, signal);
     }
 
     /// The most memory it has had so far, in bytes.
@@ -164,6 +163,12 @@ impl Running {
         };
         Ran { code: status.code(), out: self.out.all(), err: self.err.all() }
     }
+}
+
+/// Sends a signal to a program that has been started.
+pub fn send_signal(child: &Child, signal: rustix::process::Signal) {
+    let pid = i32::try_from(child.id()).ok().and_then(rustix::process::Pid::from_raw).expect("a process");
+    rustix::process::kill_process(pid, signal).expect("the signal goes out");
 }
 
 impl Drop for Running {

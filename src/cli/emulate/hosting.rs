@@ -1,0 +1,396 @@
+//! Units on pseudo-terminals, with what becomes of them.
+
+use std::ffi::OsString;
+use std::io::{BufRead, Read};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender};
+
+use serde::Serialize;
+
+use super::orders::{Order, help, places};
+use super::{Args, CliError, Global, Kind, Output};
+use crate::cli::{files, waiting};
+use crate::device::{Complaint, Product};
+use crate::emulator::Unit;
+use crate::emulator::fault::{self, Fault};
+use crate::emulator::scenario::{LARGEST_FILE, Scenario, Stage, Verb};
+use crate::host::Input;
+use crate::host::pty::{PortLink, PortLinkError};
+use crate::host::signal::Signals;
+use crate::host::state::{Contents, Opened, State};
+use crate::host::unit::{self, Answer, HostError, HostedUnit, Hosting, LineRate};
+use crate::wire::visible;
+
+/// One unit, as the first lines of the output tell it.
+#[derive(Serialize)]
+struct Started<'a> {
+    schema: &'static str,
+    unit: usize,
+    product: &'a str,
+    serial: String,
+    pty: String,
+}
+
+/// A unit of this run. The link goes first, so that nobody opens a port about to end.
+struct Running {
+    link: Option<PortLink>,
+    unit: HostedUnit,
+    /// The pseudo-terminal it is on.
+    pty: PathBuf,
+    product: &'static Product,
+}
+
+/// What can happen while units run.
+enum News {
+    Input(Input),
+    Line(String),
+    /// A unit has done what it was told, or not.
+    Answered {
+        place: usize,
+        verb: String,
+        answer: Answer,
+    },
+    /// The cable of a unit is in again.
+    Replugged {
+        place: usize,
+        pty: PathBuf,
+    },
+    Failed(HostError),
+}
+
+/// What a unit answered, in JSON.
+#[derive(Serialize)]
+struct Answered<'a> {
+    schema: &'static str,
+    /// `None` where the line names none.
+    unit: Option<usize>,
+    verb: &'a str,
+    ok: bool,
+    said: Option<&'a str>,
+}
+
+impl<'a> Answered<'a> {
+    fn to(unit: Option<usize>, verb: &'a str, answer: Result<Option<&'a str>, &'a str>) -> Self {
+        let (ok, said) = match answer {
+            Ok(said) => (true, said),
+            Err(refused) => (false, Some(refused)),
+        };
+        Answered { schema: "axcon.emulate-answer/1", unit, verb, ok, said }
+    }
+}
+
+/// News that wait at most: lines a person types or a script writes, answers, and ends.
+const NEWS: usize = 256;
+
+/// Hosts units until the user has enough.
+///
+/// # Errors
+/// If a unit cannot be hosted, at the start or later.
+pub fn run(args: Args, _global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let products = products(&args)?;
+    let faults = faults(&args.faults, &products)?;
+    let scenario = args.scenario.as_deref().map(read_scenario).transpose()?;
+    let (news, happened) = std::sync::mpsc::sync_channel(NEWS);
+    // Signals first: an interrupt in between would leave links behind.
+    let signals = listen_for_signals(news.clone())?;
+    let mut units = Vec::new();
+    for (place, product) in products.into_iter().enumerate() {
+        units.push(start(&args, place, product, scenario.as_ref(), &faults[place], news.clone(), output)?);
+    }
+    for (place, running) in units.iter().enumerate() {
+        announce(place, running, "", output)?;
+    }
+    listen_for_lines(news.clone())?;
+    let end = serve(&args, &mut units, &news, &happened, output);
+    drop(signals);
+    end
+}
+
+/// The products of all units, in their order.
+fn products(args: &Args) -> Result<Vec<&'static Product>, CliError> {
+    let repeated = |product| std::iter::repeat_n(product, usize::from(args.count));
+    let products: Vec<_> = args.products.iter().copied().flat_map(repeated).collect();
+    if products.len() > super::MOST_UNITS {
+        let message = format!("{} units are more than {}", products.len(), super::MOST_UNITS);
+        return Err(CliError::message(Kind::Usage, message).hint("start 'axcon emulate' several times"));
+    }
+    Ok(products)
+}
+
+/// The faults of each unit.
+fn faults(specs: &[String], products: &[&Product]) -> Result<Vec<Vec<Fault>>, CliError> {
+    let mut faults = vec![Vec::new(); products.len()];
+    for spec in specs {
+        let refused = |complaint: String| {
+            let shown = crate::emulator::words::shown(spec);
+            CliError::message(Kind::Usage, format!("--fault '{shown}': {complaint}"))
+                .hint("docs/emulator.md describes the faults, for example: --fault 'lost to-unit at byte 5000'")
+        };
+        let (places, fault) = places(spec, products.len()).map_err(refused)?;
+        for place in places.unwrap_or_else(|| (0..products.len()).collect()) {
+            let fault = Fault::read(&fault, products[place]).map_err(|error| refused(error.to_string()))?;
+            faults[place].push(fault);
+        }
+    }
+    Ok(faults)
+}
+
+/// A scenario's file: its name and its text.
+fn read_scenario(file: &Path) -> Result<(String, String), CliError> {
+    let name = file.display().to_string();
+    let text = files::read_text(file, LARGEST_FILE).map_err(|error| {
+        CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the scenario '{name}'")))
+    })?;
+    Ok((name, text))
+}
+
+fn start(
+    args: &Args,
+    place: usize,
+    product: &'static Product,
+    scenario: Option<&(String, String)>,
+    faults: &[Fault],
+    news: SyncSender<News>,
+    output: &mut Output,
+) -> Result<Running, CliError> {
+    let scenario = match scenario {
+        None => Scenario::default(),
+        Some((file, text)) => Scenario::read(file, text, product)
+            .map_err(|complaints| {
+                let list = Complaint::list(&complaints);
+                CliError::message(Kind::Usage, format!("the scenario cannot be played:\n{list}"))
+                    .hint("docs/emulator.md describes the format")
+            })?
+            .unwrap_or_default(),
+    };
+    let seed = args.seed.wrapping_add(place as u64);
+    let mut setup = unit::factory_setup(product, seed);
+    setup.dialect = args.dialect.map_or(0, |dialect| dialect.wrapping_add(place as u64));
+    setup.loader = args.loader.unwrap_or(setup.loader);
+    let state = match &args.state {
+        None => None,
+        Some(folder) => {
+            let fresh = Unit::new(setup.clone());
+            let factory = Contents { flash: fresh.flash().to_vec(), parameters: fresh.parameters().to_vec() };
+            let Opened { state, contents, damaged } = State::open(&numbered(folder, place), product, &factory)
+                .map_err(|error| CliError::new(Kind::Failed, error))?;
+            for file in damaged {
+                output.remark(&format!("axcon: {file}"));
+            }
+            (setup.flash, setup.parameters) = (contents.flash, contents.parameters);
+            Some(state)
+        }
+    };
+    let emulated = Stage::new(Unit::new(setup), scenario).with_faults(seed, faults);
+    let plugs = news.clone();
+    let hosting = Hosting {
+        line_rate: if args.line_rate == "off" { LineRate::Off } else { LineRate::Real },
+        state,
+        seed,
+        // The unit's thread must not wait for us: should this be dropped, `unplug` and `plug` bring it again.
+        replugged: Some(Box::new(move |pty| {
+            let _ = plugs.try_send(News::Replugged { place, pty: pty.to_owned() });
+        })),
+        failed: Some(Box::new(move |error| {
+            let _ = news.send(News::Failed(error));
+        })),
+        ..Hosting::default()
+    };
+    let unit = HostedUnit::start(emulated, hosting).map_err(|error| CliError::new(Kind::Failed, error))?;
+    let pty = unit.serial().to_owned();
+    let link = link(args, place, &pty)?;
+    Ok(Running { link, unit, pty, product })
+}
+
+fn link(args: &Args, place: usize, pty: &Path) -> Result<Option<PortLink>, CliError> {
+    let link = args.link.as_ref().map(|link| PortLink::create(&numbered(link, place), pty));
+    link.transpose().map_err(link_error)
+}
+
+fn link_error(error: PortLinkError) -> CliError {
+    match error {
+        PortLinkError::Taken { .. } => CliError::new(Kind::Failed, error).hint("give --link another name"),
+        PortLinkError::Io { .. } => CliError::new(Kind::Failed, error),
+    }
+}
+
+fn announce(place: usize, running: &Running, prefix: &str, output: &mut Output) -> Result<(), CliError> {
+    let pty = running.pty.display().to_string();
+    let serial = running.link.as_ref().map_or_else(|| pty.clone(), |link| link.path().display().to_string());
+    if output.json {
+        let product = running.product.name.as_str();
+        output.object(&Started { schema: "axcon.emulate/1", unit: place + 1, product, serial, pty })
+    } else {
+        output.data(format!("{prefix}serial: {serial}\n").as_bytes())
+    }
+}
+
+fn serve(
+    args: &Args,
+    units: &mut [Running],
+    news: &SyncSender<News>,
+    happened: &Receiver<News>,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    loop {
+        match happened.recv() {
+            Ok(News::Line(line)) => {
+                let products: Vec<&Product> = units.iter().map(|running| running.product).collect();
+                match Order::read(&line, &products) {
+                    Ok(None) => {}
+                    Ok(Some(Order::Quit)) => return Ok(()),
+                    Ok(Some(Order::Help)) => tell_help(line.trim(), &help(), output)?,
+                    Ok(Some(Order::HelpFaults)) => tell_help(line.trim(), fault::HELP, output)?,
+                    Ok(Some(Order::Tell(verbs))) => {
+                        for (place, verb) in verbs {
+                            if !tell(&units[place], place, verb, line.trim(), news) {
+                                let refused = Err("the unit takes no more orders at the moment".to_owned());
+                                report(place, line.trim(), &refused, units.len(), output)?;
+                            }
+                        }
+                    }
+                    Err(complaint) if output.json => {
+                        output.object(&Answered::to(None, line.trim(), Err(&complaint)))?;
+                    }
+                    Err(complaint) => output.remark(&visible::line(complaint.as_bytes())),
+                }
+            }
+            Ok(News::Answered { place, verb, answer }) => report(place, &verb, &answer, units.len(), output)?,
+            Ok(News::Replugged { place, pty }) => {
+                let prefix = prefix(place, units.len());
+                let running = &mut units[place];
+                running.link = None;
+                running.link = link(args, place, &pty)?;
+                running.pty = pty;
+                announce(place, running, &prefix, output)?;
+            }
+            Ok(News::Failed(error)) => return Err(CliError::new(Kind::Failed, error)),
+            Ok(News::Input(Input::Signal(_))) | Err(_) => return Ok(()),
+            Ok(News::Input(_)) => {}
+        }
+    }
+}
+
+/// An answer like any other: whoever waits for an object behind each verb gets one.
+fn tell_help(verb: &str, text: &str, output: &mut Output) -> Result<(), CliError> {
+    let text = text.trim_end();
+    if output.json {
+        return output.object(&Answered::to(None, verb, Ok(Some(text))));
+    }
+    output.data(format!("{text}\n").as_bytes())
+}
+
+/// Has a unit do something; `false` if it takes no order.
+fn tell(running: &Running, place: usize, verb: Verb, line: &str, news: &SyncSender<News>) -> bool {
+    let (news, line) = (news.clone(), line.to_owned());
+    running.unit.order(verb, move |answer| {
+        // The unit's thread must not wait for us: an answer that nobody can take is dropped.
+        let _ = news.try_send(News::Answered { place, verb: line, answer });
+    })
+}
+
+/// Says what came of a verb: data to standard output, refusals to standard error.
+fn report(place: usize, verb: &str, answer: &Answer, units: usize, output: &mut Output) -> Result<(), CliError> {
+    if output.json {
+        let answer = answer.as_ref().map(Option::as_deref).map_err(String::as_str);
+        return output.object(&Answered::to(Some(place + 1), verb, answer));
+    }
+    let unit = prefix(place, units);
+    match answer {
+        Ok(None) => Ok(()),
+        Ok(Some(said)) => output.data(format!("{unit}{said}\n").as_bytes()),
+        Err(refused) => {
+            output.remark(&format!("{unit}{}", visible::line(refused.as_bytes())));
+            Ok(())
+        }
+    }
+}
+
+/// What tells the units of a run apart in text.
+fn prefix(place: usize, units: usize) -> String {
+    if units > 1 { format!("{}: ", place + 1) } else { String::new() }
+}
+
+fn listen_for_signals(news: SyncSender<News>) -> Result<Signals, CliError> {
+    let (inputs, signals) = crate::host::channel();
+    let listening = waiting::hear_signals(inputs)?;
+    let pass_on = move || {
+        while let Ok(input) = signals.recv() {
+            if news.send(News::Input(input)).is_err() {
+                return;
+            }
+        }
+    };
+    let thread = std::thread::Builder::new().name("signals to news".into()).spawn(pass_on);
+    thread
+        .map(|_| listening)
+        .map_err(|error| CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot listen for signals")))
+}
+
+/// Bytes of a line of verbs that are looked at together; no verb is nearly as long.
+const LONGEST_LINE: u64 = 1 << 16;
+
+fn listen_for_lines(news: SyncSender<News>) -> Result<(), CliError> {
+    if !crate::host::terminal::may_read_standard_input() {
+        return Ok(());
+    }
+    let lines = move || {
+        let mut input = std::io::stdin().lock();
+        let mut line = Vec::new();
+        // What is no UTF-8, or goes on for ever, is a verb that nobody knows, and answered so.
+        while matches!(input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line), Ok(1..)) {
+            let text = String::from_utf8_lossy(&line).trim_end_matches(['\r', '\n']).to_owned();
+            line.clear();
+            if news.send(News::Line(text)).is_err() {
+                return;
+            }
+        }
+    };
+    std::thread::Builder::new().name("verbs".into()).spawn(lines).map(drop).map_err(|error| {
+        CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot listen to standard input"))
+    })
+}
+
+/// The name for the unit at a place: the first has it as it is.
+fn numbered(path: &Path, place: usize) -> PathBuf {
+    if place == 0 {
+        return path.to_owned();
+    }
+    let mut name = OsString::from(path);
+    name.push(format!("-{}", place + 1));
+    PathBuf::from(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Duration;
+
+    #[test]
+    fn faults_are_for_all_units_or_the_one_that_is_named() {
+        let products: Vec<&Product> = Product::all().iter().collect();
+        let read = |specs: &[&str]| {
+            let specs: Vec<String> = specs.iter().map(|&spec| spec.to_owned()).collect();
+            faults(&specs, &products).map_err(|error| error.to_string())
+        };
+        let (latency, queue) = (Fault::Latency(Duration::from_millis(16)), Fault::Queue(64));
+        assert_eq!(read(&["latency 16", " 2 queue 64"]), Ok(vec![vec![latency], vec![latency, queue]]));
+        // Only the second unit has so much flash.
+        assert!(read(&["2 flash stuck at word 0x20000"]).is_ok());
+        let complaint = read(&["flash stuck at word 0x20000"]).expect_err("the first has not");
+        assert!(
+            complaint.starts_with("--fault 'flash stuck at word 0x20000': column 21: '0x20000' is not 0"),
+            "{complaint}"
+        );
+        let complaint = read(&[" 1  explode"]).expect_err("no fault");
+        assert!(complaint.starts_with("--fault ' 1  explode': column 5: 'explode' is not known"), "{complaint}");
+        let complaint = read(&["3 latency 1"]).expect_err("no such unit");
+        assert!(complaint.contains("there is no unit 3: they are numbered 1 to 2"), "{complaint}");
+    }
+
+    #[test]
+    fn further_units_get_numbered_names() {
+        assert_eq!(numbered(Path::new("/tmp/unit"), 0), Path::new("/tmp/unit"));
+        assert_eq!(numbered(Path::new("/tmp/unit"), 2), Path::new("/tmp/unit-3"));
+    }
+}

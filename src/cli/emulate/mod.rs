@@ -1,0 +1,71 @@
+//! `axcon emulate`: units on pseudo-terminals, until somebody ends it.
+//!
+//! `orders` reads what standard input says to them, `hosting` carries it out.
+
+#[cfg(unix)]
+mod hosting;
+#[cfg(unix)]
+mod orders;
+
+use std::path::PathBuf;
+
+use super::error::{CliError, Kind};
+use super::output::Output;
+use super::{Global, names};
+use crate::device::{LoaderKind, Product};
+
+/// Arguments of `axcon emulate`.
+///
+/// While it runs, standard input takes verbs, one a line: `set 1 temperature 250`, `open 3`, `power off`, `read 6100:1`,
+/// `quit`, and what `help` lists; with several units, a number first says which one (`2 power off`), or `all`. The end
+/// of standard input ends nothing; an interrupt is the normal end.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// What to emulate, e.g. axtc4co; several give several units.
+    #[arg(value_name = "PRODUCT", required = true, num_args = 1..=MOST_UNITS, value_parser = names::product)]
+    products: Vec<&'static Product>,
+    /// Make PATH a link to the unit's serial port; further units get PATH-2, PATH-3 and so on.
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
+    /// Keep flash and parameters in DIR across runs; further units get DIR-2, DIR-3 and so on.
+    #[arg(long, value_name = "DIR")]
+    state: Option<PathBuf>,
+    /// Whether bytes take their time on the line; a client at another rate than 115200 then gets garbage.
+    #[arg(long, value_name = "on|off", default_value = "on", value_parser = ["on", "off"], hide_possible_values = true)]
+    line_rate: String,
+    /// Play FILE: what happens to the inputs, the wires and the supply, and when (docs/emulator.md).
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Word everything that the manuals leave open in another way for each SEED; further units get the next seeds.
+    #[arg(long, value_name = "SEED", value_parser = clap::value_parser!(u64).range(1..))]
+    dialect: Option<u64>,
+    /// Which bootloader is in the unit, if not the product's own: g1, g2, g3, or g3-1.3, which hangs on odd data.
+    #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
+    loader: Option<LoaderKind>,
+    /// Let something go wrong: bytes lost, an XON that never comes, a reset or a power cut in the middle of a file, flash
+    /// that fails, a slow adapter, a pulled cable. Several are possible; a number before SPEC says which unit it is for,
+    /// else it is for all. docs/emulator.md describes them, and so does `help faults` on standard input.
+    #[arg(long = "fault", value_name = "SPEC", action = clap::ArgAction::Append)]
+    faults: Vec<String>,
+    /// So many units of each product.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=MOST_UNITS as i64))]
+    count: u16,
+    /// Decides everything that chance decides in a unit.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+}
+
+/// Units of one run: each has a pseudo-terminal and a thread.
+const MOST_UNITS: usize = 256;
+
+/// Says that it cannot be done here.
+///
+/// # Errors
+/// Always.
+#[cfg(not(unix))]
+pub fn run(_args: Args, _global: &Global, _output: &mut Output) -> Result<(), CliError> {
+    Err(CliError::message(Kind::Failed, "emulated units need pseudo-terminals, which this system does not have"))
+}
+
+#[cfg(unix)]
+pub use hosting::run;

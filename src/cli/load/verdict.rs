@@ -1,0 +1,224 @@
+//! How an upload went: the object for a program, words for a person, the exit code.
+
+use serde::Serialize;
+
+use crate::cli::error::{CliError, Kind};
+use crate::cli::image::{self as image_cli, DefectObject};
+use crate::cli::numbers::counted;
+use crate::cli::output::Output;
+use crate::cli::talk::no_answer_hints;
+use crate::image::Report;
+use crate::session::{Facts, LoadReport, Phase, UnitNow, UnitState, Verdict};
+
+#[derive(Serialize)]
+struct LoadObject<'a> {
+    schema: &'static str,
+    port: Option<&'a str>,
+    exit_code: u8,
+    verdict: &'static str,
+    unit: &'static str,
+    phase: &'static str,
+    product: Option<&'a str>,
+    version_before: Option<String>,
+    version_after: Option<String>,
+    records: usize,
+    records_total: usize,
+    address: Option<u32>,
+    seconds: f64,
+    what: &'a str,
+    heard: &'a str,
+    remark: Option<&'a str>,
+    next: &'a str,
+    defects: Vec<DefectObject<'a>>,
+}
+
+impl<'a> LoadObject<'a> {
+    /// Of this image, as long as there is nothing else to say.
+    fn of_nothing_sent(report: &'a Report) -> Self {
+        LoadObject {
+            schema: "axcon.load/1",
+            port: None,
+            exit_code: 0,
+            verdict: "",
+            unit: unit_name(UnitNow::Unknown),
+            phase: phase_name(Phase::Check),
+            product: None,
+            version_before: None,
+            version_after: None,
+            records: 0,
+            records_total: report.facts.records as usize,
+            address: None,
+            seconds: 0.0,
+            what: "",
+            heard: "",
+            remark: None,
+            next: "",
+            defects: image_cli::defect_objects(report),
+        }
+    }
+}
+
+/// A dry run has come to its end without an objection.
+pub fn planned(
+    report: &Report,
+    unit: Option<(&Facts, &str)>,
+    product: Option<&str>,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    if !output.json {
+        return Ok(());
+    }
+    let state = match unit.map(|(facts, _)| facts.state) {
+        Some(UnitState::Loader) => UnitNow::Loader,
+        Some(_) => UnitNow::Application,
+        None => UnitNow::Unknown,
+    };
+    let version = unit.and_then(|(facts, _)| facts.version.as_ref());
+    output.object(&LoadObject {
+        port: unit.map(|(_, port)| port),
+        verdict: "planned",
+        unit: unit_name(state),
+        product,
+        version_before: version.map(|known| known.value.to_string()),
+        what: "a dry run: nothing has been sent",
+        next: "run the same command without --dry-run",
+        ..LoadObject::of_nothing_sent(report)
+    })
+}
+
+/// The image has errors: report, nothing else.
+pub fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliError> {
+    let written = if output.json {
+        let identity = report.facts.identity.as_ref();
+        output.object(&LoadObject {
+            exit_code: Kind::ImageRefused.exit_code(),
+            verdict: "refused",
+            product: identity.map(|identity| identity.product.as_str()),
+            what: "the image has errors; nothing has been sent",
+            next: "use an image without errors",
+            ..LoadObject::of_nothing_sent(report)
+        })
+    } else {
+        let written = output.data(image_cli::report_text(report, name).as_bytes());
+        output.remark("axcon: the image is refused; nothing has been sent");
+        written
+    };
+    CliError::found(Some(Kind::ImageRefused), written)
+}
+
+/// Says how it went, and what to do next.
+pub fn conclude(
+    report: &LoadReport,
+    lost: Option<CliError>,
+    image: &Report,
+    port: &str,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    let kind = exit_kind(report, lost.is_some());
+    let next = report.advice();
+    if output.json {
+        let written = output.object(&LoadObject {
+            schema: "axcon.load/1",
+            port: Some(port),
+            exit_code: kind.map_or(0, Kind::exit_code),
+            verdict: verdict_name(report.verdict),
+            unit: unit_name(report.unit),
+            phase: phase_name(report.phase),
+            product: report.product.as_deref(),
+            version_before: report.version_before.map(|version| version.to_string()),
+            version_after: report.version_after.map(|version| version.to_string()),
+            records: report.records,
+            records_total: report.records_total,
+            address: report.address,
+            seconds: (report.duration.as_secs_f64() * 1000.0).round() / 1000.0,
+            what: &report.what,
+            heard: &report.heard,
+            remark: report.remark.as_deref(),
+            next,
+            defects: image_cli::defect_objects(image),
+        });
+        return CliError::found(kind, written);
+    }
+    let Some(kind) = kind else {
+        let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));
+        let seconds = report.duration.as_secs_f64();
+        if let Some(remark) = &report.remark {
+            output.remark(&format!("note: {remark}"));
+        }
+        let records = counted(report.records as u64, "record");
+        return output.data(format!("done: {}{before}; {records} in {seconds:.1} s\n", report.what).as_bytes());
+    };
+    let mut error = CliError::message(kind, report.what.clone());
+    if report.records > 0 && report.verdict != Verdict::WrongApplication {
+        let address = report.address.map_or_else(String::new, |address| format!(", address {address:#06x}"));
+        error = error.hint(format!("sent: {} of {} records{address}", report.records, report.records_total));
+    }
+    if !report.heard.is_empty() {
+        error = error.hint(format!("last heard: \"{}\"", report.heard));
+    }
+    if let Some(remark) = &report.remark {
+        error = error.hint(remark.clone());
+    }
+    if let Some(misfit) = report.misfit {
+        error = error.hint(format!("if it is wanted all the same: --allow {misfit}"));
+    }
+    if let Some(lost) = lost {
+        error = error.hint(format!("the port: {lost}"));
+    }
+    if report.verdict == Verdict::NoAnswer {
+        error = no_answer_hints(error);
+    }
+    if report.verdict == Verdict::Refused && report.product.is_none() {
+        error = error.hint("say it with --product, for example: --product AXTC4CO");
+    }
+    Err(error.hint(next))
+}
+
+/// The exit code's kind; `None` is success.
+fn exit_kind(report: &LoadReport, link_lost: bool) -> Option<Kind> {
+    Some(match report.verdict {
+        Verdict::Done => return None,
+        Verdict::Refused if report.product.is_none() => Kind::Usage,
+        Verdict::Refused => Kind::ImageRefused,
+        Verdict::UnitRefused => Kind::UnitRefused,
+        Verdict::NoAnswer => Kind::NoAnswer,
+        Verdict::Failed if link_lost && report.records == 0 => Kind::PortGone,
+        Verdict::Failed => match report.unit {
+            UnitNow::Loader => Kind::UploadFailedLoader,
+            UnitNow::Unknown => Kind::UploadFailedUnknown,
+            UnitNow::Application => Kind::WrongApplication,
+        },
+        Verdict::WrongApplication => Kind::WrongApplication,
+        Verdict::Interrupted => Kind::Interrupted,
+    })
+}
+
+fn verdict_name(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Done => "done",
+        Verdict::Refused => "refused",
+        Verdict::UnitRefused => "unit-refused",
+        Verdict::NoAnswer | Verdict::Failed => "failed",
+        Verdict::WrongApplication => "wrong-application",
+        Verdict::Interrupted => "interrupted",
+    }
+}
+
+fn unit_name(unit: UnitNow) -> &'static str {
+    match unit {
+        UnitNow::Application => "application",
+        UnitNow::Loader => "loader",
+        UnitNow::Unknown => "unknown",
+    }
+}
+
+pub fn phase_name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Check => "check",
+        Phase::EnterLoader => "enter-loader",
+        Phase::Erase => "erase",
+        Phase::Transfer => "transfer",
+        Phase::Finish => "finish",
+        Phase::Verify => "verify",
+    }
+}
