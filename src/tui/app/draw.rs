@@ -8,7 +8,7 @@ use crate::session::Job;
 use crate::tui::frame;
 use crate::tui::keymap::{Binding, Cmd};
 use crate::tui::popup::{self, Popup, Question};
-use crate::tui::screens::{Scene, ScreenId, bench};
+use crate::tui::screens::{Scene, ScreenId, bench, overview};
 use crate::tui::view::LinkState;
 use crate::tui::widgets::lines;
 
@@ -66,7 +66,7 @@ impl App {
             (ScreenId::Connect, Cmd::Disconnect) => {
                 matches!(view.link.state, LinkState::Open { .. } | LinkState::Lost(_))
             }
-            (ScreenId::Overview, Cmd::PageDown) => !view.monitor.faults.is_empty(),
+            (ScreenId::Overview, Cmd::PageDown) => overview::has_faults(self.scene()),
             (ScreenId::Stream, Cmd::Mark) => view.link.name.is_some(),
             (ScreenId::Stream, Cmd::Export) => has_rows || view.export.is_some(),
             (ScreenId::Overview | ScreenId::Stream, _) => has_rows,

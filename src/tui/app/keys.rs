@@ -331,7 +331,7 @@ impl App {
             }
             ScreenId::Terminal => self.terminal.on(cmd, &self.view, &self.scrollback, record, area),
             ScreenId::Load => self.load.on(cmd, &self.view, area),
-            ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, page),
+            ScreenId::Dictionary => self.dictionary.on(cmd, &self.view, area),
             ScreenId::Stream => self.stream.on(cmd, &self.view),
             ScreenId::Diagnostics => {
                 let last = Diagnostics::last(self.scene(), area);

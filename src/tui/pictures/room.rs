@@ -345,3 +345,20 @@ fn a_narrower_window_stays_where_somebody_looks() {
     let first = axis.and_then(|line| line.split_whitespace().next()).expect("times below the axis").to_owned();
     assert!(first <= at, "{at} is in sight: {picture}");
 }
+
+#[test]
+fn a_page_of_the_dictionary_is_what_is_in_sight_of_it() {
+    for size in [SMALL, LARGE] {
+        let mut stage = Stage::with_dictionary(size);
+        let chosen = |stage: &Stage| {
+            let picture = stage.picture();
+            let row = picture.lines().find(|line| line.starts_with("› ")).expect("a chosen row").to_owned();
+            row.split_whitespace().find(|word| word.contains(':')).expect("its address").to_owned()
+        };
+        let before = stage.picture();
+        stage.press(KeyCode::PageDown);
+        assert!(!before.contains(&chosen(&stage)), "{size:?}: {}", stage.picture());
+        stage.press(KeyCode::Up);
+        assert!(before.contains(&chosen(&stage)), "{size:?}, nothing is left out: {}", stage.picture());
+    }
+}

@@ -73,6 +73,8 @@ const ESC: &[Press] = &[Press::Plain(KeyCode::Esc)];
 const READING_KEYS: &[Binding] = &[Binding { keys: ESC, cmd: Cmd::Back, short: "cancel", long: "" }];
 
 const HEADING: &str = "Object dictionary";
+/// Rows above the table: its heading, and those of its columns.
+const HEAD_ROWS: u16 = 2;
 /// Rows of the pane that explains the chosen entry, its heading included.
 const DETAIL_ROWS: u16 = 8;
 /// From this width on that pane stands beside the table ...
@@ -132,10 +134,10 @@ impl Dictionary {
         self.cursor = 0;
     }
 
-    /// What a command does here.
-    pub fn on(&mut self, cmd: Cmd, view: &View, page: usize) -> Option<Action> {
+    /// What a command does here; `area` is that of the picture.
+    pub fn on(&mut self, cmd: Cmd, view: &View, area: Rect) -> Option<Action> {
         let last = self.rows(view).len().saturating_sub(1);
-        let page = page.saturating_sub(usize::from(DETAIL_ROWS) + 2).max(1);
+        let page = usize::from(table(area).height).max(1);
         self.cursor = match cmd {
             Cmd::Up => self.cursor.saturating_sub(1),
             Cmd::Down => self.cursor + 1,
@@ -243,7 +245,7 @@ impl Dictionary {
         let total = all.len();
         let rows = self.chosen(all);
         let (upper, detail) = parts(area);
-        let (head, table) = lines::split(upper, 2);
+        let (head, table) = lines::split(upper, HEAD_ROWS);
         let heading = [lines::rule(theme, upper.width, HEADING, &self.remark(scene, rows.len(), total, upper.width))];
         let columns = usize::from(upper.width);
         let factory = match &self.other {
@@ -293,7 +295,7 @@ impl Dictionary {
 
     /// The row of the table that is drawn in row `y` of the screen.
     pub fn row_at(&self, view: &View, area: Rect, y: u16) -> Option<usize> {
-        let (_, table) = lines::split(parts(area).0, 2);
+        let table = table(area);
         let rows = self.rows(view).len();
         let first = lines::first_visible(self.cursor.min(rows.saturating_sub(1)), rows, usize::from(table.height));
         let row = first + usize::from(y.checked_sub(table.y)?);
@@ -358,6 +360,11 @@ fn without_unit(view: &View) -> &'static str {
         LinkState::Lost(_) => "The link is lost: C connects again.",
         LinkState::Open { .. } => "Nobody has read it in this recording up to here.",
     }
+}
+
+/// Where the rows of the table stand.
+fn table(area: Rect) -> Rect {
+    lines::split(parts(area).0, HEAD_ROWS).1
 }
 
 /// Where the table with its heading stands, and where the chosen entry is explained.

@@ -116,7 +116,7 @@ impl Overview {
     fn parts(&self, scene: Scene, area: Rect) -> Parts {
         let (mut unit, mut values) = (unit(scene, area.width), self.values(scene, area));
         // Faults are what one looks for: the blank line and what stands below the values make room for them.
-        let least = if fault_rows(scene).is_empty() { 0 } else { FAULT_ROWS };
+        let least = if has_faults(scene) { FAULT_ROWS } else { 0 };
         let too_many = |unit: &Vec<_>, values: &Vec<_>| unit.len() + values.len() + least > usize::from(area.height);
         if too_many(&unit, &values) {
             unit.pop();
@@ -139,6 +139,11 @@ impl Overview {
 /// The part of the screen that the page takes: where there is room, the terminal stands beside it.
 fn page(area: Rect) -> Rect {
     if area.width < BESIDE_COLUMNS { area } else { Rect { width: area.width * 3 / 5, ..area } }
+}
+
+/// Whether there is anything in the list of faults: seen in the stream, or listed by the unit.
+pub fn has_faults(scene: Scene) -> bool {
+    !fault_rows(scene).is_empty()
 }
 
 /// Whether the values are those of now, so that nothing has to be said about them.
