@@ -11,8 +11,8 @@ use crate::record::Span;
 use crate::secret::Secret;
 use crate::time::{Duration, Instant};
 use crate::version::Version;
-use crate::wire::Text;
 use crate::wire::stream::{Row, Source};
+use crate::wire::{MenuKey, Text};
 
 /// What the user wants of the unit. One job runs at a time, and one more may be given while it is being found out who is
 /// there; [`Command::Keys`] and [`Command::Cancel`] are no jobs.
@@ -172,6 +172,10 @@ pub enum Refusal {
     /// The unit asks for the password, and a file is none.
     #[error("the unit asks for a password: answer that first, or leave it with Enter")]
     PasswordOpen,
+    /// A key has been typed whose question takes whatever is sent for its answer: with a `Ye` before it the key of another
+    /// job completes the word that restores the defaults.
+    #[error("the question behind the {} that was typed is still open: end it on the terminal with Enter", .0.letter())]
+    QuestionOpen(MenuKey),
     /// The unit holds us by XOFF, and too much waits already.
     #[error("the unit does not take what has been typed so far (held by XOFF)")]
     Held,

@@ -7,7 +7,7 @@
 use super::event::{Event, Outcome, UnitState};
 use super::job::{Desk, Signal, Work};
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderText, MenuKey, Message, Prompt, XON};
+use crate::wire::{LoaderText, Message, Prompt, XON};
 
 /// How long a unit may take to begin its answer: the menu comes at once, an adapter adds some 20 ms.
 const ANSWER: Duration = Duration::from_millis(800);
@@ -51,7 +51,7 @@ impl Identify {
 
     fn note(&mut self, message: &Message) {
         match message {
-            Message::MenuKey(key) => self.menu |= 1 << key_number(*key),
+            Message::MenuKey(key) => self.menu |= 1 << (*key as u32),
             Message::Software(_) => self.software = true,
             // What else a loader says an application may say as well: "press any key", "restarting".
             Message::Loader(LoaderText::Waiting | LoaderText::Error(_)) | Message::Prompt(Prompt::WaitingForFile) => {
@@ -115,16 +115,5 @@ impl Work for Identify {
 
     fn deadline(&self) -> Option<Instant> {
         self.deadline
-    }
-}
-
-fn key_number(key: MenuKey) -> u32 {
-    match key {
-        MenuKey::Menu => 0,
-        MenuKey::View => 1,
-        MenuKey::Default => 2,
-        MenuKey::Stream => 3,
-        MenuKey::Diagnostics => 4,
-        MenuKey::Load => 5,
     }
 }

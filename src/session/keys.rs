@@ -46,8 +46,8 @@ impl Typed {
 /// Reads what is sent.
 #[derive(Debug, Default)]
 pub(super) struct KeyReader {
-    /// Behind D and L what is typed is an answer: the `s` of `Yes` is no key.
-    answers: bool,
+    /// The key, D or L, behind which what is typed is an answer: the `s` of `Yes` is no key.
+    question: Option<MenuKey>,
 }
 
 impl KeyReader {
@@ -63,7 +63,7 @@ impl KeyReader {
         const ESCAPE: u8 = 0x1B;
         let key = match byte.to_ascii_lowercase() {
             b'\r' => Key::Enter,
-            _ if self.answers && byte != ESCAPE => return Key::Other,
+            _ if self.question.is_some() && byte != ESCAPE => return Key::Other,
             b'm' => Key::Menu(MenuKey::Menu),
             b'v' => Key::Menu(MenuKey::View),
             b'd' => Key::Menu(MenuKey::Default),
@@ -73,13 +73,21 @@ impl KeyReader {
             b'x' => Key::Leave,
             _ => Key::Other,
         };
-        self.answers = matches!(key, Key::Menu(MenuKey::Default | MenuKey::Load));
+        self.question = match key {
+            Key::Menu(key @ (MenuKey::Default | MenuKey::Load)) => Some(key),
+            _ => None,
+        };
         key
     }
 
     /// The unit has shown its menu, or has started anew: no question is open any more, whatever would have ended it.
     pub(super) fn question_over(&mut self) {
-        self.answers = false;
+        self.question = None;
+    }
+
+    /// The key whose question is being answered.
+    pub(super) fn question(&self) -> Option<MenuKey> {
+        self.question
     }
 }
 
@@ -105,7 +113,9 @@ mod tests {
     fn a_question_that_is_answered_without_enter_ends_with_the_menu() {
         let mut reader = KeyReader::default();
         reader.read(b"dy");
+        assert_eq!(reader.question(), Some(MenuKey::Default));
         reader.question_over();
+        assert_eq!(reader.question(), None);
         assert!(reader.read(b"m").asks_menu());
     }
 

@@ -35,7 +35,7 @@ use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
 use crate::record::{Direction, LINK_BACK, LINK_LOST, Record};
 use crate::time::{Duration, Instant, character_time};
 use crate::wire::stream::Source;
-use crate::wire::{Framer, Message, Text, Vocabulary};
+use crate::wire::{Framer, MenuKey, Message, Text, Vocabulary};
 use dialogue::Dialogue;
 use hearing::PromptWatch;
 use job::{Desk, Signal, Work};
@@ -205,6 +205,9 @@ impl Session {
         let next = Running { job, work };
         match &self.running {
             None => {
+                if let Some(key) = self.open_question().filter(|_| job != Job::SendFile) {
+                    return Err(Refusal::QuestionOpen(key));
+                }
                 self.running = Some(next);
                 self.signal(Signal::Begin);
                 Ok(())
@@ -216,6 +219,12 @@ impl Session {
             }
             Some(running) => Err(Refusal::Busy(running.job)),
         }
+    }
+
+    /// The key, D or L, that was typed by hand and whose question has not been answered yet: what is sent next belongs to
+    /// the answer.
+    pub fn open_question(&self) -> Option<MenuKey> {
+        self.keys.question().filter(|_| self.running.is_none())
     }
 
     /// The port is gone: the running job ends with what that means, and nothing more is sent.
@@ -234,6 +243,7 @@ impl Session {
         self.now = self.now.max(now);
         self.transmitter.hold(now, false);
         self.password.cut_off();
+        self.keys.question_over();
         self.cut_line();
     }
 
@@ -418,6 +428,7 @@ impl Session {
         let _ = self.type_in(&typed);
         match outcome {
             Some(outcome) => {
+                self.keys.question_over();
                 self.events.push_back(Event::Finished(outcome));
                 self.running = self.queued.take();
                 self.signal(if lost { Signal::LinkLost } else { Signal::Begin });

@@ -82,6 +82,7 @@ pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
     let state = match facts.state {
         UnitState::Loader => Some("in loader"),
         _ if view.viewing => Some("halted by V"),
+        _ if view.question.is_some() => Some("asks, see 3"),
         UnitState::Silent | UnitState::Unknown | UnitState::Application => None,
     };
     let link = match &view.link.state {

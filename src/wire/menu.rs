@@ -23,6 +23,20 @@ pub enum MenuKey {
     Load,
 }
 
+impl MenuKey {
+    /// The key as it is printed.
+    pub const fn letter(self) -> char {
+        match self {
+            MenuKey::Menu => 'M',
+            MenuKey::View => 'V',
+            MenuKey::Default => 'D',
+            MenuKey::Stream => 'T',
+            MenuKey::Diagnostics => 'S',
+            MenuKey::Load => 'L',
+        }
+    }
+}
+
 /// Product and software version, as far as a line names them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SoftwareName {

@@ -7,6 +7,7 @@ use axcon::session::{
 };
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
+use axcon::wire::MenuKey;
 use axcon::wire::stream::Source;
 
 use crate::support::bench::{image_of, order, small_image};
@@ -469,4 +470,31 @@ fn what_is_typed_as_a_password_is_known_again_wherever_the_unit_repeats_it() {
     session.handle_timeout(due);
     session.handle_timeout(due + Duration::from_millis(500));
     assert!(received(&session).ends_with(", sorry\r\nAXI"), "{}", received(&session));
+}
+
+#[test]
+fn a_question_that_was_opened_by_hand_is_answered_by_no_job() {
+    let typed = |keys: &[&str]| {
+        let mut alone = Alone::with(&[("d", 10, "Enter Yes to restore the defaults: ")]);
+        for keys in keys {
+            alone.session.command(alone.now, Command::Keys(keys.as_bytes().to_vec())).expect("no job runs");
+            alone.take_sent(Instant::ZERO);
+        }
+        let open = alone.session.open_question();
+        (open, alone.session.command(alone.now, Command::Diagnostics { pages: Some(1) }))
+    };
+    let (default, load) = (MenuKey::Default, MenuKey::Load);
+    assert_eq!(typed(&["d"]), (Some(default), Err(Refusal::QuestionOpen(default))));
+    assert_eq!(typed(&["d", "Ye"]), (Some(default), Err(Refusal::QuestionOpen(default))));
+    assert_eq!(typed(&["l", "AXIO"]), (Some(load), Err(Refusal::QuestionOpen(load))));
+    for ended in [&["d", "Ye", "\r"][..], &["d", "\x1b"], &["l", "AXIO", "\r"], &["m"]] {
+        assert_eq!(typed(ended), (None, Ok(())), "{ended:?}");
+    }
+    // A job leaves its own questions, whatever came of them.
+    let mut alone = Alone::with(&[("d", 10, "Enter Yes to restore the defaults: ")]);
+    alone.session.command(alone.now, Command::RestoreDefaults).expect("it is free");
+    alone.take_sent(Instant::ZERO);
+    alone.session.command(alone.now, Command::Cancel).expect("always");
+    assert_eq!(alone.session.open_question(), None);
+    alone.session.command(alone.now, Command::Identify).expect("it is free");
 }

@@ -6,7 +6,7 @@ use ratatui::crossterm::event::{
 use ratatui::layout::{Position, Rect};
 
 use super::App;
-use crate::session::{Command, Job, Session, UnitState};
+use crate::session::{Command, Job, Refusal, Session, UnitState};
 use crate::tui::action::Action;
 use crate::tui::frame;
 use crate::tui::input::Effect;
@@ -258,7 +258,11 @@ impl App {
             Cmd::Quit => effects.push(Effect::Quit),
             // Time goes on while the program is stopped: every deadline of the job would be over.
             Cmd::Suspend if self.view.is_in_the_middle() && self.view.can_send() => {
-                let what = self.view.job.map_or("the unit's view is open: close it with X first", |_| "a job runs");
+                let what = match self.view.job {
+                    Some(_) => "a job runs",
+                    None if self.view.question.is_some() => "the unit waits for an answer: end it with Enter first",
+                    None => "the unit's view is open: close it with X first",
+                };
                 self.view.tell(Tone::Bad, format!("Not stopped: {what}."));
             }
             Cmd::Suspend => effects.push(Effect::Suspend),
@@ -355,14 +359,15 @@ impl App {
             return;
         }
         // What cannot be done now is said before anything is asked.
+        if let Some(key) = self.view.question {
+            return self.view.tell(Tone::Bad, format!("Not sent: {}.", Refusal::QuestionOpen(key)));
+        }
         let job = self.view.job.filter(|_| !self.view.awaits_first_row());
         let why_not = match (menu, job, self.view.facts.state) {
             (MenuCmd::Diagnostics, Some(Job::Diagnostics), _) | (_, Some(Job::Identify), _) => None,
             (_, Some(_), _) => self.view.busy(),
             (MenuCmd::Menu, ..) => None,
-            (MenuCmd::Defaults | MenuCmd::Stream | MenuCmd::Diagnostics, None, _) if self.view.viewing => {
-                Some("the view is open and has keys of its own: M closes it")
-            }
+            (_, None, _) if self.view.viewing => Some("the view is open and has keys of its own: M closes it"),
             (_, None, UnitState::Loader) => {
                 Some("the unit is in its loader, which takes every key for an error: L sends software")
             }

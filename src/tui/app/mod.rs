@@ -313,6 +313,7 @@ impl App {
                 effects.push(Effect::UploadEnds { link });
             }
         }
+        self.view.question = self.session.as_ref().and_then(Session::open_question);
         let record = self.session.as_ref().map_or(&self.no_record, Session::record);
         self.dirty |= self.scrollback.follow(record);
     }

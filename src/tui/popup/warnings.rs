@@ -44,6 +44,10 @@ pub fn in_the_middle(view: &View) -> [&'static str; 2] {
         Some(Job::StreamOn | Job::StreamOff | Job::RestoreDefaults) => {
             ["The unit is in the middle of its questions.", "axcon ends them first, so that it is at its menu again."]
         }
+        None | Some(Job::Identify | Job::Overhear) if view.question.is_some() => [
+            "The unit's question behind a key typed on the terminal is still open.",
+            "It stays so, and takes the next key for its answer, whoever sends it: end it on the terminal with Enter.",
+        ],
         None | Some(Job::Identify | Job::Overhear) => [
             "The unit's view is open: temperature scanning and CAN are halted.",
             "axcon closes it first (X), so that they go on.",

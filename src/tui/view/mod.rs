@@ -18,6 +18,7 @@ use crate::monitor::Monitor;
 use crate::session::{DictionaryReading, Facts, Job, LoadReport, Progress, UnitState};
 use crate::time::{Duration, Instant};
 use crate::version::Version;
+use crate::wire::MenuKey;
 
 /// Everything a screen may read.
 #[derive(Debug, Default)]
@@ -56,6 +57,8 @@ pub struct View {
     pub last_period: Option<Duration>,
     /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
     pub viewing: bool,
+    /// The key that was typed on the terminal and whose question is still open: the unit takes the next key for an answer.
+    pub question: Option<MenuKey>,
     /// When the unit said last which CANopen state it is in: it says so on request, and changes it without a word.
     pub nmt_heard: Option<Instant>,
     /// When that has become old enough for another word.
@@ -263,7 +266,7 @@ impl View {
 
     /// Whether something would stay half done if the link were closed now.
     pub fn is_in_the_middle(&self) -> bool {
-        self.has_job_to_end() || self.viewing
+        self.has_job_to_end() || self.viewing || self.question.is_some()
     }
 
     /// The product, where it is one we know.

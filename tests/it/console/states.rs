@@ -89,7 +89,7 @@ fn an_open_view_is_told_and_closed_with_m() {
     assert!(told.contains("the view is open and halts the unit. M closes it."), "{told}");
     assert!(told.contains("view open, halted") && !told.contains("application runs"), "{told}");
     desk.sent.clear();
-    for key in ["s", "t", "d"] {
+    for key in ["s", "t", "d", "v"] {
         desk.keys(key);
         assert!(desk.picture().contains("Not sent: the view is open"), "{key}: {}", desk.picture());
     }
@@ -97,6 +97,29 @@ fn an_open_view_is_told_and_closed_with_m() {
     desk.keys("m").run(Duration::from_secs(4));
     let told = desk.picture();
     assert!(told.contains("application runs") && !told.contains("M closes it"), "{told}");
+}
+
+#[test]
+fn no_key_of_a_job_completes_an_answer_that_was_begun_by_hand() {
+    let mut desk = Desk::new();
+    desk.keys("3dYe").run(Duration::from_secs(1)).key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("2");
+    assert!(desk.picture().contains("asks, see 3"), "{}", desk.picture());
+    desk.sent.clear();
+    desk.keys("s").run(Duration::from_secs(10));
+    assert!(desk.picture().contains("the question behind the D that was typed is still open"), "{}", desk.picture());
+    for key in ["m", "v", "t", "d"] {
+        desk.keys(key).run(Duration::from_secs(2));
+        assert!(desk.picture().contains("the question behind the D"), "{key}: {}", desk.picture());
+    }
+    assert!(desk.sent.is_empty(), "{:?}", desk.sent);
+    desk.keys("q");
+    assert!(desk.picture().contains("question behind a key typed on the terminal"), "{}", desk.picture());
+    desk.keys("n3").press(KeyCode::Enter).run(Duration::from_secs(3));
+    desk.key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("2m").run(Duration::from_secs(3));
+    let told = desk.picture();
+    assert!(told.contains("application runs") && !told.contains("asks, see 3"), "{told}");
+    // The unit has not started anew: nothing has been restored.
+    assert!(!desk.sent.is_empty());
 }
 
 #[test]
