@@ -22,6 +22,9 @@ const LONGEST_PROMPT: usize = 200;
 /// How long behind the question for the menu what comes is its answer.
 pub(super) const MENU_ANSWER: Duration = Duration::from_millis(1500);
 
+/// How long behind its header a loader prints that it wants a key.
+const LOADER_HEADER: Duration = Duration::from_secs(2);
+
 /// Watches for text without a line end behind which the unit falls silent.
 #[derive(Debug, Default)]
 pub(super) struct PromptWatch {
@@ -239,12 +242,9 @@ impl Session {
                 facts.unrecognised_lines = facts.unrecognised_lines.saturating_sub(self.dialogue.menu());
             }
             Message::FirstStart => facts.state = UnitState::Application,
-            Message::Loader(text) => {
-                // "Press any key" and "restarting" an application may say as well.
-                if matches!(text, LoaderText::Waiting) {
-                    facts.enter_loader();
-                }
-            }
+            // "Press any key" and "restarting" an application may say as well.
+            Message::Loader(LoaderText::Waiting) => facts.enter_loader(),
+            Message::Loader(_) => {}
             Message::Software(name) => {
                 // Three numbers with points between them are not enough to make a unit of whatever talks there.
                 if name.product.is_some() || name.confidence > Confidence::Bare {
@@ -280,6 +280,17 @@ impl Session {
         if matches!(message, Message::Prompt(Prompt::WaitingForFile)) {
             facts.enter_loader();
         }
+        // One that names itself and wants a key is a loader.
+        let headed = self.loader_headed_at.is_some_and(|at| self.dated <= at + LOADER_HEADER);
+        let wants_key = matches!(message, Message::Loader(LoaderText::AnyKey) | Message::Prompt(Prompt::AnyKey));
+        if headed && wants_key {
+            facts.enter_loader();
+        }
+        self.loader_headed_at = match message {
+            Message::Loader(LoaderText::Header) => Some(self.dated),
+            Message::Text => self.loader_headed_at,
+            _ => None,
+        };
         if *facts != before {
             self.events.push_back(Event::FactsChanged);
         }

@@ -72,6 +72,8 @@ pub struct Session {
     /// Which lines answer a key.
     keys: KeyReader,
     dialogue: Dialogue,
+    /// A loader has printed who it is, and nothing but text since.
+    loader_headed_at: Option<Instant>,
     /// Whether the stream is still on.
     toggled: Toggled,
     /// Pages of diagnostics, whoever has asked for them.
@@ -116,6 +118,7 @@ impl Session {
             menu_asked_at: None,
             keys: KeyReader::default(),
             dialogue: Dialogue::default(),
+            loader_headed_at: None,
             toggled: Toggled::default(),
             pages: Pages::default(),
             counted: false,

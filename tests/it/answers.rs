@@ -3,7 +3,7 @@
 
 use axcon::endpoint::Endpoint;
 use axcon::session::{
-    Awaited, Command, Event, FileEnd, Job, LoadReport, Outcome, Phase, Refusal, Session, UnitNow, Verdict,
+    Awaited, Command, Event, FileEnd, Job, LoadReport, Outcome, Phase, Refusal, Session, UnitNow, UnitState, Verdict,
 };
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
@@ -497,4 +497,20 @@ fn a_question_that_was_opened_by_hand_is_answered_by_no_job() {
     alone.session.command(alone.now, Command::Cancel).expect("always");
     assert_eq!(alone.session.open_question(), None);
     alone.session.command(alone.now, Command::Identify).expect("it is free");
+}
+
+#[test]
+fn a_loader_that_names_itself_and_wants_a_key_is_one_and_either_alone_is_not() {
+    let state = |text: &str| {
+        let mut session = Session::new(115_200);
+        session.handle_bytes(Instant::from_millis(10), text.as_bytes());
+        session.handle_timeout(Instant::from_millis(500));
+        session.facts().state
+    };
+    let (header, key) = ("56F83xx Serial Bootloader v2.0\r\n", "Hit any key to continue");
+    assert_eq!(state(&format!("{header}{key}")), UnitState::Loader);
+    assert_eq!(state(&format!("{header}(c) 2005\r\n{key}\r\n")), UnitState::Loader);
+    assert_eq!(state(&format!("{key}\r\n{header}")), UnitState::Unknown);
+    assert_eq!(state(key), UnitState::Unknown);
+    assert_eq!(state(&format!("{header}AXTC4CO V1.1.0\r\n{key}\r\n")), UnitState::Application);
 }

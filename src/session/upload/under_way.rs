@@ -126,7 +126,7 @@ impl Upload {
                 let unit = if transfer.is_taken() { UnitNow::Loader } else { UnitNow::Unknown };
                 let what = match stall {
                     Stall::Held => "the loader stopped us (XOFF) and did not let us go on",
-                    Stall::Silent => "the loader has fallen silent",
+                    Stall::Silent => "the loader has fallen silent: its power may be off, or the cable out",
                     Stall::Unacknowledged => "the loader has not acknowledged a record (XOFF, XON), so it may be lost",
                 };
                 let fill_up = transfer.may_wait_in_a_record();
