@@ -26,7 +26,7 @@ pub(super) fn too_fast(view: &View, source: Source, millis: &str) -> Option<Stri
     })
 }
 
-/// What is in the middle, and what becomes of it when the link is closed.
+/// What is in the middle or left undone, and what becomes of it when the link is closed.
 pub fn in_the_middle(view: &View) -> [&'static str; 2] {
     match view.job {
         Some(Job::Load) => {
@@ -44,6 +44,10 @@ pub fn in_the_middle(view: &View) -> [&'static str; 2] {
         Some(Job::StreamOn | Job::StreamOff | Job::RestoreDefaults) => {
             ["The unit is in the middle of its questions.", "axcon ends them first, so that it is at its menu again."]
         }
+        None | Some(Job::Identify | Job::Overhear) if view.waits_in_loader() => [
+            "The unit waits in its loader without software: it neither measures nor talks on CAN.",
+            "It needs the file sent again (L), now or later: without power it comes back to its loader.",
+        ],
         None | Some(Job::Identify | Job::Overhear) => [
             "The unit's view is open: temperature scanning and CAN are halted.",
             "axcon closes it first (X), so that they go on.",
