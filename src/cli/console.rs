@@ -1,6 +1,7 @@
 //! `axcon` without a command: the console on the screen.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::mpsc::SyncSender;
 
@@ -22,6 +23,11 @@ use crate::tui::{self, Failure, ImageFacts, Noted, Palette};
 /// # Errors
 /// If there is no terminal to draw on, or a signal ends it.
 pub fn run(global: &Global) -> Result<(), CliError> {
+    if std::io::stdout().is_terminal() && !may_draw(std::env::var_os("TERM").as_deref()) {
+        return Err(CliError::message(Kind::Usage, "this terminal cannot be drawn on: TERM is empty or 'dumb'").hint(
+            "'axcon terminal --port PORT' talks to a unit line by line; 'axcon --help' lists the other commands",
+        ));
+    }
     // A name that makes no sense is said before the screen is taken.
     let link = global.port().map(|_| link::spec(global)).transpose()?;
     let world = World {
@@ -48,6 +54,11 @@ pub fn run(global: &Global) -> Result<(), CliError> {
                 .hint("'axcon --help' lists the commands that do without one"))
         }
     }
+}
+
+/// Whether a terminal that calls itself this understands more than text. Where none has a name, nobody says that it does not.
+fn may_draw(term: Option<&OsStr>) -> bool {
+    term.is_none_or(|name| !name.is_empty() && name != "dumb")
 }
 
 /// `NO_COLOR` and `AXCON_THEME`, which says what the terminal's ground is; nobody can ask every terminal.
@@ -102,6 +113,13 @@ fn journal(link: &str) -> Option<(Journal, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_terminal_that_says_it_takes_text_only_is_not_drawn_on() {
+        for (term, expected) in [(None, true), (Some(""), false), (Some("dumb"), false), (Some("xterm"), true)] {
+            assert_eq!(may_draw(term.map(OsStr::new)), expected, "{term:?}");
+        }
+    }
 
     #[test]
     fn the_environment_chooses_the_colours() {

@@ -76,7 +76,12 @@ impl Tracked {
     /// One of its numbers, as finely as the page prints them.
     pub fn text(&self, value: f64) -> String {
         let decimals = self.decimals;
-        format!("{value:.decimals$}")
+        let text = format!("{value:.decimals$}");
+        match text.strip_prefix('-') {
+            // Nothing is less than nothing.
+            Some(digits) if !digits.contains(|digit| matches!(digit, '1'..='9')) => digits.to_owned(),
+            _ => text,
+        }
     }
 }
 
@@ -102,6 +107,9 @@ mod tests {
             diagnostics.found.iter().map(|found| found.value).collect::<Vec<_>>(),
             [Some(24.0), Some(5.0), Some(7.0)]
         );
+        let ohm = Tracked { decimals: 2, ..supply.clone() };
+        let below = [-0.001, -0.004, -0.006].map(|value| ohm.text(value));
+        assert_eq!(below, ["0.00", "0.00", "-0.01"], "nothing is less than nothing");
         diagnostics.page(Instant::ZERO, &page(&["nothing of that"]));
         assert!(diagnostics.found.iter().all(|found| found.value.is_none()));
         assert_eq!((diagnostics.pages, diagnostics.lines.len()), (4, 1));

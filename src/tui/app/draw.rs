@@ -8,6 +8,8 @@ use crate::session::Job;
 use crate::tui::frame;
 use crate::tui::keymap::{Binding, Cmd};
 use crate::tui::popup::{self, Popup, Question};
+use crate::tui::screens::recordings::Recordings;
+use crate::tui::screens::stream::Stream;
 use crate::tui::screens::{Scene, ScreenId, bench, overview};
 use crate::tui::view::LinkState;
 use crate::tui::widgets::lines;
@@ -50,7 +52,9 @@ impl App {
     /// The bindings of the screen in front that mean something now, as many as have room.
     pub(super) fn footer(&self, columns: usize) -> Vec<Binding> {
         let bindings = match self.front {
-            ScreenId::Load => self.load.footer(&self.view),
+            ScreenId::Load => self.load.footer(&self.view, self.screen_area()),
+            ScreenId::Stream => Stream::footer(&self.view),
+            ScreenId::Recordings => Recordings::footer(&self.view),
             ScreenId::Dictionary => self.dictionary.footer(&self.view),
             screen => screen.bindings().to_vec(),
         };

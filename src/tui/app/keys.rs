@@ -254,7 +254,7 @@ impl App {
             Cmd::Next => self.perform(Action::Go(self.front.step(1)), effects),
             Cmd::Previous => self.perform(Action::Go(self.front.step(ScreenId::ALL.len() - 1)), effects),
             Cmd::Help => self.help = Some(Help::default()),
-            Cmd::Quit if self.view.is_in_the_middle() => self.ask(Question::Quit),
+            Cmd::Quit if self.view.would_be_left() => self.ask(Question::Quit),
             Cmd::Quit => effects.push(Effect::Quit),
             // Time goes on while the program is stopped: every deadline of the job would be over.
             Cmd::Suspend if self.view.is_in_the_middle() && self.view.can_send() => {

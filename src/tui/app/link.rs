@@ -216,7 +216,8 @@ impl App {
 
     pub(super) fn link_failed(&mut self, failure: Failure) {
         self.dirty = true;
-        if self.opening.take().is_some() {
+        if let Some(link) = self.opening.take() {
+            self.connect.failed(link);
             if self.view.link.state == LinkState::Opening {
                 self.session = None;
                 self.begin_link(Link::default());
@@ -350,7 +351,9 @@ impl App {
             session.recording_over(now);
         }
         match failure {
-            None => self.view.tell(Tone::Quiet, "This is the end of the recording. 3 shows all of it."),
+            None => {
+                self.view.tell(Tone::Quiet, "This is the end of the recording: 3 shows all of it, Space on 8 plays it.")
+            }
             Some(failure) => {
                 self.scrollback.note(now, visible::text(&failure.text));
                 self.view.link.defect = Some(failure.text.clone());

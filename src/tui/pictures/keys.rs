@@ -153,6 +153,21 @@ fn a_recording_is_steered_by_its_keys() {
         stage.keys(" ");
         assert_eq!(stage.asked(), [Effect::Play(Playback::Again(Pace::Times(1)))], "from the beginning, {pace:?}");
     }
+    // There + and - say how fast Space will play it, which is in sight.
+    plays(&mut stage, 100, Pace::AtOnce);
+    assert!(stage.shows("Space plays it, as fast as it was; + - change that."), "{}", stage.picture());
+    assert!(stage.shows("Space play ") && !stage.shows("Space pause"), "{}", stage.picture());
+    stage.keys("+");
+    assert_eq!(stage.asked(), [Effect::Play(Playback::Pace(Pace::Times(2)))]);
+    plays(&mut stage, 100, Pace::Times(60));
+    assert!(stage.shows("Space plays it, 60 times as fast;"), "{}", stage.picture());
+    stage.keys("+");
+    assert_eq!(stage.asked(), [], "at once would show what is there already");
+    stage.keys(" ");
+    assert_eq!(stage.asked(), [Effect::Play(Playback::Again(Pace::Times(60)))]);
+    // It is being written while it is played.
+    plays(&mut stage, 101, Pace::Times(1));
+    assert!(stage.shows("1:41 of 1:41"), "{}", stage.picture());
     stage.input(Input::Playing(Playing { position: seconds(0), length: Some(seconds(3600)), pace: Pace::Paused }));
     assert!(stage.shows("Arrows move 36 s"), "{}", stage.picture());
 }

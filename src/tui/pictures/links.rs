@@ -5,7 +5,7 @@ use ratatui::crossterm::event::{KeyCode, KeyModifiers};
 use super::stage::*;
 use crate::endpoint::Transmit;
 use crate::time::Duration;
-use crate::tui::{App, Effect, Failure, Input, LinkInfo, Options, Pace, Palette, Playing};
+use crate::tui::{App, Effect, Failure, Input, LinkInfo, Options, Pace, Palette, Playing, PortEntry};
 
 #[test]
 fn connecting_asks_the_unit_who_it_is() {
@@ -65,6 +65,37 @@ fn another_link_is_asked_about_and_opened_before_the_first_is_given_up() {
 }
 
 #[test]
+fn an_enter_too_many_behind_a_failure_opens_no_other_port() {
+    let failed = || Input::LinkFailed(Failure { text: "it is busy".into(), hints: Vec::new() });
+    // The list may come before or behind the failure.
+    for (link, opened) in [("/dev/ttyUSB1", Some("/dev/ttyUSB1")), ("/dev/ttyUSB7", None)] {
+        for is_listed_first in [true, false] {
+            let mut stage = Stage::on(SMALL, Some(link.into()));
+            let port = |link: &str| PortEntry { link: link.into(), description: String::new(), busy_by: None };
+            let listed = || Input::PortsListed(Ok(["/dev/ttyUSB0", "/dev/ttyUSB1"].map(port).into()));
+            match is_listed_first {
+                true => stage.input(listed()).input(failed()),
+                false => stage.input(failed()).input(listed()),
+            };
+            stage.press(KeyCode::Enter).asked();
+            stage.press(KeyCode::Enter);
+            let effects = stage.asked();
+            assert_eq!(effects, opened.map(|link| Effect::OpenLink(link.into())).into_iter().collect::<Vec<_>>());
+            assert_eq!(stage.shows("Connect to"), opened.is_none(), "{}", stage.picture());
+        }
+    }
+}
+
+#[test]
+fn a_link_that_is_lost_while_it_is_asked_about_is_not_called_connected() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("1").press(KeyCode::Down).press(KeyCode::Enter);
+    assert!(stage.shows("/dev/ttyUSB0 is connected."), "{}", stage.picture());
+    stage.press(KeyCode::Enter).lost();
+    assert!(stage.shows("/dev/ttyUSB0 is lost.") && !stage.shows("is connected."), "{}", stage.picture());
+}
+
+#[test]
 fn a_lost_link_is_opened_again_by_c_and_the_terminal_keeps_its_lines() {
     let mut stage = Stage::connected(SMALL);
     stage.lost().asked();
@@ -97,7 +128,7 @@ fn leaving_with_the_view_open_offers_to_close_it() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("vt").prefix().keys("2q");
     stage.asked();
-    stage.press(KeyCode::Enter);
+    stage.keys("y");
     let effects = stage.asked();
     assert_eq!(effects, [Effect::Transmit(Transmit::open(*b"x")), Effect::Quit]);
 }

@@ -40,6 +40,44 @@ fn an_upload_is_noted_once_it_is_taken_and_before_its_first_byte() {
 }
 
 #[test]
+fn only_y_gives_an_upload_up() {
+    for key in [KeyCode::Esc, KeyCode::Char('q')] {
+        let mut stage = Stage::loading(SMALL);
+        stage.press(key).asked();
+        assert!(stage.shows("Y cancel the upload") || stage.shows("Y leave"), "{}", stage.picture());
+        let question = stage.picture();
+        stage.press(KeyCode::Enter);
+        assert_eq!((stage.asked(), stage.picture()), (Vec::new(), question), "pressed out of habit");
+        stage.keys("n");
+        assert!(stage.asked().is_empty() && stage.shows("── Loading"), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn whoever_leaves_a_unit_in_its_loader_is_told_what_it_waits_for() {
+    let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO"));
+    stage.asked();
+    stage.keys("q");
+    assert!(
+        stage.shows("waits in its loader without software") && stage.shows("sent again (L)"),
+        "{}",
+        stage.picture()
+    );
+    stage.keys("n").resized((60, 10)).keys("q");
+    assert!(stage.asked().is_empty() && stage.shows("Leave axcon?"), "{}", stage.picture());
+    stage.keys("y");
+    assert_eq!(stage.asked(), [Effect::Quit]);
+}
+
+#[test]
+fn findings_that_are_all_in_sight_are_not_offered_to_be_moved() {
+    let stage = Stage::connected(SMALL).with_image(nameless_image(&[]));
+    assert!(stage.shows("one finding") && !stage.shows("↑↓ findings"), "{}", stage.picture());
+    let stage = Stage::connected(SMALL).with_image(bad_image());
+    assert!(stage.shows("↑↓ findings"), "{}", stage.picture());
+}
+
+#[test]
 fn the_end_of_every_finding_can_be_read() {
     let facts = bad_image();
     let last = facts.defects.last().and_then(|text| text.split_whitespace().last()).expect("findings").to_owned();

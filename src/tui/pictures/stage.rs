@@ -45,8 +45,13 @@ pub(super) struct Stage {
 
 impl Stage {
     pub(super) fn new(size: (u16, u16)) -> Self {
+        Stage::on(size, None)
+    }
+
+    /// Started with this link.
+    pub(super) fn on(size: (u16, u16), link: Option<String>) -> Self {
         let options = Options {
-            link: None,
+            link,
             directory: PathBuf::from("/home/service/images"),
             home: Some("/home/service".into()),
             palette: Palette::Mono,

@@ -1,6 +1,6 @@
 //! What is said to the user: what is old, what is not there, what cannot be done and why.
 
-use ratatui::crossterm::event::{KeyCode, KeyModifiers};
+use ratatui::crossterm::event::KeyCode;
 
 use super::stage::*;
 use crate::canopen::ObjectAddress;
@@ -8,7 +8,7 @@ use crate::device::Product;
 use crate::dump::Dump;
 use crate::image::DefectId;
 use crate::record::Span;
-use crate::session::{DictionaryReading, Event, Facts, Outcome, ReadEntry, UnitState};
+use crate::session::{Awaited, DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry, UnitState};
 use crate::tui::popup::ORDERS;
 use crate::tui::{Effect, Input, LinkInfo};
 use crate::wire::stream::Source;
@@ -41,7 +41,7 @@ fn the_bench_calls_values_old_as_the_other_screens_do() {
 
 #[test]
 fn a_stream_that_was_just_switched_on_is_waited_for_and_not_called_late() {
-    let facts = |stream| Facts { stream, ..Facts::default() };
+    let facts = |stream| Facts { stream, state: UnitState::Application, ..Facts::default() };
     let mut stage = Stage::streaming(SMALL);
     stage.fold_with(Event::FactsChanged, &facts(None));
     stage.wait(600_000).keys("2");
@@ -135,8 +135,8 @@ fn the_order_box_says_what_there_is_and_so_does_help() {
     stage.keys("Help").press(KeyCode::Enter);
     assert!(stage.shows("They stand above") && stage.shows("Enter do it"), "{}", stage.picture());
     assert_eq!(stage.asked(), []);
-    stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("heal").press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::Order("heal".into())]);
+    stage.keys("heal").press(KeyCode::Enter);
+    assert_eq!(stage.asked(), [Effect::Order("heal".into())], "the word itself is gone");
 }
 
 #[test]
@@ -227,6 +227,87 @@ fn keys_that_do_nothing_now_are_not_offered_and_say_why() {
     }
     let stage = Stage::with_ports(SMALL).with_image(good_image());
     assert!(!stage.shows("findings"), "{}", stage.picture());
+}
+
+#[test]
+fn e_says_what_it_does_while_rows_go_to_a_file() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.keys("6");
+    assert!(stage.shows("E export") && !stage.shows("E end export"), "{}", stage.picture());
+    stage.keys("e").press(KeyCode::Enter);
+    assert!(stage.shows("E end export"), "{}", stage.picture());
+    stage.keys("e");
+    assert!(stage.shows("E export") && !stage.shows("E end export"), "{}", stage.picture());
+}
+
+#[test]
+fn a_word_that_is_not_true_any_more_goes() {
+    let known = |facts: Facts| Facts { state: UnitState::Application, ..facts };
+    let pages = || known(Facts { diagnostics: Some(Span::default()), ..Facts::default() });
+    let streams = || known(Facts { stream: Some(Source::FieldValue), ..Facts::default() });
+    let product = Known { value: "AXTC4CO".to_owned(), origin: Origin::Banner, span: Span::default() };
+    let named = known(Facts { product: Some(product), ..Facts::default() });
+    let no_page = Outcome::NoAnswer { job: Job::Diagnostics, awaited: Awaited::Page, heard: None };
+    let cases = [
+        (Outcome::Done(Job::Diagnostics), "The diagnostics are off.", pages(), streams()),
+        (no_page, "no page of diagnostics came", pages(), streams()),
+        (Outcome::Done(Job::StreamOff), "The stream is off.", streams(), pages()),
+        (Outcome::Identified, "does not say what it is", named, pages()),
+    ];
+    for (outcome, word, refutes, says_nothing) in cases {
+        let mut stage = Stage::with_ports(SMALL);
+        stage.press(KeyCode::Enter).opened("/dev/ttyUSB0");
+        stage.fold_with(Event::FactsChanged, &known(Facts::default())).finished(outcome).keys("");
+        assert!(stage.shows(word), "{}", stage.picture());
+        stage.fold_with(Event::FactsChanged, &says_nothing);
+        assert!(stage.shows(word), "{}", stage.picture());
+        stage.fold_with(Event::FactsChanged, &refutes);
+        assert!(!stage.shows(word), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn a_unit_that_does_not_answer_is_not_said_to_be_there() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.fold_with(Event::FactsChanged, &Facts::default());
+    for screen in ["2", "6"] {
+        stage.keys(screen);
+        assert!(stage.shows("has not answered: these are its last values"), "{}", stage.picture());
+        assert!(!stage.shows("is back") && !stage.shows("T switches it"), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn a_dictionary_that_was_never_read_has_no_deviations_and_says_so() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("5/temperature").press(KeyCode::Enter).keys("o");
+    assert!(stage.shows("Nothing has been read of the unit"), "{}", stage.picture());
+    assert!(!stage.shows("Nothing here matches"), "{}", stage.picture());
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0").bytes(b"?\r\n").wait(5000);
+    stage.keys("5");
+    assert!(stage.shows("V reads its dictionary"), "{}", stage.picture());
+    stage.keys("v").press(KeyCode::Enter);
+    assert!(stage.shows("The dictionary is being read.") && !stage.shows("V reads its"), "{}", stage.picture());
+}
+
+#[test]
+fn a_file_for_another_product_says_how_to_choose_another() {
+    let mut facts = good_image();
+    facts.product = Some("AXRTD8CO".into());
+    let stage = Stage::connected(SMALL).with_image(facts);
+    assert!(stage.shows("for an AXRTD8CO, the unit is an AXTC4CO. Esc"), "{}", stage.picture());
+    assert!(stage.shows("chooses another."), "{}", stage.picture());
+}
+
+#[test]
+fn a_value_over_its_shutdown_limit_is_no_ok_and_stands_with_the_faults() {
+    let mut stage = Stage::with_dictionary(SMALL);
+    stage.keys("2").bytes(b"  23.500; 300.000;  96.000; 110.000;Disabled\r\n");
+    let picture = stage.picture();
+    let row = picture.lines().find(|line| line.contains("TC1")).unwrap_or_default();
+    assert!(row.contains("300.000 °C   over shutdown"), "{picture}");
+    assert!(picture.contains("1 over shutdown") && picture.contains("300.0 °C, its shutdown limit"), "{picture}");
 }
 
 #[test]

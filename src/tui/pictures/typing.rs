@@ -124,7 +124,11 @@ fn what_of_a_paste_the_unit_does_not_know_is_told_before_it_is_sent() {
     assert_eq!(stage.sent(), b"23 C  warm");
     paste(&mut stage, "°");
     assert!(stage.shows("Not sent: the unit knows none of these"), "{}", stage.picture());
-    stage.lost();
+    paste(&mut stage, "m\nv\nx\n");
+    assert!(stage.shows("6 characters, 3 lines"), "behind the last line end nothing begins: {}", stage.picture());
+    stage.press(KeyCode::Enter);
+    assert!(stage.sent().is_empty() && stage.shows("Send the pasted"), "{}", stage.picture());
+    stage.press(KeyCode::Esc).lost();
     paste(&mut stage, "m");
     assert!(stage.shows("Not sent: the link is lost.") && !stage.shows("Send the pasted"), "{}", stage.picture());
 }

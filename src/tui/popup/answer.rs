@@ -80,8 +80,8 @@ impl Question {
                 self.edit(TextField::clear, PasswordField::clear);
                 self.changed()
             }
-            // The Enter behind its path may come twice, and records are keys to a unit in its menu: only Y sends them.
-            KeyCode::Enter if matches!(self, Question::SendFile { is_image: true, .. }) => Answer::Stay,
+            // Pressed out of habit, or twice behind a path, it destroys nothing: where only Y is named, only Y is meant.
+            KeyCode::Enter if self.wants_y() => Answer::Stay,
             KeyCode::Enter => self.accept(),
             // Nothing is left of what was typed: as in the list of the load screen.
             KeyCode::Backspace if self.is_untyped_choice() => self.move_in_list(Cmd::Back),
@@ -100,6 +100,18 @@ impl Question {
             }
             _ => Answer::Stay,
         }
+    }
+
+    /// Whether it is answered by Y alone, because something is given up by that or goes to the unit unseen.
+    fn wants_y(&self) -> bool {
+        matches!(
+            self,
+            Question::CancelLoad
+                | Question::Paste { .. }
+                | Question::SendFile { .. }
+                | Question::Disconnect { .. }
+                | Question::Quit
+        )
     }
 
     fn is_untyped_choice(&self) -> bool {
@@ -137,7 +149,7 @@ impl Question {
         }
     }
 
-    /// Enter.
+    /// Enter, or Y.
     fn accept(&mut self) -> Answer {
         match self {
             Question::Link(field) if field.text().trim().is_empty() => Answer::Stay,
@@ -174,6 +186,8 @@ impl Question {
                 // The emulator's own help is made for a page, not for a line of answers.
                 text if text.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("help")) => {
                     *complaint = Some("They stand above; docs/emulator.md has all, with every fault.");
+                    // What is typed next is the order that was looked for.
+                    typed.clear();
                     Answer::Stay
                 }
                 text => Answer::Act(Action::Order(text.to_owned())),

@@ -10,7 +10,7 @@ use crate::tui::keymap::Press;
 use crate::tui::picker::Picker;
 use crate::tui::screens::bench::emulated;
 use crate::tui::theme::Theme;
-use crate::tui::view::View;
+use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
 use crate::tui::widgets::format;
 use crate::wire::stream::Source;
@@ -93,7 +93,7 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
             (title, rows, vec![(ENTER, key), (CLEAR, "clear"), (ESC, "back")])
         }
         Question::Find(field) => {
-            ("Find", vec![typed(theme, "", field.text(), columns)], vec![(ENTER, "keep"), (ESC, "show everything")])
+            ("Find", vec![typed(theme, "", field.text(), columns)], vec![(ENTER, "keep"), (ESC, "end the search")])
         }
         Question::Temperature { input, typed: field, complaint } => (
             "Temperature of the sensor",
@@ -216,7 +216,8 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
         Question::Paste { bytes, left_out } => (
             "Send the pasted text?",
             {
-                let rows = bytes.iter().filter(|&&byte| byte == b'\r').count() + 1;
+                // What stands behind the last line end is a line as well, if anything does.
+                let rows = bytes.split_inclusive(|&byte| byte == b'\r').count();
                 let lines = if rows == 1 { "one line".to_owned() } else { format!("{} lines", format::grouped(rows)) };
                 let go = if bytes.len() == 1 { "goes" } else { "go" };
                 let mut texts = vec![
@@ -266,11 +267,12 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
         Question::Disconnect { then } => (
             "Close the link?",
             {
-                let mut texts: Vec<String> = match view.is_in_the_middle() {
-                    true => in_the_middle(view).map(str::to_owned).to_vec(),
-                    false => {
-                        vec![format!("{} is connected.", visible::text(view.link.name.as_deref().unwrap_or("A unit")))]
-                    }
+                let name = view.link.name.as_deref().map_or("The link".into(), visible::text);
+                let mut texts: Vec<String> = match &view.link.state {
+                    // It was, when this was asked.
+                    LinkState::Lost(_) => vec![format!("{name} is lost.")],
+                    _ if view.would_be_left() => in_the_middle(view).map(str::to_owned).to_vec(),
+                    _ => vec![format!("{name} is connected.")],
                 };
                 if emulated(view).is_some() {
                     texts.push("The emulated unit is gone with its link, with all that was set and loaded.".into());

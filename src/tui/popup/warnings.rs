@@ -26,7 +26,7 @@ pub(super) fn too_fast(view: &View, source: Source, millis: &str) -> Option<Stri
     })
 }
 
-/// What is in the middle, and what becomes of it when the link is closed.
+/// What is in the middle or left undone, and what becomes of it when the link is closed.
 pub fn in_the_middle(view: &View) -> [&'static str; 2] {
     match view.job {
         Some(Job::Load) => {
@@ -47,6 +47,10 @@ pub fn in_the_middle(view: &View) -> [&'static str; 2] {
         None | Some(Job::Identify | Job::Overhear) if view.question.is_some() => [
             "The unit's question behind a key typed on the terminal is still open.",
             "It stays so, and takes the next key for its answer, whoever sends it: end it on the terminal with Enter.",
+        ],
+        None | Some(Job::Identify | Job::Overhear) if view.waits_in_loader() => [
+            "The unit waits in its loader for a file: it neither measures nor talks on CAN.",
+            "It needs the file sent again (L), now or later: without power it comes back to its loader.",
         ],
         None | Some(Job::Identify | Job::Overhear) => [
             "The unit's view is open: temperature scanning and CAN are halted.",

@@ -58,6 +58,8 @@ pub struct Connect {
     /// Recordings that are there.
     recordings: usize,
     cursor: usize,
+    /// The link that could not be opened, until the user chooses another.
+    failed: Option<String>,
 }
 
 /// The serial ports.
@@ -91,6 +93,7 @@ impl Connect {
         let was_listed = matches!(self.ports, Ports::Listed(_));
         let stays = was_listed || self.cursor > 0;
         self.change(stays, |connect| connect.ports = ports.map_or_else(Ports::Failed, Ports::Listed));
+        self.point_at_failed();
     }
 
     /// The recordings have been listed, newest first: they tell what was connected before.
@@ -103,10 +106,12 @@ impl Connect {
             }
         }
         self.change(true, |connect| (connect.recent, connect.recordings) = (recent, recordings.len()));
+        self.point_at_failed();
     }
 
     /// A link is open: it is in the list, whatever it is, and the cursor is on it.
     pub fn opened(&mut self, link: &str) {
+        self.failed = None;
         self.change(true, |connect| {
             connect.current = Some(link.to_owned());
             connect.recent.retain(|known| known != link);
@@ -115,6 +120,22 @@ impl Connect {
         });
         let entries = self.entries();
         let place = entries.iter().position(|entry| entry.name().eq_ignore_ascii_case(link));
+        self.cursor = place.unwrap_or(self.cursor);
+    }
+
+    /// A link could not be opened. An Enter too many must not open another one instead.
+    pub fn failed(&mut self, link: String) {
+        self.failed = Some(link);
+        self.point_at_failed();
+    }
+
+    /// Puts the cursor on the link that could not be opened, or on what asks for a name where that is not listed.
+    fn point_at_failed(&mut self) {
+        let Some(failed) = &self.failed else { return };
+        let entries = self.entries();
+        let place = |wanted: &dyn Fn(&Entry) -> bool| entries.iter().position(wanted);
+        let place = place(&|entry| entry.name().eq_ignore_ascii_case(failed))
+            .or_else(|| place(&|entry| matches!(entry, Entry::Other)));
         self.cursor = place.unwrap_or(self.cursor);
     }
 
@@ -131,6 +152,9 @@ impl Connect {
     /// What a command does here.
     pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
         let last = self.entries().len() - 1;
+        if matches!(cmd, Cmd::Up | Cmd::Down | Cmd::First | Cmd::Last) {
+            self.failed = None;
+        }
         match cmd {
             Cmd::Up => self.cursor = self.cursor.saturating_sub(1),
             Cmd::Down => self.cursor = (self.cursor + 1).min(last),
@@ -185,6 +209,7 @@ impl Connect {
 
     /// Puts the cursor on an entry. Says whether it was there already.
     pub fn choose(&mut self, number: usize) -> bool {
+        self.failed = None;
         std::mem::replace(&mut self.cursor, number) == number
     }
 

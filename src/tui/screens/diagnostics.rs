@@ -195,7 +195,7 @@ fn more(rows: usize, first: usize, room: usize) -> Option<String> {
 }
 
 /// Words that a page has in place of a channel's temperature (`wire::stream` knows those of the rows).
-const STATES: [&str; 8] = ["open", "short", "shorted", "opencct", "shortcct", "disabled", "off", "error"];
+const STATES: [&str; 9] = ["open", "short", "shorted", "opencct", "shortcct", "disabled", "null", "off", "error"];
 
 /// The numbers under names of their own. Where a channel has no temperature its state stands before the number behind it,
 /// `RTD1 Short C raw 4001 uV`: that is the `RTD1 raw` of other pages. Two quantities of one name are told apart by what
@@ -306,6 +306,8 @@ mod tests {
     fn a_state_is_no_part_of_the_name_of_the_number_behind_it() {
         let row = "RTD1  Short C   raw    4001 uV   0.00 Ohm   PV  0";
         assert_eq!(names(&[row]), ["RTD1 raw", "RTD1 resistance", "RTD1 PV"]);
+        let row = "RTD5   Null C   raw       0 uV   PV  0";
+        assert_eq!(names(&[row]), ["RTD5 raw", "RTD5 PV"], "a channel that is switched off");
         assert_eq!(names(&["Short Circuits 3", "Last Error Code 7"]), ["Short Circuits", "Last Error Code"]);
         let mut found: Vec<Tracked> = Vec::new();
         for (line, value) in [("RTD1 20.0 C raw 4000 uV", None), ("RTD1 Short C raw 4001 uV", Some(()))] {

@@ -23,7 +23,12 @@ pub const TITLE: &str = "Recordings";
 pub const BINDINGS: &[Binding] = &[
     Binding { keys: &[Press::Plain(KeyCode::Up)], cmd: Cmd::Up, short: "", long: "recording above" },
     Binding { keys: &[Press::Plain(KeyCode::Down)], cmd: Cmd::Down, short: "choose", long: "recording below" },
-    Binding { keys: &[Press::Plain(KeyCode::Enter)], cmd: Cmd::Accept, short: "play", long: "play the chosen one" },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Enter)],
+        cmd: Cmd::Accept,
+        short: "open",
+        long: "open the chosen one, at its end",
+    },
     Binding {
         keys: &[Press::Plain(KeyCode::Char(' '))],
         cmd: Cmd::Pause,
@@ -101,6 +106,18 @@ impl Recordings {
         }
     }
 
+    /// The keys of the footer, by what they do now.
+    pub fn footer(view: &View) -> Vec<Binding> {
+        let ended = view.playing.is_some_and(is_at_end);
+        let named = |binding: &Binding| match (binding.cmd, view.playing) {
+            (Cmd::Pause, Some(playing)) if ended || playing.pace == Pace::Paused => {
+                Binding { short: "play", ..*binding }
+            }
+            _ => *binding,
+        };
+        BINDINGS.iter().map(named).collect()
+    }
+
     /// What a command does here.
     pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
         let last = self.entries().len().saturating_sub(1);
@@ -115,14 +132,20 @@ impl Recordings {
             let what = match (cmd, self.entries().is_empty()) {
                 (Cmd::Up | Cmd::Down, _) => return None,
                 (_, true) => "Nothing is being played.",
-                (_, false) => "Nothing is being played: Enter plays the chosen recording.",
+                (_, false) => "Nothing is being played: Enter opens the chosen recording.",
             };
             return Some(Action::Tell(what.to_owned()));
         };
         let step = step(playing);
         let play = match cmd {
-            // There is nothing to stop or to go on with, whatever its pace was.
-            Cmd::Pause if is_at_end(playing) => Playback::Again(Pace::Times(1)),
+            // There is nothing to stop or to go on with: it begins again.
+            Cmd::Pause if is_at_end(playing) => Playback::Again(pace_from_end(playing)),
+            // Once more at once would show what is there already.
+            Cmd::Faster if is_at_end(playing) => match step_of_pace(pace_from_end(playing), 1) {
+                Pace::AtOnce => return None,
+                pace => Playback::Pace(pace),
+            },
+            Cmd::Slower if is_at_end(playing) => Playback::Pace(step_of_pace(pace_from_end(playing), -1)),
             Cmd::Pause if playing.pace != Pace::Paused => {
                 self.pace = Some(playing.pace);
                 Playback::Pace(Pace::Paused)
@@ -278,6 +301,24 @@ fn is_at_end(playing: Playing) -> bool {
     playing.length.is_some_and(|length| playing.position >= length)
 }
 
+/// The pace it is played at from its beginning once it stands at its end.
+fn pace_from_end(playing: Playing) -> Pace {
+    match playing.pace {
+        Pace::Times(times) => Pace::Times(times),
+        Pace::Paused | Pace::AtOnce => Pace::Times(1),
+    }
+}
+
+/// A pace in words.
+fn words(pace: Pace) -> String {
+    match pace {
+        Pace::Paused => "paused".into(),
+        Pace::Times(1) => "as fast as it was".into(),
+        Pace::Times(times) => format!("{times} times as fast"),
+        Pace::AtOnce => "all at once".into(),
+    }
+}
+
 fn step_of_pace(pace: Pace, step: isize) -> Pace {
     let place = PACES.iter().position(|&known| known == pace).unwrap_or(0);
     PACES[place.saturating_add_signed(step).min(PACES.len() - 1)]
@@ -292,12 +333,11 @@ fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
     let pace = match playing.pace {
         _ if ended && defect.is_some() => "cannot be read on".to_owned(),
         _ if ended => "at its end".to_owned(),
-        Pace::Paused => "paused".into(),
-        Pace::Times(1) => "as fast as it was".into(),
-        Pace::Times(times) => format!("{times} times as fast"),
-        Pace::AtOnce => "all at once".into(),
+        pace => words(pace),
     };
-    let length = playing.length.map_or_else(|| "?".to_owned(), format::minutes);
+    // One that is being written is longer by now than when it was listed.
+    let length = playing.length.map(|length| length.max(playing.position));
+    let length = length.map_or_else(|| "?".to_owned(), format::minutes);
     let place = format!("{} of {length}", format::minutes(playing.position));
     let room = usize::from(columns).saturating_sub(format::width(&place) + format::width(&pace) + 10);
     let part = playing
@@ -319,6 +359,14 @@ fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
             Some(defect) => Line::styled(
                 format!("  {}", format::keep_end(&visible::text(defect), usize::from(columns).saturating_sub(4))),
                 theme.bad(),
+            ),
+            None if ended => Line::styled(
+                format!(
+                    "  Space plays it, {}; + - change that. Arrows move {}, Home to its start.",
+                    words(pace_from_end(playing)),
+                    format::period(step(playing))
+                ),
+                theme.quiet(),
             ),
             None => Line::styled(
                 format!(

@@ -127,6 +127,15 @@ impl Stream {
         *self = Stream { window: self.window, alone: self.alone, ..Stream::default() };
     }
 
+    /// The keys of the footer, by what they do now.
+    pub fn footer(view: &View) -> Vec<Binding> {
+        let named = |binding: &Binding| match binding.cmd {
+            Cmd::Export if view.export.is_some() => Binding { short: "end export", ..*binding },
+            _ => *binding,
+        };
+        BINDINGS.iter().map(named).collect()
+    }
+
     /// What a command does here.
     pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
         let values = &view.monitor.stream;

@@ -12,8 +12,13 @@ use crate::tui::widgets::format;
 
 /// Serial number of the identity object (CiA 301; both manuals, section 3.3).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
-/// What is told of a unit that says nothing, until it says something.
+/// What is told of a unit that says nothing, until it says something ...
 const NOBODY: &str = "Nobody has answered: check power, cable and port.";
+/// ... of one that does not say its name, until it does ...
+const NAMELESS: &str = "The unit talks, but does not say what it is: V reads that, a power cycle shows it.";
+/// ... and of one that shows no diagnostics, or no more of them, until it shows them.
+const NO_PAGE: [&str; 2] =
+    ["No answer: no page of diagnostics came.", "No answer: the next page of diagnostics did not come."];
 
 impl View {
     /// Takes in one event; `facts` are the session's at that moment.
@@ -76,8 +81,7 @@ impl View {
             facts.version.as_ref().filter(|known| known.origin == Origin::Banner).map(|known| known.span)
         };
         let has_started = banner(facts).is_some() && banner(facts) != banner(&self.facts);
-        let nobody = |notice: &Notice| notice.text == NOBODY;
-        if facts.state != UnitState::Silent && self.notice.as_ref().is_some_and(nobody) {
+        if self.notice.as_ref().is_some_and(|notice| notice.is_refuted(facts)) {
             self.notice = None;
         }
         let was_loader = self.facts.state == UnitState::Loader && facts.state != UnitState::Loader;
@@ -237,11 +241,19 @@ impl View {
                 let text = format!("The unit is an {}{version}.", product.value);
                 self.tell(Tone::Good, text);
             }
-            (UnitState::Unknown | UnitState::Application, None) => {
-                let text = "The unit talks, but does not say what it is: V reads that, a power cycle shows it.";
-                self.tell(Tone::Quiet, text);
-            }
+            (UnitState::Unknown | UnitState::Application, None) => self.tell(Tone::Quiet, NAMELESS),
         }
+    }
+}
+
+impl Notice {
+    /// Whether what is known by now says otherwise: whoever reads both would not know what to believe.
+    fn is_refuted(&self, facts: &Facts) -> bool {
+        let is = |text: &str| self.text == text;
+        is(NOBODY) && facts.state != UnitState::Silent
+            || is(NAMELESS) && facts.product.is_some()
+            || (NO_PAGE.into_iter().any(is) || is(done(Job::Diagnostics))) && facts.diagnostics.is_some()
+            || is(done(Job::StreamOff)) && facts.stream.is_some()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::View;
 use crate::canopen::{ObjectAddress, Value};
+use crate::wire::stream::Source;
 
 /// A channel's temperature limits in °C, as far as the unit showed them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -18,9 +19,9 @@ impl Limits {
     /// What a value is beyond these, in a word. The unit itself waits for its reaction delay (4030h) before it says so.
     pub fn word(self, value: f64) -> Option<&'static str> {
         match self {
-            Limits { shutdown: Some(limit), .. } if value >= limit => Some("shutdown"),
-            Limits { high: Some(limit), .. } if value >= limit => Some("high"),
-            Limits { low: Some(limit), .. } if value < limit => Some("low"),
+            Limits { shutdown: Some(limit), .. } if value >= limit => Some("over shutdown"),
+            Limits { high: Some(limit), .. } if value >= limit => Some("ok, high"),
+            Limits { low: Some(limit), .. } if value < limit => Some("ok, low"),
             Limits { .. } => None,
         }
     }
@@ -45,6 +46,20 @@ impl View {
         };
         let limits = Limits { low: limit(LOW_WARNING), high: limit(HIGH_WARNING), shutdown: limit(HIGH_SHUTDOWN) };
         (limits != Limits::default()).then_some(limits)
+    }
+
+    /// The channels whose newest value has reached their shutdown limit, with both; the unit itself waits for its reaction
+    /// delay (4030h) before it says so.
+    pub fn over_shutdown(&self) -> Vec<(&str, f64, f64)> {
+        let stream = &self.monitor.stream;
+        // They are temperatures: beside counts they would say nothing.
+        let channels = stream.channels.iter().filter(|_| stream.source == Some(Source::FieldValue));
+        channels
+            .filter_map(|channel| {
+                let (value, limit) = (channel.reading.value()?, self.limits(&channel.name)?.shutdown?);
+                (value >= limit).then_some((channel.name.as_str(), value, limit))
+            })
+            .collect()
     }
 
     /// The averages as they were when the object dictionary was read: of what, and in °C.

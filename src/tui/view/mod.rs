@@ -269,6 +269,16 @@ impl View {
         self.has_job_to_end() || self.viewing || self.question.is_some()
     }
 
+    /// Whether the unit at the line waits in its loader for a file.
+    pub fn waits_in_loader(&self) -> bool {
+        self.can_send() && self.facts.state == UnitState::Loader
+    }
+
+    /// Whether something would stay half done, or has been left so, and whoever leaves now should know.
+    pub fn would_be_left(&self) -> bool {
+        self.is_in_the_middle() || self.waits_in_loader()
+    }
+
     /// The product, where it is one we know.
     pub fn product(&self) -> Option<&'static Product> {
         self.facts.product.as_ref().and_then(|known| Product::named(&known.value))

@@ -8,6 +8,8 @@ use crate::session::{Job, UnitState};
 pub enum Old {
     /// The unit runs its loader, and measures nothing.
     InLoader,
+    /// It has not answered.
+    Silent,
     /// It measures nothing while it shows its object dictionary ...
     DictionaryIsRead,
     /// ... nor while its view is open.
@@ -27,6 +29,7 @@ impl Old {
     pub fn reason(self) -> &'static str {
         match self {
             Old::InLoader => "The unit is in its loader.",
+            Old::Silent => "The unit has not answered.",
             Old::DictionaryIsRead => "The dictionary is being read.",
             Old::Viewing => "The view is open.",
             Old::StreamOff => "The stream is off.",
@@ -40,6 +43,7 @@ impl Old {
     pub fn text(self) -> &'static str {
         match self {
             Old::InLoader => "The unit is in its loader: these are its last values. L loads software.",
+            Old::Silent => "The unit has not answered: these are its last values. Check power, M asks.",
             Old::DictionaryIsRead => "These values are old: the unit measures nothing while its dictionary is read.",
             Old::Viewing => "These values are old: the view is open and halts the unit. M closes it.",
             Old::StreamOff => "The stream is off: these are its last values. T switches it on.",
@@ -57,13 +61,14 @@ impl View {
         stream.newest?;
         match self.facts.state {
             UnitState::Loader => Some(Old::InLoader),
+            UnitState::Silent => Some(Old::Silent),
             _ if self.job == Some(Job::ReadDictionary) => Some(Old::DictionaryIsRead),
             _ if self.viewing => Some(Old::Viewing),
             _ if self.facts.stream.is_none() && self.stream_is_off => Some(Old::StreamOff),
             _ if self.facts.stream.is_none() => Some(Old::NotHeard),
             _ if stream.late => Some(Old::NoRow),
             _ if stream.awaits_first_row() => Some(Old::NoRowYet),
-            UnitState::Silent | UnitState::Unknown | UnitState::Application => None,
+            UnitState::Unknown | UnitState::Application => None,
         }
     }
 }

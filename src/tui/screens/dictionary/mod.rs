@@ -277,10 +277,15 @@ impl Dictionary {
                 (_, Some(_)) if self.only == Only::Differences && self.words.is_empty() => {
                     "Nothing differs between the two. Esc shows everything again."
                 }
+                (None, None) if view.job == Some(Job::ReadDictionary) => "The dictionary is being read.",
                 (None, None) if view.can_send() => {
                     "Nothing to show: the unit has not said what it is. V reads its dictionary all the same."
                 }
                 (None, None) => without_unit(view),
+                (Some(_), None) if self.only == Only::Deviations => {
+                    "Nothing has been read of the unit, so nothing is known to differ: V reads it. Esc shows the manual's \
+                     entries again."
+                }
                 _ => "Nothing here matches. O chooses what is shown, / what it has to contain, Esc shows everything.",
             };
             let broken = format::wrap(text, columns.saturating_sub(4));

@@ -323,8 +323,8 @@ impl Load {
         }
     }
 
-    /// The keys that mean something now, for the footer.
-    pub fn footer(&self, view: &View) -> Vec<Binding> {
+    /// The keys that mean something now, for the footer; `area` is that of the picture.
+    pub fn footer(&self, view: &View, area: Rect) -> Vec<Binding> {
         if view.job == Some(Job::Load) {
             return RUNNING_KEYS.to_vec();
         }
@@ -337,15 +337,17 @@ impl Load {
             Stage::Report { facts, .. } => facts,
         };
         let can_start = objections(facts, view, self.loader).is_empty();
+        let (all, shown) = findings_shown(facts, view, (self.packed, self.loader), area);
         let has_place = |binding: &Binding| match binding.cmd {
             Cmd::Accept => can_start,
             Cmd::Pack => facts.ok,
             Cmd::Allow => !overridable(facts, view, self.loader).is_empty(),
-            Cmd::Down => !facts.defects.is_empty(),
+            // Where all of them are in sight there is nothing to move.
+            Cmd::Down => shown < all,
             _ => true,
         };
-        let shown = |binding: Binding| if binding.cmd == Cmd::Pack && self.packed { UNPACK } else { binding };
-        REPORT_KEYS.iter().copied().filter(has_place).map(shown).collect()
+        let named = |binding: Binding| if binding.cmd == Cmd::Pack && self.packed { UNPACK } else { binding };
+        REPORT_KEYS.iter().copied().filter(has_place).map(named).collect()
     }
 
     /// The picture.

@@ -49,13 +49,13 @@ pub(super) fn objections(facts: &ImageFacts, view: &View, loader: Option<LoaderK
         && !unit.value.eq_ignore_ascii_case(image)
     {
         let (image, unit) = (visible::text(image), visible::text(&unit.value));
-        against.push(format!("the file is for an {image}, the unit is an {unit}."));
+        against.push(format!("the file is for an {image}, the unit is an {unit}. Esc chooses another."));
     }
     if let (Some(noted), Some(image)) = (view.noted(), &facts.product)
         && !noted.product.eq_ignore_ascii_case(image)
     {
         let (image, unit) = (visible::text(image), visible::text(&noted.product));
-        against.push(format!("the file is for an {image}, our notes say {unit}."));
+        against.push(format!("the file is for an {image}, our notes say {unit}. Esc chooses another."));
     }
     let misfits = misfits(facts, view, loader).into_iter();
     against.extend(misfits.map(|misfit| format!("{}. O sends it all the same.", misfit.message)));

@@ -28,6 +28,8 @@ impl Overview {
             let when = if is_current(scene) { "now" } else { "when last seen" };
             remark.push(format!("{lasting} {when}, {} since connecting", format::grouped(faults.seen)));
         }
+        let over = scene.view.over_shutdown().len();
+        remark.extend((over > 0).then(|| format!("{over} over shutdown")));
         // How far it can be scrolled stands in the heading: a row of its own would take that of a fault.
         remark.extend((first > 0).then(|| format!("↑ {first} more")));
         remark.extend((below > 0).then(|| format!("↓ {below} more, PgDn")));
@@ -50,9 +52,22 @@ pub(super) fn fault_rows(scene: Scene) -> Vec<Line<'static>> {
     let faults = &scene.view.monitor.faults;
     // Lasting faults first: they are the ones to work on.
     let mut rows: Vec<Line> = faults.lasting().map(|fault| fault_row(scene, fault)).collect();
+    rows.extend(over_shutdown(scene));
     rows.extend(listed(scene));
     rows.extend(faults.ended().map(|fault| fault_row(scene, fault)));
     rows
+}
+
+/// The channels that have reached their shutdown limits.
+fn over_shutdown(scene: Scene) -> impl Iterator<Item = Line<'static>> {
+    let row = move |(channel, value, limit): (&str, f64, f64)| {
+        Line::from(vec![
+            Span::raw(format!("    {channel:<CHANNEL_COLUMNS$}")),
+            Span::styled(format!("{:<KIND_COLUMNS$}", "over shutdown"), scene.theme.bad()),
+            Span::raw(format!("{value:.1} °C, its shutdown limit (4020h) is {limit:.1} °C")),
+        ])
+    };
+    scene.view.over_shutdown().into_iter().map(row)
 }
 
 /// The errors in the unit's own list, as it was when the dictionary was read.

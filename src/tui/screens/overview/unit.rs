@@ -94,7 +94,8 @@ fn known<T>(fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -> Span<'stati
             let origin = match known.origin {
                 Origin::Banner => "banner",
                 Origin::Menu => "menu",
-                Origin::Dictionary => "object dictionary",
+                // In full it would push the second column aside.
+                Origin::Dictionary => "dictionary",
                 Origin::Diagnostics => "diagnostics",
             };
             Span::raw(format!("{} ({origin})", show(&known.value)))

@@ -95,7 +95,7 @@ fn value_row(
     let limits = scene.view.limits(&channel.name).filter(|_| source == Source::FieldValue);
     let beyond = limits.zip(channel.reading.value()).and_then(|(limits, value)| limits.word(value));
     let (state, style) = match beyond {
-        Some(word) => (format!("{}, {word}", channel.reading.words()), theme.warning()),
+        Some(word) => (word.to_owned(), theme.warning()),
         None => (channel.reading.words().to_owned(), theme.state(channel.reading)),
     };
     let limit_columns = match has_limits {
