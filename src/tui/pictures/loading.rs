@@ -59,7 +59,7 @@ fn whoever_leaves_a_unit_in_its_loader_is_told_what_it_waits_for() {
     stage.asked();
     stage.keys("q");
     assert!(
-        stage.shows("waits in its loader without software") && stage.shows("sent again (L)"),
+        stage.shows("waits in its loader for a file") && stage.shows("sent again (L)"),
         "{}",
         stage.picture()
     );
