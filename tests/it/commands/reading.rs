@@ -271,7 +271,7 @@ fn a_report_on_a_unit_that_dies_keeps_what_was_found_out() {
     args.extend(["--port", "u0"]);
     args.extend(FAST);
     let report = bench.world.start(&args);
-    bench.world.wait_in("r.cast", "every 500 ms");
+    bench.world.wait_in("r.cast", r#""i","500"#);
     bench.unit.as_mut().expect("it runs").input(b"power off\n");
     let ran = report.wait();
     assert_eq!(ran.code, Some(4), "{}", ran.err);
