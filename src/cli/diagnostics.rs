@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::Global;
-use super::error::CliError;
+use super::error::{CliError, Kind};
+use super::numbers::counted;
 use super::output::Output;
 use super::talk::{Ended, Talk};
 use crate::session::{Command, Event};
@@ -14,7 +15,7 @@ use crate::wire::{diagnostics, visible};
 /// Pages are shown as the unit prints them, one a second, until it is enough or Ctrl-C; then no more come.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// End after N pages.
+    /// End after N pages. Exit code 130 if an interrupt comes first; without it an interrupt is the normal end.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     count: Option<u32>,
     /// How pages are written. JSON if --json is given: one object a page, with the numbers found on it.
@@ -52,8 +53,10 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     let calendar = talk.calendar();
+    let mut pages = 0u64;
     let ended = talk.run(Command::Diagnostics { pages: args.count }, |_, event| {
         let Event::Page { at, lines } = event else { return Ok(()) };
+        pages += 1;
         let lines: Vec<String> = lines.iter().map(|line| visible::line(line.text.trim_end().as_bytes())).collect();
         if json {
             let values = lines.iter().flat_map(|line| diagnostics::quantities(line)).map(|quantity| ValueObject {
@@ -70,8 +73,14 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     talk.close(output);
     match ended? {
         // Without a count, the interrupt is the way to end.
-        Ended::Finished { interrupted: true, .. } if args.count.is_none() => Ok(()),
-        Ended::Finished { interrupted: true, .. } => Err(CliError::interrupted()),
+        Ended::Finished { interrupted: true, .. } => match args.count {
+            None if pages > 0 => Ok(()),
+            None => Err(CliError::message(Kind::Interrupted, "interrupted: no page has come")),
+            Some(count) => {
+                let message = format!("interrupted: {} of {count} shown", counted(pages, "page"));
+                Err(CliError::message(Kind::Interrupted, message))
+            }
+        },
         Ended::Finished { outcome, interrupted: false } => talk.expect_done(&outcome),
         Ended::Lost { error, .. } => Err(error),
     }

@@ -26,7 +26,8 @@ pub struct Args {
     /// CAN meanwhile.
     #[arg(long)]
     deep: bool,
-    /// Wait for the power-up messages: a unit prints its version only then. Switch its power off and on.
+    /// Wait for the power-up messages: a unit prints its version only then. Switch its power off and on within
+    /// 120 s; exit code 4 if nothing has come then.
     #[arg(long, conflicts_with = "deep")]
     wait: bool,
 }

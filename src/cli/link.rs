@@ -196,7 +196,9 @@ pub fn link_error(error: LinkError) -> CliError {
         Cause::Denied { group: Some(group) } => {
             hints.push(format!("join the group that has access, then log in again: sudo usermod -aG {group} $USER"));
         }
-        Cause::Denied { group: None } => hints.push("ask the owner of the port for access".to_owned()),
+        Cause::Denied { group: None } => {
+            hints.push("its owner alone has access: 'ls -l' says who that is; ask them, or set a udev rule".to_owned())
+        }
         Cause::Busy { holder: Some(holder) } => hints.push(format!("close {holder} first")),
         Cause::Busy { holder: None } => {
             hints.push("close the other program; 'sudo fuser PORT' names it".to_owned());

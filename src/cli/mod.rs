@@ -71,6 +71,8 @@ const EXIT_CODES: &str = "Exit codes:
   8    the upload failed and nobody can say what the unit is now
   9    the unit runs, but not what was sent
   130  interrupted, by a key or a signal (SIGINT, SIGTERM, SIGHUP)
+`stream` and `diagnostics` that were not told when to end (--count, --duration) are ended by an interrupt as is usual: 0
+once something has come.
 If `load` to several ports fails: the code that all failures share, else 1.
 A reader that closes our output is no failure; nor is an output that was closed before we began (>&-), which the system's
 runtime replaces with /dev/null and nobody can see.";

@@ -106,12 +106,20 @@ struct ErrorObject<'a> {
     schema: &'static str,
     exit_code: u8,
     kind: &'static str,
+    /// Of one of several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    port: Option<&'a str>,
     message: String,
     hints: &'a [String],
 }
 
 /// Tells the user about an error and gives the exit code. A reader that closed our output is not an error.
 pub fn conclude(output: &mut Output, result: Result<(), CliError>) -> u8 {
+    conclude_of(output, None, result)
+}
+
+/// The same for one of several links, which a program has to be able to tell apart.
+pub fn conclude_of(output: &mut Output, port: Option<&str>, result: Result<(), CliError>) -> u8 {
     let Err(error) = result else { return 0 };
     if error.error.is::<Closed>() {
         return 0;
@@ -125,6 +133,7 @@ pub fn conclude(output: &mut Output, result: Result<(), CliError>) -> u8 {
             schema: "axcon.error/1",
             exit_code: code,
             kind: error.kind.name(),
+            port,
             message: error.to_string(),
             hints: &error.hints,
         };

@@ -7,9 +7,9 @@ use jiff::tz::TimeZone;
 use serde::Serialize;
 
 use super::ask::confirm;
-use super::error::CliError;
+use super::error::{CliError, Kind};
 use super::files::Destination;
-use super::output::Output;
+use super::output::{Closed, Output};
 use super::stream::{leave_as_found, watch};
 use super::talk::{Ended, Talk};
 use super::{Global, link};
@@ -25,7 +25,8 @@ use crate::wire::stream::Source;
 /// Arguments of `axcon report`.
 ///
 /// Of a unit: values are read for some seconds, then a page of diagnostics and the object dictionary; the stream is left
-/// as it was found. Of a recording: what somebody asked then.
+/// as it was found. Of a recording: what somebody asked then. If the unit dies meanwhile, the page says what is missing, and
+/// the exit code is 4, or 3 if the port has gone.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The page, HTML.
@@ -41,6 +42,24 @@ pub struct Args {
 
 /// Time between rows, where the stream is not on already.
 const PERIOD: Duration = Duration::from_millis(500);
+
+/// What is asked of a unit, one after the other.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Step {
+    Values,
+    Diagnostics,
+    Dictionary,
+}
+
+impl Step {
+    fn what(self) -> &'static str {
+        match self {
+            Step::Values => "the stream",
+            Step::Diagnostics => "diagnostics",
+            Step::Dictionary => "the object dictionary",
+        }
+    }
+}
 
 /// What is being found out.
 #[derive(Default)]
@@ -62,7 +81,7 @@ struct Object<'a> {
 /// Makes the report.
 ///
 /// # Errors
-/// If nobody said yes, no unit answers, or the file cannot be written. What a unit that answers does not show is missing
+/// If nobody said yes, no unit answers or it stops answering, or the file cannot be written. What a unit that answers does not show is missing
 /// in the report, which says so.
 pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let is_recording = link::is_recording(global);
@@ -73,14 +92,11 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     let mut findings = Findings::default();
+    let mut died = None;
     if is_recording {
         findings.ask(&mut talk, Command::Overhear, "the recording")?;
     } else {
-        findings.watch_values(&mut talk, args.seconds, output)?;
-        findings.ask(&mut talk, Command::Diagnostics { pages: Some(1) }, "diagnostics")?;
-        if !args.no_dictionary {
-            findings.ask(&mut talk, Command::ReadDictionary, "the object dictionary")?;
-        }
+        died = findings.of_unit(&mut talk, args, output)?;
     }
     talk.close(output);
     let facts = talk.session().facts().clone();
@@ -100,7 +116,14 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
         transcript: &transcript,
         start_of_day: clock::time_of_day(start.as_millisecond()),
     };
-    out.save(contents.html().as_bytes(), output)?;
+    let saved = out.save(contents.html().as_bytes(), output);
+    if let Some(died) = died {
+        // What became of the unit counts, whoever still reads.
+        saved.or_else(|error| if error.error.is::<Closed>() { Ok(()) } else { Err(error) })?;
+        let place = if out.is_standard_output() { "standard output".to_owned() } else { out.shown() };
+        return Err(died.hint(format!("what was found out before is in the report all the same: {place}")));
+    }
+    saved?;
     if out.is_standard_output() {
         return Ok(());
     }
@@ -128,6 +151,34 @@ impl Findings {
                 self.reading = Some((**reading).clone());
             }
         }
+    }
+
+    /// Finds out all there is of a unit. Gives why it was left in the middle, if the unit or the link to it is gone: what is
+    /// known by then is still worth a page.
+    fn of_unit(&mut self, talk: &mut Talk, args: &Args, output: &mut Output) -> Result<Option<CliError>, CliError> {
+        let mut died = None;
+        for step in [Step::Values, Step::Diagnostics, Step::Dictionary] {
+            if step == Step::Dictionary && args.no_dictionary {
+                continue;
+            }
+            if died.is_some() {
+                self.missing.push(format!("Not found out: {}.", step.what()));
+                continue;
+            }
+            let done = match step {
+                Step::Values => self.watch_values(talk, args.seconds, output),
+                Step::Diagnostics => self.ask(talk, Command::Diagnostics { pages: Some(1) }, step.what()).map(|_| ()),
+                Step::Dictionary => self.ask(talk, Command::ReadDictionary, step.what()).map(|_| ()),
+            };
+            match done {
+                Err(error) if matches!(error.kind, Kind::NoAnswer | Kind::PortGone) => {
+                    self.missing.push(format!("Not found out to the end: {}. {error}.", step.what()));
+                    died = Some(error);
+                }
+                done => done?,
+            }
+        }
+        Ok(died)
     }
 
     /// Watches the stream for some seconds; one that is off is switched on for as long.

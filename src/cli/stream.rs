@@ -1,13 +1,14 @@
 //! `axcon stream`: the unit's data stream as CSV, JSON lines or as it is.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use serde::Serialize;
 
 use super::error::{CliError, Kind};
 use super::files::Destination;
+use super::numbers::counted;
 use super::output::{Closed, Output};
 use super::talk::{Calendar, Ended, Talk};
 use super::{Global, link};
@@ -20,7 +21,7 @@ use crate::wire::stream::{Layout, Reading, Row, Source};
 ///
 /// The stream is switched on, written until it is enough (or Ctrl-C), and left as it was found. A stream that runs
 /// already is joined, unless another source or period is asked for. A recording's rows are written with the times they
-/// had.
+/// had. Exit code 4 if no row comes for 15 s and three periods: what came before is written.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Field values (fv: °C) or process values (pv: counts).
@@ -29,16 +30,16 @@ pub struct Args {
     /// Repetition time in ms.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     period: Option<u64>,
-    /// How rows are written. JSON lines if --json is given.
+    /// How rows are written. Otherwise FILE's ending says so (.csv, .jsonl), or --json.
     #[arg(long, value_enum)]
     format: Option<Format>,
     /// Write to FILE instead of standard output. It is made with the first row; one that is there needs --yes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// End after N rows.
+    /// End after N rows. Exit code 130 if an interrupt comes first, as with --duration; without both it is the normal end.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
-    /// End after S seconds.
+    /// End S seconds after the first row.
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
     /// Leave the stream on.
@@ -65,6 +66,17 @@ enum Format {
     Raw,
 }
 
+impl Format {
+    /// The format that a file's name promises.
+    fn of_file(file: &Path) -> Option<Self> {
+        match file.extension()?.to_str()?.to_lowercase().as_str() {
+            "csv" => Some(Format::Csv),
+            "jsonl" | "ndjson" => Some(Format::Jsonl),
+            _ => None,
+        }
+    }
+}
+
 /// Repetition time asked for where the user says nothing (errata E-105: the units' own default).
 const PERIOD: Duration = Duration::from_millis(1000);
 
@@ -77,7 +89,10 @@ const LISTEN_FIRST: Duration = Duration::from_millis(1200);
 /// If the link does not open, no unit answers, or the unit does not do as asked.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let duration = args.duration.map(seconds).transpose()?;
-    let format = output.format(args.format, Format::Jsonl, Format::Csv)?;
+    let format = match (args.format, args.out.as_deref().and_then(Format::of_file)) {
+        (None, Some(by_name)) => by_name,
+        (format, _) => output.format(format, Format::Jsonl, Format::Csv)?,
+    };
     let wanted = args.source.map(|source| match source {
         SourceName::Fv => Source::FieldValue,
         SourceName::Pv => Source::ProcessValue,
@@ -101,7 +116,16 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let sink = Sink { out, format, source: wanted, calendar: talk.calendar(), channels: None, rows: 0 };
     let period = args.period.map(Duration::from_millis);
     let limits = Limits { count: args.count, duration };
-    let mut stream = Stream { talk, sink, limits, until: Instant::NEVER, setting: None, was_on: false, is_known: true };
+    let mut stream = Stream {
+        talk,
+        sink,
+        limits,
+        until: Instant::NEVER,
+        setting: None,
+        was_on: false,
+        is_known: true,
+        patience: PATIENCE + SLOWEST * 3,
+    };
     if stream.talk.is_recorded() {
         let written = stream.write_rows(output);
         stream.talk.close(output);
@@ -110,6 +134,9 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let found = watch(&mut stream.talk)?;
     let joins = found.is_some_and(|found| period.is_none() && wanted.is_none_or(|wanted| wanted == found.source));
     stream.was_on = found.is_some();
+    if let Some(period) = found.and_then(|found| found.period) {
+        stream.patience = PATIENCE + period * 3;
+    }
     let begun = if joins {
         Ok(())
     } else {
@@ -121,7 +148,9 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let written = begun.and_then(|()| stream.keep_writing(Duration::from_secs(args.reconnect), output));
     let Stream { mut talk, setting, was_on, is_known, .. } = stream;
     // However it ended, and also if the first row never came: what has been changed is changed back.
-    let is_gone = written.as_ref().is_err_and(|error| error.kind == Kind::PortGone || error.error.is::<AnotherUnit>());
+    let is_gone = written.as_ref().is_err_and(|error| {
+        error.kind == Kind::PortGone || error.error.is::<AnotherUnit>() || error.error.is::<NoRows>()
+    });
     let left = if setting.is_none() || args.keep || is_gone {
         Ok(())
     } else if is_known {
@@ -159,7 +188,16 @@ struct Stream {
     /// Whether the unit has shown itself since the link was opened: another one, or something else, may be behind a
     /// cable that is back, and takes every key for its own.
     is_known: bool,
+    /// How long no row may come.
+    patience: Duration,
 }
+
+/// How long no row may come, beside three periods: a unit that starts anew needs up to 6 s, goes on by itself, and may do
+/// so twice; later than that it is not coming back.
+const PATIENCE: Duration = Duration::from_secs(15);
+
+/// The longest period a unit takes: that of a stream of which too little was seen to know it.
+const SLOWEST: Duration = Duration::from_secs(60);
 
 /// How long the rows of a unit that was on all the time may take to come behind a cable that is back, beside their
 /// period: a unit that was switched off as well has none for up to 5 s (AXRTD8CO manual, section 1.1).
@@ -170,6 +208,7 @@ impl Stream {
     fn switch_on(&mut self, source: Source, period: Duration, output: &mut Output) -> Result<(), CliError> {
         // What is found on behind a cable that is back is our own.
         let is_first = self.setting.replace((source, period)).is_none();
+        self.patience = PATIENCE + period * 3;
         let mut proof = None;
         let ended = self.talk.run(Command::StreamOn { source, period }, |session, event| {
             if let Event::Row { at, span, row } = event {
@@ -201,7 +240,7 @@ impl Stream {
             self.is_known = false;
             let is_back = self.talk.reconnect(lost, patience, output)?;
             if !(is_back && self.ask_again(output)?) {
-                return Ok(());
+                return self.had_enough();
             }
         }
     }
@@ -240,22 +279,77 @@ impl Stream {
         {
             self.until = self.talk.now() + duration;
         }
-        let (sink, count) = (&mut self.sink, self.limits.count);
-        if count.is_some_and(|count| sink.rows >= count) {
+        let count = self.limits.count;
+        if count.is_some_and(|count| self.sink.rows >= count) {
             return Ok(());
         }
-        self.talk.listen(self.until, |session, event| {
-            if let Event::Row { at, span, row } = event {
-                sink.row(*at, row, &session.record().bytes(*span), output)?;
+        let mut last = self.talk.now();
+        loop {
+            // A recording ends by itself.
+            let silent_at = if self.talk.is_recorded() { Instant::NEVER } else { last + self.patience };
+            let before = self.sink.rows;
+            let sink = &mut self.sink;
+            let undisturbed = self.talk.listen(self.until.min(silent_at), |session, event| {
+                if let Event::Row { at, span, row } = event {
+                    sink.row(*at, row, &session.record().bytes(*span), output)?;
+                    last = *at;
+                }
+                Ok(if count.is_some_and(|count| sink.rows >= count) {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                })
+            })?;
+            let is_enough = count.is_some_and(|count| self.sink.rows >= count);
+            if !undisturbed && !is_enough {
+                return self.had_enough();
             }
-            Ok(if count.is_some_and(|count| sink.rows >= count) {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            })
-        })?;
-        Ok(())
+            if is_enough || self.talk.is_recorded() || self.until <= self.talk.now() {
+                return Ok(());
+            }
+            if self.sink.rows == before && last + self.patience <= self.talk.now() {
+                return Err(self.no_rows());
+            }
+        }
     }
+
+    /// The user has interrupted: the normal end where nothing else was to end it and something has come.
+    fn had_enough(&self) -> Result<(), CliError> {
+        let Limits { count, duration } = self.limits;
+        let rows = counted(self.sink.rows, "row");
+        let message = match (count, duration) {
+            (Some(count), _) => format!("interrupted: {rows} of {count} written"),
+            (None, Some(duration)) => {
+                format!("interrupted before {} s were over: {rows} written", duration.as_secs_f64())
+            }
+            (None, None) if self.sink.rows > 0 => return Ok(()),
+            (None, None) => "interrupted: no row has come".to_owned(),
+        };
+        Err(CliError::message(Kind::Interrupted, message))
+    }
+
+    fn no_rows(&self) -> CliError {
+        let written = match self.sink.rows {
+            0 => "nothing is written".to_owned(),
+            rows => format!("what came before is written: {}", counted(rows, "row")),
+        };
+        let state = match self.setting {
+            Some(_) => "the stream was not switched off: should the unit come back it may go on; 'axcon stream --off'",
+            None => "the stream was on before, and nothing was done to it",
+        };
+        CliError::new(Kind::NoAnswer, NoRows { seconds: self.patience.as_secs_f64() })
+            .hint("has the unit power, and is its cable in? 'axcon identify' says whether it answers")
+            .hint("if it does, somebody has switched its stream off: run the same command again")
+            .hint(written)
+            .hint(state)
+    }
+}
+
+/// The unit is silent that has streamed.
+#[derive(Debug, thiserror::Error)]
+#[error("no row has come for {seconds} s: the unit does not stream any more")]
+struct NoRows {
+    seconds: f64,
 }
 
 /// A stream that was on before we came.
@@ -438,4 +532,62 @@ fn seconds(seconds: f64) -> Result<Duration, CliError> {
     Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero()).ok_or_else(|| {
         CliError::message(Kind::Usage, format!("--duration {seconds} is not a length of time in seconds"))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::output::Remarks;
+
+    fn nowhere() -> Output {
+        Output { json: false, out: Box::new(std::io::sink()), err: Remarks::to(std::io::sink()) }
+    }
+
+    /// At a unit whose stream is off.
+    fn stream(limits: Limits, patience: Duration) -> Stream {
+        let global = Global {
+            ports: vec!["emu:axtc4co".into()],
+            baud: 115_200,
+            json: false,
+            yes: false,
+            record: None,
+            no_record: true,
+        };
+        let talk = Talk::open(&global, &mut nowhere()).expect("an emulated unit");
+        let out = Destination::admit(None, false).expect("always there");
+        let sink = Sink { out, format: Format::Csv, source: None, calendar: talk.calendar(), channels: None, rows: 0 };
+        Stream { talk, sink, limits, until: Instant::NEVER, setting: None, was_on: false, is_known: true, patience }
+    }
+
+    #[test]
+    fn a_unit_that_streams_no_more_is_not_waited_for_for_ever() {
+        let mut stream = stream(Limits { count: None, duration: None }, Duration::from_millis(200));
+        stream.setting = Some((Source::FieldValue, PERIOD));
+        let error = stream.write_rows(&mut nowhere()).expect_err("nothing comes");
+        assert_eq!(error.kind, Kind::NoAnswer);
+        assert_eq!(error.to_string(), "no row has come for 0.2 s: the unit does not stream any more");
+        assert!(error.hints.iter().any(|hint| hint.contains("stream --off")), "{:?}", error.hints);
+        stream.limits.duration = Some(Duration::from_millis(50));
+        assert!(stream.write_rows(&mut nowhere()).is_ok(), "the time that was asked for is over before");
+    }
+
+    #[test]
+    fn an_interrupt_is_the_normal_end_only_where_nothing_else_is_awaited() {
+        let mut stream = stream(Limits { count: None, duration: None }, SLOWEST);
+        let said = |stream: &Stream| stream.had_enough().map_err(|error| (error.kind, error.to_string()));
+        let interrupted = |what: &str| Err((Kind::Interrupted, what.to_owned()));
+        assert_eq!(said(&stream), interrupted("interrupted: no row has come"));
+        stream.sink.rows = 3;
+        assert_eq!(said(&stream), Ok(()));
+        stream.limits = Limits { count: Some(9), duration: None };
+        assert_eq!(said(&stream), interrupted("interrupted: 3 rows of 9 written"));
+        stream.limits = Limits { count: None, duration: Some(Duration::from_millis(1500)) };
+        assert_eq!(said(&stream), interrupted("interrupted before 1.5 s were over: 3 rows written"));
+    }
+
+    #[test]
+    fn the_ending_of_a_file_says_what_is_written() {
+        let of = |name| Format::of_file(Path::new(name));
+        assert_eq!([of("a.jsonl"), of("a.CSV"), of("a.txt")], [Some(Format::Jsonl), Some(Format::Csv), None]);
+    }
 }

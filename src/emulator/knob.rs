@@ -62,7 +62,7 @@ pub enum KnobError {
         what: &'static str,
     },
     /// The number is none it can have.
-    #[error("{what} cannot be {value}: it is from {low} to {high}")]
+    #[error("{what} cannot be {}: it is from {low} to {high}", crate::emulator::words::number(*value))]
     Value {
         /// What was to be turned.
         what: &'static str,

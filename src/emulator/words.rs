@@ -114,10 +114,10 @@ impl<'a> Words<'a> {
     /// # Errors
     /// If the next word is none.
     pub fn seconds(&mut self, longest: f64) -> Result<Duration, WordError> {
-        let column = self.words.get(self.next).map_or(self.end, |&(column, _)| column);
+        let (column, word) = self.words.get(self.next).copied().unwrap_or((self.end, ""));
         let seconds = self.number("a time in seconds")?;
         if !(0.0..=longest).contains(&seconds) {
-            return Err(WordError { column, message: format!("'{seconds}' is not 0 to {longest} seconds") });
+            return Err(WordError { column, message: format!("'{}' is not 0 to {longest} seconds", shown(word)) });
         }
         Ok(Duration::from_secs_f64(seconds))
     }
@@ -140,6 +140,11 @@ impl<'a> Words<'a> {
 /// A word that is none of those there are.
 pub fn unknown(column: usize, word: &str, allowed: &str) -> WordError {
     WordError { column, message: format!("'{}' is not known; there is: {allowed}", shown(word)) }
+}
+
+/// A number of the user's as an error quotes it: not with all the digits of an absurd one.
+pub fn number(value: f64) -> String {
+    if value.abs() < 1e15 { value.to_string() } else { format!("{value:e}") }
 }
 
 /// A word of the user's as an error quotes it: an endless one its beginning.

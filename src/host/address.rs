@@ -35,6 +35,12 @@ pub enum AddressError {
         /// What stood there.
         host: String,
     },
+    /// A user's name and password before the host.
+    #[error("a user name ('{user}') and a password have no meaning here: write HOST:PORT")]
+    User {
+        /// The name, not the password.
+        user: String,
+    },
     /// An IPv6 address whose last group could be a port.
     #[error("the IPv6 address in '{text}' has to stand in brackets, e.g. [::1]:2000")]
     Bare {
@@ -77,6 +83,10 @@ impl FromStr for Address {
                 None => return Err(bad()),
             }
         } else {
+            // Before the colons are counted: a name and a password may have one between them.
+            if let Some((user, _)) = text.split_once('@').filter(|(user, _)| user.contains(':')) {
+                return Err(AddressError::User { user: user.split(':').next().unwrap_or_default().to_owned() });
+            }
             let (host, port) = text.split_once(':').unwrap_or((text, ""));
             if port.contains(':') {
                 return Err(AddressError::Bare { text: text.to_owned() });
@@ -145,6 +155,7 @@ mod tests {
             ("bench:2000/", "'2000/' is no port number (1 to 65535)"),
             ("bench:telnet", "'telnet' is no port number (1 to 65535)"),
             ("me@bench:2000", "'me@bench' is no host name"),
+            ("u:secret@bench:2", "a user name ('u') and a password have no meaning here: write HOST:PORT"),
             ("a bench:2000", "'a bench' is no host name"),
             ("::1:2000", "the IPv6 address in '::1:2000' has to stand in brackets, e.g. [::1]:2000"),
             ("[bench]:2000", "'[bench]:2000' is no IPv6 address in brackets, e.g. [::1]:2000"),

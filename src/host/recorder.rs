@@ -85,6 +85,12 @@ const LIMITS: Limits = Limits { bytes: 200_000_000, files: 20_000, part_bytes: 2
 /// Ending of a recording's name; nothing else in the directory is ever deleted.
 pub(super) const ENDING: &str = ".cast";
 
+/// Why there is no recording, and where it should have been, where there is a place for it.
+fn unrecorded(place: Option<&Path>, error: &io::Error) -> String {
+    let place = place.map_or_else(String::new, |place| format!("{}: ", place.display()));
+    format!("this session is not recorded: {place}{error}")
+}
+
 impl Recorder {
     /// Starts recording a connection. Never fails: see [`take_warning`](Recorder::take_warning).
     pub fn start(plan: &Plan, connection: &Connection, clock: Clock) -> Self {
@@ -124,13 +130,10 @@ impl Recorder {
             Ok(open) => Recorder { open: Some(open), ..Recorder::default() },
             Err(error) => {
                 let place = match plan {
-                    Plan::File(path) => path.display().to_string(),
-                    Plan::Unasked | Plan::Nothing => folder().unwrap_or_default().display().to_string(),
+                    Plan::File(path) => Some(path.clone()),
+                    Plan::Unasked | Plan::Nothing => folder(),
                 };
-                Recorder {
-                    warning: Some(format!("this session is not recorded: {place}: {error}")),
-                    ..Recorder::default()
-                }
+                Recorder { warning: Some(unrecorded(place.as_deref(), &error)), ..Recorder::default() }
             }
         }
     }
@@ -405,6 +408,13 @@ pub(super) mod tests {
         let limits = Limits { bytes: 2_000, files: 100, part_bytes: 1 };
         let open = series(folder.path().to_owned(), "x", header(), Instant::ZERO, limits).expect("opened");
         Recorder { open: Some(open), ..Recorder::default() }
+    }
+
+    #[test]
+    fn why_nothing_is_recorded_is_said_also_where_there_is_no_place_for_it() {
+        let said = |place: Option<&str>| unrecorded(place.map(Path::new), &io::Error::other("it is full"));
+        assert_eq!(said(Some("/a")), "this session is not recorded: /a: it is full");
+        assert_eq!(said(None), "this session is not recorded: it is full");
     }
 
     #[test]

@@ -67,9 +67,26 @@ fn beside(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
+/// Whether a file is one that some run of the program wrote beside this place and did not put into it.
+pub fn is_beside(file: &Path, place: &Path) -> bool {
+    let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let (file, place) = (name(file), name(place));
+    let number = file.strip_prefix(&place).and_then(|rest| rest.strip_prefix('.')?.strip_suffix(".part"));
+    number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_what_is_written_beside_a_place_is_taken_for_that() {
+        let place = Path::new("a/x.bin");
+        assert!(is_beside(&beside(place), place) && is_beside(Path::new("a/x.bin.7.part"), place));
+        for other in ["a/x.bin", "a/x.bin.part", "a/x.bin..part", "a/x.bin.old.part", "a/y.bin.7.part"] {
+            assert!(!is_beside(Path::new(other), place), "{other}");
+        }
+    }
 
     #[test]
     fn a_file_is_whole_or_as_it_was_and_nothing_stays_behind() {

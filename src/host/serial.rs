@@ -210,7 +210,7 @@ fn open_exclusively(path: &Path) -> Result<OwnedFd, Cause> {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let port = rustix::fs::open(path, flags, Mode::empty()).map_err(|error| match error {
         Errno::NOENT => Cause::Missing,
-        Errno::ACCESS | Errno::PERM | Errno::ROFS => Cause::Denied { group: group_name(metadata.gid()) },
+        Errno::ACCESS | Errno::PERM | Errno::ROFS => Cause::Denied { group: group_with_access(&metadata) },
         Errno::BUSY => Cause::Busy { holder: who_has(path) },
         Errno::NXIO | Errno::NODEV | Errno::IO => Cause::Gone,
         error => Cause::Io(error.into()),
@@ -274,6 +274,18 @@ fn cause(error: Errno) -> Cause {
     }
 }
 
+/// The group whose members may read and write: whoever joins one that may not has gained nothing, and nobody should join
+/// that of root.
+fn group_with_access(metadata: &fs::Metadata) -> Option<String> {
+    let may = may_be_joined(metadata.mode(), metadata.gid());
+    may.then(|| group_name(metadata.gid())).flatten()
+}
+
+fn may_be_joined(mode: u32, gid: u32) -> bool {
+    const READ_AND_WRITE: u32 = 0o060;
+    mode & READ_AND_WRITE == READ_AND_WRITE && gid != 0
+}
+
 /// The name of a group, from the file that has them on most systems; its number elsewhere.
 fn group_name(gid: u32) -> Option<String> {
     let groups = fs::read_to_string("/etc/group").unwrap_or_default();
@@ -291,6 +303,14 @@ mod tests {
     use std::sync::mpsc;
 
     use super::*;
+
+    #[test]
+    fn only_a_group_that_has_access_and_is_not_roots_is_to_be_joined() {
+        assert!(may_be_joined(0o020_660, 20));
+        for (mode, gid) in [(0o020_600, 20), (0o020_640, 20), (0o020_620, 5), (0o020_660, 0)] {
+            assert!(!may_be_joined(mode, gid), "{mode:o} {gid}");
+        }
+    }
 
     #[cfg(target_os = "linux")]
     #[test]

@@ -111,6 +111,7 @@ impl State {
     pub fn open(folder: &Path, product: &Product, initial: &Contents) -> Result<Opened, StateError> {
         fs::create_dir_all(folder).map_err(failed("create", folder))?;
         let lock = lock(folder)?;
+        remove_parts(folder);
         let (flash_file, parameters_file) = (folder.join(FLASH), folder.join(PARAMETERS));
         let (name, size) = (&product.name, initial.flash.len());
         let flash = match read(&flash_file, size)? {
@@ -165,6 +166,17 @@ impl State {
             }
         }
         Ok(())
+    }
+}
+
+/// Removes what processes left that were killed while they replaced a file. Whoever writes here holds the lock, so nobody
+/// is at work on them; that one cannot be removed is no reason to have no unit.
+fn remove_parts(folder: &Path) {
+    let Ok(found) = fs::read_dir(folder) else { return };
+    for path in found.flatten().map(|entry| entry.path()) {
+        if save::is_beside(&path, &folder.join(PARAMETERS)) || save::is_beside(&path, &folder.join(FLASH)) {
+            let _ = fs::remove_file(&path);
+        }
     }
 }
 
@@ -262,6 +274,17 @@ mod tests {
 
     fn open(folder: &Path, name: &str) -> Result<Opened, StateError> {
         State::open(folder, product(name), &initial(name))
+    }
+
+    #[test]
+    fn what_a_killed_emulator_has_left_is_cleared_away_and_nothing_else_is() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let left = [("parameters.bin.123.part", false), ("flash.bin.7.part", false), ("notes.7.part", true)];
+        left.iter().for_each(|(name, _)| fs::write(folder.path().join(name), b"half").expect("written"));
+        drop(open(folder.path(), "AXTC4CO").expect("created"));
+        for (name, stays) in left {
+            assert_eq!(folder.path().join(name).exists(), stays, "{name}");
+        }
     }
 
     #[test]

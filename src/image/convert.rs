@@ -39,10 +39,16 @@ pub enum ConvertError {
         address: u64,
     },
     /// Records of this size cannot be.
-    #[error(
-        "records take 1 to {MOST_BLOCK_BYTES} data bytes, an even number where addresses count words; {bytes} cannot be"
-    )]
+    #[error("records take 1 to {MOST_BLOCK_BYTES} data bytes; {bytes} cannot be")]
     RecordBytes {
+        /// What was asked for.
+        bytes: u8,
+    },
+    /// Records of whole words cannot have this size.
+    #[error(
+        "where addresses count words, records take an even number of data bytes, 2 to {MOST_BLOCK_BYTES}; {bytes} cannot be"
+    )]
+    HalfWords {
         /// What was asked for.
         bytes: u8,
     },
@@ -55,9 +61,11 @@ pub enum ConvertError {
 pub fn convert(image: &Image, shape: &Shape) -> Result<Vec<u8>, ConvertError> {
     let unit = shape.address_unit;
     if let Some(bytes) = shape.record_bytes {
-        let whole = u32::from(bytes).is_multiple_of(unit.bytes());
-        if bytes == 0 || usize::from(bytes) > MOST_BLOCK_BYTES || !whole {
+        if bytes == 0 || usize::from(bytes) > MOST_BLOCK_BYTES {
             return Err(ConvertError::RecordBytes { bytes });
+        }
+        if !u32::from(bytes).is_multiple_of(unit.bytes()) {
+            return Err(ConvertError::HalfWords { bytes });
         }
     }
     let kept;
@@ -236,10 +244,12 @@ mod tests {
         assert_eq!(convert(&odd, &to_words), Err(ConvertError::Odd { address: 3 }));
         let entry = image(AddressUnit::Byte, 5, &[(0, &[1, 2])]);
         assert_eq!(convert(&entry, &to_words), Err(ConvertError::Odd { address: 5 }));
-        for bytes in [0, 3, 251, 255] {
+        for bytes in [0, 251, 255] {
             let shape = Shape { record_bytes: Some(bytes), ..to_words };
             assert_eq!(convert(&odd, &shape), Err(ConvertError::RecordBytes { bytes }));
         }
+        let error = convert(&odd, &Shape { record_bytes: Some(3), ..to_words }).expect_err("half a word");
+        assert!(error.to_string().contains("an even number of data bytes, 2 to 250; 3 cannot be"), "{error}");
     }
 
     /// Word-addressed blocks of whole words, in ascending order.

@@ -6,7 +6,7 @@
 use super::defect::DefectId;
 use super::report::{AddressRange, CheckedImage};
 use super::whole::Judged;
-use super::{AddressUnit, Target};
+use super::{AddressUnit, Block, Outside, Target};
 use crate::version::Version;
 
 /// Why an image should not be sent to a unit.
@@ -66,6 +66,17 @@ impl CheckedImage {
             });
             return misfits;
         }
+        // Loaders that fold write page by page, and what they have no data for they leave as it is.
+        if let Some(gap) = self.gap().filter(|_| unit.outside == Outside::Folds) {
+            note(DefectId::Gap, &|| {
+                format!(
+                    "no record writes 0x{:04X} to 0x{:04X}, where the {product}'s loader leaves what was there; the \
+                     program's CRC is right only if that is erased flash",
+                    gap.start,
+                    gap.end - 1
+                )
+            });
+        }
         let judged = Judged::of(unit);
         let end = unit.flash.end();
         for block in &image.blocks {
@@ -88,12 +99,30 @@ impl CheckedImage {
         }
         misfits
     }
+
+    /// The first words that no record writes and the identity block's CRC covers all the same, as erased flash.
+    fn gap(&self) -> Option<AddressRange> {
+        let (identity, image) = (self.identity()?, self.image());
+        let program = u64::from(identity.program_words) * 2 / u64::from(image.address_unit.bytes());
+        let ends = |block: &Block| u64::from(block.address) + image.address_unit.addresses(block.data.len());
+        let mut spans: Vec<(u64, u64)> =
+            image.blocks.iter().map(|block| (u64::from(block.address), ends(block))).collect();
+        spans.sort_unstable();
+        let mut next = 0;
+        for (start, end) in spans.into_iter().chain([(program, program)]) {
+            if start > next && next < program {
+                return Some(AddressRange { start: next, end: start.min(program) });
+            }
+            next = next.max(end);
+        }
+        None
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::{FlashMap, Outside, check, make};
+    use crate::image::{FlashMap, check, make};
 
     /// A unit with so much flash and its boot flash behind it.
     fn unit(product: &str, program_words: u32, outside: Outside) -> Target {
@@ -183,6 +212,21 @@ mod tests {
             said(Outside::Refuses, DefectId::OutOfRange),
             of("0x10000", "stops there, with the old program erased")
         );
+    }
+
+    #[test]
+    fn a_gap_that_the_check_sum_covers_wants_a_loader_that_erases_it() {
+        let file = |flaw| {
+            let recipe = make::Recipe { target: &small(), version: Version::new(1, 2, 0), words: 600, flaw };
+            let file = make::make(&recipe).expect("an image");
+            check(file.as_slice(), None, &[small()], Some("AXSMALL"), &[]).expect("a slice").image().expect("sound")
+        };
+        let gap = file(Some(DefectId::Gap));
+        let misfits = gap.misfits(&small(), None);
+        assert_eq!(ids(&misfits), ["gap"]);
+        assert!(misfits[0].message.starts_with("no record writes 0x00D0 to 0x00DF, where the AXSMALL's loader"));
+        assert_eq!(gap.misfits(&unit("AXSMALL", 0x1_0000, Outside::Refuses), None), [], "it erases everything first");
+        assert_eq!(file(None).misfits(&small(), None), []);
     }
 
     #[test]

@@ -13,11 +13,19 @@ pub(super) struct SRecordFile {
     /// Lines that begin as data records, readable or not: what a count record counts.
     data_lines: u64,
     lower_case: Repeated,
+    /// Types that loaders do not take, what each would be taken as, and where.
+    refused: Vec<(Kind, &'static str, Repeated)>,
 }
 
 impl SRecordFile {
     pub(super) fn new() -> Self {
-        SRecordFile { header_seen: false, early_data: None, data_lines: 0, lower_case: Repeated::default() }
+        SRecordFile {
+            header_seen: false,
+            early_data: None,
+            data_lines: 0,
+            lower_case: Repeated::default(),
+            refused: Vec::new(),
+        }
     }
 }
 
@@ -60,6 +68,10 @@ impl Grammar for SRecordFile {
 
     fn conclude(&mut self, scan: &mut Scan) {
         self.lower_case.note(&mut scan.findings, DefectId::LowerCase, "lower-case letters");
+        for (kind, instead, lines) in &self.refused {
+            let what = format!("loaders take S0, S3 and S7 only; {kind}, which they would take as {instead}");
+            lines.note(&mut scan.findings, DefectId::RefusedType, &what);
+        }
         if !self.header_seen {
             scan.findings.note(DefectId::MissingHeader, 1, 1, || "there is no header (S0)".into());
         }
@@ -77,14 +89,27 @@ impl SRecordFile {
             Kind::Header => self.header(scan, record),
             Kind::Data32 => self.data(scan, record),
             Kind::Data16 | Kind::Data24 => {
-                refused_type(scan, record.kind, "S3");
+                self.refused(scan, record.kind, "S3");
                 self.data(scan, record);
             }
             Kind::Count16 | Kind::Count24 => self.count(scan, record),
             Kind::Start32 => start(scan, record),
             Kind::Start24 | Kind::Start16 => {
-                refused_type(scan, record.kind, "S7");
+                self.refused(scan, record.kind, "S7");
                 start(scan, record);
+            }
+        }
+    }
+
+    /// A record of a type that loaders stop at: as a rule every line is of one, so each type is told once.
+    fn refused(&mut self, scan: &Scan, kind: Kind, instead: &'static str) {
+        let known = self.refused.iter_mut().find(|(known, ..)| *known == kind);
+        match known {
+            Some((.., lines)) => lines.seen(scan.line, 1),
+            None => {
+                let mut lines = Repeated::default();
+                lines.seen(scan.line, 1);
+                self.refused.push((kind, instead, lines));
             }
         }
     }
@@ -152,12 +177,6 @@ fn start(scan: &mut Scan, record: &Record<'_>) {
     scan.entry_at = Some((scan.line, ADDRESS_COLUMN));
     scan.facts.entry = Some(record.address);
     scan.facts.characters += srecord::TERMINATOR_CHARACTERS as u64 + 1;
-}
-
-fn refused_type(scan: &mut Scan, kind: Kind, instead: &str) {
-    scan.findings.note(DefectId::RefusedType, scan.line, 1, || {
-        format!("loaders take S0, S3 and S7 only, this is {kind}; as {instead} it would be taken")
-    });
 }
 
 const fn defect(error: &LineError) -> DefectId {

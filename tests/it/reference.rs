@@ -236,7 +236,7 @@ fn the_pytest_example_for_test_automation_works_as_printed() {
     let world = world_of("docs/automation.md");
     let ran = run_example(&world, Path::new(&python), &["-m", "pytest", "-q", "test_unit.py"], b"");
     assert_eq!(ran.code, Some(0), "{}\n{}", ran.out, ran.err);
-    assert!(ran.out.contains("3 passed"), "{}", ran.out);
+    assert!(ran.out.contains("4 passed"), "{}", ran.out);
 }
 
 #[test]

@@ -139,7 +139,7 @@ fn shape(args: &Args, address_unit: AddressUnit) -> Shape {
 
 fn inexpressible(error: ConvertError, name: &str) -> CliError {
     match error {
-        ConvertError::RecordBytes { .. } => CliError::new(Kind::Usage, error),
+        ConvertError::RecordBytes { .. } | ConvertError::HalfWords { .. } => CliError::new(Kind::Usage, error),
         ConvertError::TooHigh { .. } | ConvertError::Odd { .. } => {
             CliError::new(Kind::ImageRefused, anyhow::Error::new(error).context(format!("cannot convert {name}")))
                 .hint("'axcon image info' shows which addresses it has, and what they count")

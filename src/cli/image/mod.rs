@@ -23,7 +23,7 @@ use crate::image::make::{self, Recipe};
 use crate::image::{self, DefectId, Report, Severity, Target};
 use crate::version::Version;
 
-pub use report::{DefectObject, ImageObject, defect_objects, report_text};
+pub use report::{DefectObject, ImageObject, defect_objects, misfit_object, report_text};
 use report::{contents, facts_text};
 
 /// Arguments.
@@ -229,9 +229,9 @@ pub fn allowable(name: &str) -> Result<DefectId, String> {
 }
 
 /// Whether allowing it makes a difference somewhere: what is only a warning passes by itself, but for the missing
-/// identity, which is an error where a product is expected.
+/// identity, which is an error where a product is expected, and the gap, which a unit's loader may not erase.
 fn can_be_meant(id: DefectId) -> bool {
-    id.can_be_allowed() && (id.severity() == Severity::Error || id == DefectId::NoIdentity)
+    id.can_be_allowed() && (id.severity() == Severity::Error || matches!(id, DefectId::NoIdentity | DefectId::Gap))
 }
 
 fn flaw(name: &str) -> Result<DefectId, String> {

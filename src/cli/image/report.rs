@@ -188,6 +188,11 @@ pub fn defect_objects(report: &Report) -> Vec<DefectObject<'_>> {
         .collect()
 }
 
+/// What speaks against a sound file for one unit, as JSON: it stands in no line.
+pub fn misfit_object(id: DefectId, message: &str) -> DefectObject<'_> {
+    DefectObject { id: id.name(), severity: id.severity().name(), line: 0, column: 0, message, allowed: false }
+}
+
 /// 115200 baud, ten bits a character.
 const CHARACTERS_PER_SECOND: f64 = 11_520.0;
 /// A program is one range, rarely two or three.

@@ -19,7 +19,7 @@ use crate::image::{CheckedImage, DefectId, Report, Software};
 use crate::secret::Secret;
 use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, UnitState};
 use meter::Meter;
-use verdict::{conclude, planned, refuse};
+use verdict::{conclude, planned, refuse, would_be_refused};
 
 /// Arguments of `axcon load`.
 ///
@@ -84,7 +84,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     }
     let password = if args.dry_run { None } else { password::find(args.password_file.as_deref())? };
     if args.dry_run && global.ports.is_empty() {
-        plan(&report, &image, &name, args.loader, None, output)?;
+        plan(&report, &image, &name, &args, None, output)?;
         return planned(&report, None, image.identity().map(|identity| identity.product.as_str()), output);
     }
     let mut prepared = Prepared { args, name, report, image, password };
@@ -137,7 +137,7 @@ fn upload_over(
     let journal = Desk::of(talk);
     find_product(talk, args, global, output)?;
     let facts = talk.session().facts().clone();
-    plan(report, image, name, args.loader, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
+    plan(report, image, name, args, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
     if let Some(product) = args.product
         && let Some(note) = journal.against(&facts, &product.name)
         && !args.allow.contains(&DefectId::WrongProduct)
@@ -153,7 +153,14 @@ fn upload_over(
         output.remark("axcon: which version the unit ran is not known, so nobody can say whether the image is older");
     }
     if args.dry_run {
-        let product = check_fit(image, &facts, &journal, args)?;
+        let product = match check_fit(image, &facts, &journal, args) {
+            Ok(product) => product,
+            Err(Unfit { error, misfit: Some((product, misfit)) }) if output.json => {
+                let unit = (&facts, talk.port());
+                return would_be_refused(report, unit, &product.name, misfit, &error, output);
+            }
+            Err(Unfit { error, .. }) => return Err(error),
+        };
         return planned(report, Some((&facts, talk.port())), Some(&product.name), output);
     }
     let password = consent(talk, password.as_ref(), &facts, global, output)?;
@@ -272,23 +279,39 @@ fn doubt(note: &Note) -> String {
     format!("{product} is what the note of '{image}' says; if that is wrong: --product NAME --allow wrong-product")
 }
 
+/// Why the upload would be refused.
+struct Unfit {
+    error: CliError,
+    /// Where it is the image that speaks against it: what, and for which unit.
+    misfit: Option<(&'static Product, DefectId)>,
+}
+
+impl From<CliError> for Unfit {
+    fn from(error: CliError) -> Self {
+        Unfit { error, misfit: None }
+    }
+}
+
 /// What the upload itself would say of this image for this unit.
-fn check_fit(image: &CheckedImage, facts: &Facts, journal: &Desk, args: &Args) -> Result<&'static Product, CliError> {
+fn check_fit(image: &CheckedImage, facts: &Facts, journal: &Desk, args: &Args) -> Result<&'static Product, Unfit> {
     let refused = |message: String| CliError::message(Kind::ImageRefused, message + ": it would be refused");
     let said = facts.product.as_ref().and_then(|known| Product::named(&known.value));
     if let (Some(said), Some(ordered)) = (said, args.product)
         && said.name != ordered.name
     {
-        return Err(refused(format!("the unit is an {}, not an {}", said.name, ordered.name)));
+        let error = refused(format!("the unit is an {}, not an {}", said.name, ordered.name));
+        return Err(Unfit { error, misfit: Some((said, DefectId::WrongProduct)) });
     }
     let note = journal.note.as_ref();
     let noted = note.and_then(|note| Product::named(&note.product));
     if matches!(facts.state, UnitState::Silent | UnitState::Unknown) {
-        return Err(no_answer_hints(CliError::message(Kind::NoAnswer, "no unit answers on this port")));
+        return Err(no_answer_hints(CliError::message(Kind::NoAnswer, "no unit answers on this port")).into());
     }
     let Some(product) = said.or(args.product).or(noted) else {
         let message = "the unit does not say which product it is";
-        return Err(CliError::message(Kind::Usage, message).hint("look at its label and say it: --product NAME"));
+        return Err(CliError::message(Kind::Usage, message)
+            .hint("look at its label and say it: --product NAME")
+            .into());
     };
     let unit = product.target_with(args.loader.unwrap_or(product.loader.kind));
     let runs = facts.version.as_ref().map(|known| Software::Runs(known.value));
@@ -299,7 +322,8 @@ fn check_fit(image: &CheckedImage, facts: &Facts, journal: &Desk, args: &Args) -
             let allow = format!("if it is wanted all the same: --allow {}", misfit.id);
             let error = refused(misfit.message).hint(allow);
             let is_noted_only = misfit.id == DefectId::WrongProduct && said.is_none() && args.product.is_none();
-            Err(note.filter(|_| is_noted_only).map(doubt).into_iter().fold(error, CliError::hint))
+            let error = note.filter(|_| is_noted_only).map(doubt).into_iter().fold(error, CliError::hint);
+            Err(Unfit { error, misfit: Some((product, misfit.id)) })
         }
     }
 }
@@ -309,13 +333,14 @@ fn plan(
     report: &Report,
     image: &CheckedImage,
     name: &str,
-    loader: Option<LoaderKind>,
+    Args { loader, pack: packed, .. }: &Args,
     unit: Option<(&Facts, &str, Option<&Note>)>,
     output: &mut Output,
 ) -> Result<(), CliError> {
     if output.json {
         return Ok(());
     }
+    let (loader, packed) = (*loader, *packed);
     let contents = image.identity().map_or_else(
         || "it does not say what it is".to_owned(),
         |identity| format!("{} V{}", identity.product, identity.version),
@@ -344,15 +369,21 @@ fn plan(
     let named = || image.identity().map(|identity| identity.product.as_str());
     let product = said.or_else(noted).or_else(named).and_then(Product::named);
     let pace = product.map(|product| (loader.unwrap_or(product.loader.kind), &product.flash));
-    let (characters, data_bytes) = (report.facts.characters, report.facts.data_bytes);
+    let size = packed.then(|| {
+        let loader = loader.or(product.map(|product| product.loader.kind));
+        let product = product.map(|product| product.name.clone());
+        LoadOrder { product, loader, packed, ..LoadOrder::new(image.clone(), None) }.at_its_beginning()
+    });
+    let characters = size.map_or(report.facts.characters, |size| size.bytes_total as u64);
+    let data_bytes = report.facts.data_bytes;
     let seconds = device::transfer_time(characters, data_bytes, pace).as_secs_f64();
     let enter = match unit {
         Some((facts, ..)) if facts.state == UnitState::Loader => "",
         Some(_) | None => "enter the loader, ",
     };
+    let records = size.map_or_else(String::new, |size| format!(" in {} records", size.records_total));
     output.remark(&format!(
-        "plan   {enter}send {} characters (some {seconds:.0} s), then believe only the new banner",
-        report.facts.characters
+        "plan   {enter}send {characters} characters{records} (some {seconds:.0} s), then believe only the new banner"
     ));
     Ok(())
 }

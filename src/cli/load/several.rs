@@ -90,7 +90,7 @@ pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut 
                     let mut output = Output { json, out: stdout, err: Remarks::to(err.clone()) };
                     let meter = if json { Meter::new(port, true) } else { Meter::on_board(port, board.clone(), line) };
                     let result = upload(prepared, &global, meter, &mut output);
-                    let code = output::conclude(&mut output, result);
+                    let code = output::conclude_of(&mut output, Some(port), result);
                     if !json {
                         let text = if code == 0 { "done".to_owned() } else { format!("failed, exit code {code}") };
                         board.set(line, text);
@@ -129,7 +129,7 @@ pub fn plan(ports: &[String], prepared: &Prepared, global: &Global, output: &mut
         let global = Global { ports: vec![port.clone()], ..global.clone() };
         match upload(prepared, &global, Meter::new(port, output.json), output) {
             Err(error) if error.kind == Kind::Interrupted || error.error.is::<Closed>() => return Err(error),
-            planned => codes.push(output::conclude(output, planned)),
+            planned => codes.push(output::conclude_of(output, Some(port), planned)),
         }
     }
     sum_up(ports, &codes, "can take it", Ok(()), output)

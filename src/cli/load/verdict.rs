@@ -5,9 +5,9 @@ use serde::Serialize;
 use crate::cli::error::{CliError, Kind};
 use crate::cli::image::{self as image_cli, DefectObject};
 use crate::cli::numbers::counted;
-use crate::cli::output::Output;
+use crate::cli::output::{Closed, Output};
 use crate::cli::talk::no_answer_hints;
-use crate::image::Report;
+use crate::image::{DefectId, Report};
 use crate::session::{Facts, LoadReport, Phase, UnitNow, UnitState, Verdict};
 
 #[derive(Serialize)]
@@ -106,6 +106,44 @@ pub fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), Cl
     CliError::found(Some(Kind::ImageRefused), written)
 }
 
+/// The defects of the file, and what speaks against it for this unit, which is in no line of it.
+fn with_misfit<'a>(image: &'a Report, misfit: Option<DefectId>, message: &'a str) -> Vec<DefectObject<'a>> {
+    let mut defects = image_cli::defect_objects(image);
+    defects.extend(misfit.map(|id| image_cli::misfit_object(id, message)));
+    defects
+}
+
+/// A dry run has found what speaks against the image for this unit: the same object that the upload would end with.
+pub fn would_be_refused(
+    image: &Report,
+    unit: (&Facts, &str),
+    product: &str,
+    misfit: DefectId,
+    error: &CliError,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    let (facts, port) = unit;
+    let what = error.to_string();
+    let next = error.hints.join("; ");
+    let written = output.object(&LoadObject {
+        port: Some(port),
+        exit_code: Kind::ImageRefused.exit_code(),
+        verdict: verdict_name(Verdict::Refused),
+        unit: unit_name(match facts.state {
+            UnitState::Loader => UnitNow::Loader,
+            UnitState::Application => UnitNow::Application,
+            UnitState::Silent | UnitState::Unknown => UnitNow::Unknown,
+        }),
+        product: Some(product),
+        version_before: facts.version.as_ref().map(|known| known.value.to_string()),
+        what: &what,
+        next: &next,
+        defects: with_misfit(image, Some(misfit), &what),
+        ..LoadObject::of_nothing_sent(image)
+    });
+    CliError::found(Some(Kind::ImageRefused), written)
+}
+
 /// Says how it went, and what to do next.
 pub fn conclude(
     report: &LoadReport,
@@ -128,16 +166,20 @@ pub fn conclude(
             version_before: report.version_before.map(|version| version.to_string()),
             version_after: report.version_after.map(|version| version.to_string()),
             records: report.records,
-            records_total: report.records_total,
+            // What was refused before it was packed and counted has the records of its file.
+            records_total: match report.verdict {
+                Verdict::Refused if report.records_total == 0 => image.facts.records as usize,
+                _ => report.records_total,
+            },
             address: report.address,
             seconds: (report.duration.as_secs_f64() * 1000.0).round() / 1000.0,
             what: &report.what,
             heard: &report.heard,
             remark: report.remark.as_deref(),
             next,
-            defects: image_cli::defect_objects(image),
+            defects: with_misfit(image, report.misfit, &report.what),
         });
-        return CliError::found(kind, written);
+        return CliError::found(kind, written.map_err(|error| untold(report, error, output)));
     }
     let Some(kind) = kind else {
         let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));
@@ -146,7 +188,8 @@ pub fn conclude(
             output.remark(&format!("note: {remark}"));
         }
         let records = counted(report.records as u64, "record");
-        return output.data(format!("done: {}{before}; {records} in {seconds:.1} s\n", report.what).as_bytes());
+        let done = format!("done: {}{before}; {records} in {seconds:.1} s\n", report.what);
+        return output.data(done.as_bytes()).map_err(|error| untold(report, error, output));
     };
     let mut error = CliError::message(kind, report.what.clone());
     if report.records > 0 && report.verdict != Verdict::WrongApplication {
@@ -172,6 +215,14 @@ pub fn conclude(
         error = error.hint("say it with --product, for example: --product AXTC4CO");
     }
     Err(error.hint(next))
+}
+
+/// The verdict could not be written: what is true of the unit is worth more than that, and is told beside it.
+fn untold(report: &LoadReport, error: CliError, output: &mut Output) -> CliError {
+    if !error.error.is::<Closed>() {
+        output.remark(&format!("axcon: {}: {}", verdict_name(report.verdict), report.what));
+    }
+    error
 }
 
 /// The exit code's kind; `None` is success.

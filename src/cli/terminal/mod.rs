@@ -40,7 +40,7 @@ use shown::{LineEnd, Look, Shown};
 /// What the unit sends is shown with its control characters made visible, except line ends, tabs and backspaces.
 /// Ctrl-] leaves; Ctrl-T and a key do the rest: h hexadecimal, t times, e local echo, r raw, f send a file, b break.
 /// Where standard input is not a terminal, what comes is sent as it is, and the command ends when the input has ended
-/// and the line has been silent for a second. A recording is shown as it was.
+/// and the line has been silent for a second, or after 10 s where it is never silent. A recording is shown as it was.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Append what the unit sends to FILE, byte for byte; only a password it repeats is replaced.
@@ -72,6 +72,10 @@ pub struct Args {
 /// How long the line must have been silent after the end of the input: a unit answers a key much faster, and repeats
 /// its diagnostics every second.
 const SILENCE: Duration = Duration::from_secs(1);
+
+/// How long a line that is never silent, with a stream on it, is shown behind the end of the input and of what was sent:
+/// a script that pipes keys in waits for its end.
+const LISTENING: Duration = Duration::from_secs(10);
 
 /// How long the beginning of a UTF-8 character, or of a hexadecimal row, waits for its end before it is shown.
 const HALF_CHARACTER: Duration = Duration::from_millis(100);
@@ -150,6 +154,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         ended: from_file_only,
         hold_told: false,
         last: clock.now(),
+        last_sent: clock.now(),
     };
     let end = conversation.run(&inputs, output);
     let warning = conversation.recorder.take_warning();
@@ -170,6 +175,11 @@ const STUCK: Duration = Duration::from_secs(30);
 /// When a command that nobody sits at gives up what it cannot send. Who sits at it sees that and leaves.
 fn stuck_at(held_since: Option<Instant>, waits: bool, interactive: bool) -> Option<Instant> {
     held_since.filter(|_| waits && !interactive).map(|since| since + STUCK)
+}
+
+/// When a command whose input has ended is over: a byte went either way last at the one moment, to the unit at the other.
+fn over_at(last: Instant, last_sent: Instant) -> Instant {
+    (last + SILENCE).min(last_sent + LISTENING)
 }
 
 struct Conversation {
@@ -199,6 +209,8 @@ struct Conversation {
     hold_told: bool,
     /// When a byte last went either way.
     last: Instant,
+    /// When one last left, or there was no more to send.
+    last_sent: Instant,
 }
 
 impl Conversation {
@@ -207,7 +219,7 @@ impl Conversation {
             let now = self.clock.now();
             self.send(now, output)?;
             let waits = self.sending.is_some() || self.session.waiting() > 0;
-            let silent_at = (self.ended && !waits).then(|| self.last + SILENCE);
+            let silent_at = (self.ended && !waits).then(|| over_at(self.last, self.last_sent));
             if silent_at.is_some_and(|at| at <= now) {
                 return self.finish_shown(output);
             }
@@ -252,7 +264,7 @@ impl Conversation {
                 }
                 Ok(Input::TypedEnd) => {
                     self.ended = true;
-                    self.last = self.clock.now();
+                    (self.last, self.last_sent) = (self.clock.now(), self.clock.now());
                 }
                 // Of a link that is given up already there is nothing more to say.
                 Ok(Input::Gone { link, error }) => {
@@ -393,7 +405,7 @@ impl Conversation {
         }
         let mut failed = None;
         while let Some(transmit) = self.session.poll_transmit() {
-            self.last = now;
+            (self.last, self.last_sent) = (now, now);
             self.recorder.follow(self.session.record());
             let Some(connection) = &self.connection else { continue };
             if let Err(error) = connection.send(transmit.bytes) {
@@ -421,7 +433,7 @@ impl Conversation {
                 let text = format!("sent {}", counted(sending.sent(), "byte"));
                 self.sending = None;
                 self.keys.set_sending(false);
-                self.last = now;
+                (self.last, self.last_sent) = (now, now);
                 return self.say(&text, output);
             }
             self.session.command(now, Command::Keys(piece)).map_err(|refusal| CliError::new(Kind::Failed, refusal))?;
@@ -552,6 +564,14 @@ fn log_error(path: &Path, error: io::Error) -> CliError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pipe_ends_with_silence_and_also_where_there_is_none() {
+        let sent = Instant::from_millis(500);
+        assert_eq!(over_at(sent, sent), sent + SILENCE);
+        let heard = |seconds| sent + Duration::from_secs(seconds);
+        assert_eq!([over_at(heard(2), sent), over_at(heard(60), sent)], [heard(3), sent + LISTENING]);
+    }
 
     #[test]
     fn only_what_nobody_sits_at_gives_up_and_only_if_something_waits() {

@@ -90,6 +90,9 @@ impl Shown {
                 for &byte in bytes {
                     if self.row.direction != Some(direction) || self.row.bytes.len() == ROW {
                         self.end_row(&time_of, out);
+                    }
+                    // Also a row that was shown at the end of a chunk or in a pause is over: the next begins here.
+                    if self.row.bytes.is_empty() {
                         self.row.direction = Some(direction);
                         self.row.at = at;
                         self.row.start = self.row.count(direction);
@@ -298,5 +301,41 @@ mod tests {
         let rows: Vec<&str> = text.lines().collect();
         assert_eq!(rows[0], "< 00000000  30 31 32 33 34 35 36 37 38 39 61 62 63 64 65 66  0123456789abcdef");
         assert!(rows[1].starts_with("< 00000010  13   ") && rows[2].starts_with("> 00000000  6d   "), "{text}");
+    }
+
+    #[test]
+    fn the_offset_of_a_row_holds_wherever_the_bytes_are_cut_and_shown() {
+        for size in [1, 7, 16, 32, 48] {
+            let mut shown = Shown::new(Look::Hex, false, LineEnd::Auto, false);
+            let mut out = Vec::new();
+            for chunk in [b'x'; 160].chunks(size) {
+                shown.push(T, Direction::FromUnit, chunk, time_of, &mut out);
+            }
+            shown.finish(time_of, &mut out);
+            let text = String::from_utf8(out).expect("UTF-8");
+            let starts: Vec<String> = text.lines().map(|row| row[2..10].to_owned()).collect();
+            let wanted: Vec<String> = (0..10).map(|row| format!("{:08x}", row * 16)).collect();
+            assert_eq!(starts, wanted, "chunks of {size}");
+        }
+        let mut shown = Shown::new(Look::Hex, false, LineEnd::Auto, false);
+        let mut out = Vec::new();
+        for (direction, bytes) in [
+            (Direction::ToUnit, &b"m"[..]),
+            (Direction::FromUnit, &[b'x'; 32]),
+            (Direction::ToUnit, b"s"),
+            (Direction::FromUnit, b"12345"),
+        ] {
+            shown.push(T, direction, bytes, time_of, &mut out);
+        }
+        shown.finish(time_of, &mut out);
+        shown.push(T, Direction::FromUnit, b"6", time_of, &mut out);
+        shown.finish(time_of, &mut out);
+        let text = String::from_utf8(out).expect("UTF-8");
+        let starts: Vec<&str> = text.lines().map(|row| &row[..10]).collect();
+        assert_eq!(
+            starts,
+            ["> 00000000", "< 00000000", "< 00000010", "> 00000001", "< 00000020", "< 00000025"],
+            "{text}"
+        );
     }
 }

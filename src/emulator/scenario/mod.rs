@@ -14,7 +14,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::sensors::Sensors;
-use super::words::shown;
+use super::words::{self, shown};
 use crate::device::{Complaint, Complaints, Product};
 use crate::time::Duration;
 
@@ -52,8 +52,8 @@ struct RawRamp {
     from: Spanned<f64>,
     to: Spanned<f64>,
     what: Spanned<String>,
-    start: f64,
-    end: f64,
+    start: Spanned<f64>,
+    end: Spanned<f64>,
 }
 
 /// Largest file that is read; a scenario of a day with a deed every second has half of it.
@@ -139,6 +139,16 @@ impl Reading<'_> {
             self.complaints.add(ramp.to.span().start, "ramp.to", "a ramp ends later than it begins");
             return;
         }
+        let (start, end) = (*ramp.start.get_ref(), *ramp.end.get_ref());
+        // TOML has words for them, and what is between would be no number either.
+        for (raw, key) in [(&ramp.start, "ramp.start"), (&ramp.end, "ramp.end")] {
+            if !raw.get_ref().is_finite() {
+                self.complaints.add(raw.span().start, key, format!("{} is not a number like 23.5", raw.get_ref()));
+            }
+        }
+        if !start.is_finite() || !end.is_finite() {
+            return;
+        }
         let steps = ramp_steps(to - from);
         if self.deeds.len() + steps as usize >= MOST_DEEDS {
             self.complaints.add(ramp.from.span().start, "ramp", format!("more than {MOST_DEEDS} steps in all"));
@@ -146,7 +156,7 @@ impl Reading<'_> {
         }
         for step in 0..=steps {
             let part = f64::from(step) / f64::from(steps);
-            let value = ramp.start + (ramp.end - ramp.start) * part;
+            let value = start + (end - start) * part;
             match self.act(&format!("set {} {value}", ramp.what.get_ref())) {
                 Ok(verb) => self.deeds.push((from + (to - from).mul_f64(part), verb)),
                 Err(error) => {
@@ -174,7 +184,11 @@ impl Reading<'_> {
     fn seconds(&mut self, raw: &Spanned<f64>, key: &str) -> Option<Duration> {
         let value = *raw.get_ref();
         if !(0.0..=LONGEST_S).contains(&value) {
-            self.complaints.add(raw.span().start, key, format!("{value} is not 0 to {LONGEST_S} seconds"));
+            self.complaints.add(
+                raw.span().start,
+                key,
+                format!("{} is not 0 to {LONGEST_S} seconds", words::number(value)),
+            );
             return None;
         }
         Some(Duration::from_secs_f64(value))
@@ -246,6 +260,11 @@ mod tests {
                 "[[ramp]]\nfrom = 1\nto = 2\nwhat = '1 pressure'\nstart = 1\nend = 2",
                 "test.toml:4:8: ramp.what: 'pressure' is not known",
             ),
+            (
+                "[[ramp]]\nfrom = 1\nto = 2\nwhat = '1 temperature'\nstart = 1\nend = inf",
+                "test.toml:6:7: ramp.end: inf is not a number like 23.5",
+            ),
+            ("[[at]]\nseconds = 1e99\ndo = []", "test.toml:2:11: at.seconds: 1e99 is not 0 to 604800 seconds"),
             ("product = 'axtc5'", "test.toml:1:11: product: 'axtc5' is no product; there is axtc4co, axrtd8co"),
             (
                 "repeat = 1\n[[at]]\nseconds = 2\ndo = []\n[[at]]\nseconds = 3\ndo = ['freeze']",

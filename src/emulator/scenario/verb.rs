@@ -267,6 +267,7 @@ mod tests {
             ("set 1 temperature inf", "column 19: 'inf' is not a temperature in °C"),
             ("set 1 temperature 20 C", "column 22: 'C' is too much: the line is complete before it"),
             ("power", "column 6: what to do with the supply is missing: on, off, cycle"),
+            ("power cycle 1e99", "column 13: '1e99' is not 0 to 86400 seconds"),
             ("power cycle -1", "column 13: '-1' is not 0 to 86400 seconds"),
             ("nmt go", "column 5: 'go' is not known; there is: start, stop, pre-operational, reset"),
             ("write 6112", "column 11: a value is missing"),

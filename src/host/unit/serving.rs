@@ -157,7 +157,12 @@ impl<U: Hosted> Host<U> {
             let now = self.clock.now(self.wake_at());
             self.catch_up(now)?;
             match orders.try_recv() {
-                Ok(Order { verb, answered }) => answered(self.plugged.unit_mut().perform(now, &verb)),
+                Ok(Order { verb, answered }) => {
+                    let answer = self.plugged.unit_mut().perform(now, &verb);
+                    // Whoever hears that the cable is in finds the port.
+                    self.note_cable()?;
+                    answered(answer);
+                }
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => return Ok(()),
             }
         }

@@ -321,6 +321,48 @@ fn a_dry_run_says_that_the_image_is_for_another_unit() {
     let ran = world.run(&["load", "--dry-run", "--port", "emu:axtc4co", &image], b"");
     assert_eq!(ran.code, Some(5), "{}", ran.err);
     assert!(ran.err.contains("the image is for AXRTD8CO, the unit is an AXTC4CO"), "{}", ran.err);
+    // Its loader leaves old words where the check sum wants erased ones: it would wait for a file for ever.
+    let gap = Path::new(env!("CARGO_MANIFEST_DIR")).join("firmware_images/odd/gap.elf.S").display().to_string();
+    let plan = |more: &[&str]| {
+        world.run(&[&["load", "--dry-run", "--port", "emu:axtc4co", &gap, "--allow", "downgrade"], more].concat(), b"")
+    };
+    let ran = plan(&[]);
+    assert_eq!(ran.code, Some(5), "{}", ran.err);
+    assert!(ran.err.contains("no record writes 0x00D0 to 0x00DF") && ran.err.contains("--allow gap"), "{}", ran.err);
+    assert_eq!([plan(&["--allow", "gap"]).code, plan(&["--loader", "g3"]).code], [Some(0), Some(0)]);
+}
+
+#[test]
+fn a_plan_of_long_records_counts_those() {
+    let bench = Bench::new();
+    let plan = |more: &[&str]| {
+        let ran = bench.run(&[&["load", "new.S", "--dry-run"], more].concat());
+        let (_, plan) = ran.err.split_once("send ").expect("a plan");
+        let (characters, rest) = plan.split_once(" characters").expect("their number");
+        (characters.parse::<u32>().expect("a number"), rest.to_owned())
+    };
+    let ((own, _), (packed, rest)) = (plan(&[]), plan(&["--pack"]));
+    assert!(packed * 10 < own * 9, "{packed} of {own}");
+    assert!(rest.starts_with(" in 34 records"), "8000 bytes, 250 in each, header and end: {rest}");
+}
+
+#[test]
+fn the_error_of_one_of_several_units_says_which() {
+    let bench = Bench::new();
+    let args = ["load", "new.S", "--dry-run", "--json", "--port", "no1", "--port", "no2"];
+    let ran = bench.world.run(&args, b"");
+    let ports: Vec<Value> = objects(&ran.err).iter().map(|error| error["port"].clone()).collect();
+    assert_eq!((ran.code, ports), (Some(3), vec!["no1".into(), "no2".into()]), "{}", ran.err);
+}
+
+#[test]
+fn how_an_upload_has_ended_is_said_also_if_there_is_no_room_for_it() {
+    let bench = Bench::new();
+    let program = env!("CARGO_BIN_EXE_axcon");
+    let line = format!("'{program}' load new.S --yes --password-file pw --port u0 --baud 3000000 > /dev/full");
+    let ran = Running::start(bench.world.command_of(Path::new("/bin/sh"), &["-c", &line])).wait();
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("axcon: done: ") && ran.err.contains("standard output"), "{}", ran.err);
 }
 
 #[test]
@@ -411,6 +453,12 @@ fn older_software_than_what_runs_is_sent_when_that_is_wanted() {
         assert_eq!(refused.code, Some(5), "{}", refused.err);
         assert!(refused.err.contains("older than the V1.1.0 that the unit runs"), "{}", refused.err);
         assert!(refused.err.contains("--allow downgrade"), "{}", refused.err);
+        let refused = bench.load("old.S", &[dry, &["--json"]].concat());
+        let report = json(refused.out.lines().last().expect("a report"));
+        assert_eq!((refused.code, &report["schema"]), (Some(5), &"axcon.load/1".into()), "{}", refused.err);
+        assert_eq!((&report["verdict"], &report["unit"]), (&"refused".into(), &"application".into()), "{report}");
+        assert_eq!(report["defects"][0]["id"], "downgrade", "{report}");
+        assert!(report["records_total"].as_u64() > Some(10), "{report}");
     }
     assert_eq!(bench.version(), "1.1.0");
     let sent = bench.load("old.S", &["--allow", "downgrade"]);

@@ -252,6 +252,50 @@ fn a_stream_that_ends_before_its_first_row_is_off_all_the_same() {
 }
 
 #[test]
+fn an_interrupt_before_all_rows_have_come_is_told() {
+    let bench = Bench::new();
+    let mut args = vec!["stream", "--port", "u0", "--period", "100", "--count", "9999", "--out", "rows.jsonl"];
+    args.extend(FAST);
+    let rows = bench.world.start(&args);
+    bench.world.wait_in("rows.jsonl", "axcon.stream/1");
+    rows.signal(rustix::process::Signal::INT);
+    let ran = rows.wait();
+    assert_eq!(ran.code, Some(130), "{}", ran.err);
+    assert!(ran.err.contains("axcon: interrupted: ") && ran.err.contains(" of 9999 written"), "{}", ran.err);
+}
+
+#[test]
+fn a_report_on_a_unit_that_dies_keeps_what_was_found_out() {
+    let mut bench = Bench::new();
+    let mut args = vec!["report", "--out", "r.html", "--seconds", "2", "--no-dictionary", "--record", "r.cast"];
+    args.extend(["--port", "u0"]);
+    args.extend(FAST);
+    let report = bench.world.start(&args);
+    bench.world.wait_in("r.cast", r#""i","500"#);
+    bench.unit.as_mut().expect("it runs").input(b"power off\n");
+    let ran = report.wait();
+    assert_eq!(ran.code, Some(4), "{}", ran.err);
+    assert!(ran.err.contains("in the report all the same: r.html"), "{}", ran.err);
+    let page = fs::read_to_string(bench.world.path("r.html")).expect("a page");
+    assert!(page.contains("AXTC4CO") && page.contains("Not found out: diagnostics."), "{page}");
+}
+
+#[test]
+fn a_cable_is_said_to_be_in_when_its_port_is_there() {
+    let world = World::new();
+    let mut unit = world.start(&["emulate", "axtc4co", "--json"]);
+    unit.wait_out("axcon.emulate/1");
+    unit.input(b"unplug\nplug\n");
+    let said = unit.wait_out("\"verb\":\"plug\"");
+    let whole = &said[..said.rfind('\n').expect("a line")];
+    let told: Vec<String> = objects(whole)
+        .iter()
+        .map(|told| told["verb"].as_str().or(told["schema"].as_str()).expect("one of them").to_owned())
+        .collect();
+    assert_eq!(told[..4], ["axcon.emulate/1", "unplug", "axcon.emulate/1", "plug"], "{said}");
+}
+
+#[test]
 fn pages_whose_reader_has_gone_are_stopped() {
     let bench = Bench::new();
     let mut command = bench.world.command(&["diagnostics", "--port", "u0", "--record", "pages.cast"]);
