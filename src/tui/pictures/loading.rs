@@ -58,11 +58,7 @@ fn whoever_leaves_a_unit_in_its_loader_is_told_what_it_waits_for() {
     let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO"));
     stage.asked();
     stage.keys("q");
-    assert!(
-        stage.shows("waits in its loader for a file") && stage.shows("sent again (L)"),
-        "{}",
-        stage.picture()
-    );
+    assert!(stage.shows("waits in its loader for a file") && stage.shows("sent again (L)"), "{}", stage.picture());
     stage.keys("n").resized((60, 10)).keys("q");
     assert!(stage.asked().is_empty() && stage.shows("Leave axcon?"), "{}", stage.picture());
     stage.keys("y");
