@@ -206,21 +206,20 @@ impl Session {
             }
         };
         let next = Running { job, work };
-        match &self.running {
-            None => {
-                if let Some(key) = self.open_question().filter(|_| job != Job::SendFile) {
-                    return Err(Refusal::QuestionOpen(key));
-                }
+        let question = self.keys.question().filter(|_| job != Job::SendFile);
+        match (&self.running, question) {
+            (None, None) => {
                 self.running = Some(next);
                 self.signal(Signal::Begin);
                 Ok(())
             }
             // Asking who is there takes a moment and changes nothing: whoever is quicker waits for it unawares.
-            Some(Running { job: Job::Identify, .. }) if self.queued.is_none() && job != Job::Identify => {
+            (Some(Running { job: Job::Identify, .. }), None) if self.queued.is_none() && job != Job::Identify => {
                 self.queued = Some(next);
                 Ok(())
             }
-            Some(running) => Err(Refusal::Busy(running.job)),
+            (None | Some(Running { job: Job::Identify, .. }), Some(key)) => Err(Refusal::QuestionOpen(key)),
+            (Some(running), _) => Err(Refusal::Busy(running.job)),
         }
     }
 
@@ -339,8 +338,10 @@ impl Session {
     }
 
     fn keys(&mut self, keys: &[u8]) -> Result<(), Refusal> {
-        if let Some(running) = self.running.as_ref().filter(|running| running.job != Job::Identify) {
-            return Err(Refusal::Busy(running.job));
+        // What waits for the question who is there to end would send its keys behind these, and into what they open.
+        let busy = self.running.as_ref().filter(|running| running.job != Job::Identify).or(self.queued.as_ref());
+        if let Some(busy) = busy {
+            return Err(Refusal::Busy(busy.job));
         }
         self.type_in(keys)
     }
@@ -431,7 +432,10 @@ impl Session {
         let _ = self.type_in(&typed);
         match outcome {
             Some(outcome) => {
-                self.keys.question_over();
+                // A job has left its own questions; beside this one somebody may have typed.
+                if running.job != Job::Identify {
+                    self.keys.question_over();
+                }
                 self.events.push_back(Event::Finished(outcome));
                 self.running = self.queued.take();
                 self.signal(if lost { Signal::LinkLost } else { Signal::Begin });
@@ -485,6 +489,10 @@ impl Endpoint for Session {
         if transmit.secrecy == Secrecy::Open {
             let typed = self.note_typed(&transmit.bytes);
             self.watch(Saw::Typed(&typed));
+            // Its next question begins with Enter, which would be the answer.
+            if self.keys.question().is_some() && self.job() == Some(Job::Identify) {
+                self.signal(Signal::Cancel);
+            }
         }
         // The record keeps the order of time: nothing that is taken in behind this is dated before it.
         self.dated = self.now;

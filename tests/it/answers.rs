@@ -514,3 +514,24 @@ fn a_loader_that_names_itself_and_wants_a_key_is_one_and_either_alone_is_not() {
     assert_eq!(state(key), UnitState::Unknown);
     assert_eq!(state(&format!("{header}AXTC4CO V1.1.0\r\n{key}\r\n")), UnitState::Application);
 }
+
+#[test]
+fn nothing_answers_a_question_that_a_hand_has_opened_while_the_unit_was_asked_who_it_is() {
+    let mut alone = Alone::with(&[]);
+    let begun = alone.now;
+    alone.session.command(begun, Command::Identify).expect("it is free");
+    alone.take_sent(begun);
+    alone.session.command(begun, Command::Keys(b"dYes".to_vec())).expect("only who is there is asked");
+    let (outcome, _) = alone.end(begun);
+    assert_eq!(outcome, Outcome::Identified);
+    // No Enter has left, and no job puts one there.
+    assert_eq!(alone.log(), "0:\u{11}m 0:dYes");
+    let refused = alone.session.command(alone.now, Command::StreamOff);
+    assert_eq!(refused, Err(Refusal::QuestionOpen(MenuKey::Default)));
+    // Behind a job that waits for its turn nobody opens one.
+    let mut alone = Alone::with(&[]);
+    alone.session.command(begun, Command::Identify).expect("it is free");
+    alone.session.command(begun, Command::StreamOff).expect("it waits");
+    let refused = alone.session.command(begun, Command::Keys(b"d".to_vec()));
+    assert_eq!(refused, Err(Refusal::Busy(Job::StreamOff)));
+}

@@ -266,29 +266,15 @@ impl Question {
             }
             // Whoever types on without looking must not close them: the rest would be keys to the unit.
             Question::Paste { .. } | Question::SendFile { .. } if !character.eq_ignore_ascii_case(&'y') => {}
-            Question::View
-            | Question::CancelLoad
-            | Question::Paste { .. }
-            | Question::SendFile { .. }
-            | Question::Disconnect { .. }
-            | Question::Quit => match character.to_ascii_lowercase() {
+            _ if self.has_field() => {
+                self.edit(|field| field.push(character), |field| field.push(character));
+                return self.changed();
+            }
+            _ => match character.to_ascii_lowercase() {
                 'y' => return self.accept(),
                 'n' => return Answer::Close,
                 _ => {}
             },
-            Question::Link(_)
-            | Question::File { .. }
-            | Question::Choose { .. }
-            | Question::Find(_)
-            | Question::Temperature { .. }
-            | Question::Order { .. }
-            | Question::Defaults { .. }
-            | Question::Allow { .. }
-            | Question::Label { .. }
-            | Question::Password { .. } => {
-                self.edit(|field| field.push(character), |field| field.push(character));
-                return self.changed();
-            }
         }
         Answer::Stay
     }
