@@ -53,7 +53,7 @@ impl Destination {
         let path = path.unwrap_or(Path::new("-"));
         let place = if STANDARD_OUTPUT.iter().any(|name| path == Path::new(name)) {
             Place::StandardOutput
-        } else if is_stream(path) {
+        } else if save::is_stream(path) {
             let opened = File::options().write(true).open(path);
             Place::Stream(opened.map_err(|error| save_error(path, SaveError::Io(error)))?)
         } else {
@@ -116,21 +116,6 @@ impl Destination {
 
 /// Names of standard output. Opened by one of the last three, a file behind it would be written from its beginning.
 const STANDARD_OUTPUT: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
-
-/// Whether bytes go there one behind the other, and no file may take its place.
-#[cfg(unix)]
-fn is_stream(path: &Path) -> bool {
-    use std::os::unix::fs::FileTypeExt;
-
-    let kind = std::fs::metadata(path).map(|found| found.file_type());
-    kind.is_ok_and(|kind| kind.is_fifo() || kind.is_char_device())
-}
-
-/// The same where devices are no files.
-#[cfg(not(unix))]
-fn is_stream(_path: &Path) -> bool {
-    false
-}
 
 /// Whether a command may write this file: to be asked before the unit is. `overwrite`: the user has said `--yes`.
 ///
@@ -196,7 +181,7 @@ mod tests {
         let output = &mut nowhere();
         let null = || Destination::admit(Some(Path::new("/dev/null")), false).expect("a device");
         null().save(b"all", output).and_then(|()| null().append(b"row", output)).expect("taken");
-        assert!(is_stream(Path::new("/dev/null")), "no file has taken its place");
+        assert!(save::is_stream(Path::new("/dev/null")), "no file has taken its place");
         let full = Destination::admit(Some(Path::new("/dev/full")), true);
         let error = full.and_then(|mut full| full.save(b"x", output)).expect_err("there is no room");
         assert!(error.to_string().starts_with("cannot write '/dev/full'"), "{error}");
@@ -223,7 +208,11 @@ mod tests {
         assert_eq!(read(&[&full[..], b"x"].concat()), Err("it is larger than 1 MiB".into()));
         assert_eq!(read(b"ab\xff"), Err("it is no text: byte 2 is no UTF-8".into()));
         assert!(read_text(folder.path(), 1).is_err(), "a folder");
-        #[cfg(unix)]
-        assert!(read_text(Path::new("/dev/zero"), 1 << 20).is_err(), "no end");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_has_no_end_is_not_read_to_its_end() {
+        assert!(read_text(Path::new("/dev/zero"), 1 << 20).is_err());
     }
 }

@@ -9,6 +9,8 @@ use crate::time::Duration;
 use super::duplex as serial;
 #[cfg(unix)]
 use super::serial;
+#[cfg(any(not(unix), test))]
+use super::unit::memory;
 
 /// What a connection reads and writes through.
 #[derive(Debug)]
@@ -17,6 +19,9 @@ pub enum Lines {
     Serial(serial::Lines),
     /// A socket.
     Socket(socket::Lines),
+    /// A unit in this process, where there are no pseudo-terminals.
+    #[cfg(any(not(unix), test))]
+    Memory(memory::Lines),
 }
 
 impl Lines {
@@ -25,6 +30,8 @@ impl Lines {
         match self {
             Lines::Serial(lines) => lines.close(patience),
             Lines::Socket(lines) => lines.close(patience),
+            #[cfg(any(not(unix), test))]
+            Lines::Memory(lines) => lines.close(patience),
         }
     }
 
@@ -33,6 +40,8 @@ impl Lines {
         match self {
             Lines::Serial(lines) => lines.send_break(),
             Lines::Socket(lines) => lines.send_break(),
+            #[cfg(any(not(unix), test))]
+            Lines::Memory(lines) => lines.send_break(),
         }
     }
 }
@@ -46,5 +55,12 @@ impl From<serial::Lines> for Lines {
 impl From<socket::Lines> for Lines {
     fn from(lines: socket::Lines) -> Self {
         Lines::Socket(lines)
+    }
+}
+
+#[cfg(any(not(unix), test))]
+impl From<memory::Lines> for Lines {
+    fn from(lines: memory::Lines) -> Self {
+        Lines::Memory(lines)
     }
 }

@@ -15,8 +15,11 @@ use super::lines::Lines;
 use super::network::NetworkError;
 use super::ports::{self, Holder};
 use super::socket::{self, Dialled, Protocol};
+use super::unit::{Answer, HostedUnit, Hosting, Power, factory_setup};
 use super::{Input, LinkId};
 use crate::device::Product;
+use crate::emulator::Unit;
+use crate::emulator::scenario::{Stage, Verb};
 use crate::record::Adapter;
 use crate::time::Duration;
 
@@ -223,8 +226,7 @@ pub struct Connection {
     id: LinkId,
     // Closed in this order: first our side, then the unit that hangs on the other.
     lines: Lines,
-    #[cfg(unix)]
-    unit: Option<(super::unit::HostedUnit, &'static Product)>,
+    unit: Option<(HostedUnit, &'static Product)>,
     outgoing: Option<SyncSender<Vec<u8>>>,
     port: String,
     settings: String,
@@ -326,7 +328,8 @@ impl Connection {
         Ok(connection)
     }
 
-    #[cfg(unix)]
+    /// A unit that hangs on a pseudo-terminal of its own, which is opened like any other port; on one within this
+    /// process where the system has none.
     fn emulated(
         spec: &LinkSpec,
         product: &'static Product,
@@ -334,38 +337,26 @@ impl Connection {
         clock: Clock,
         inputs: SyncSender<Input>,
     ) -> Result<Self, LinkError> {
-        use super::unit::{HostedUnit, Hosting, Power, factory_setup};
-        use crate::emulator::Unit;
-        use crate::emulator::scenario::Stage;
-
-        let failed = |error: anyhow::Error| LinkError {
-            port: spec.to_string(),
-            operation: Operation::Open,
-            cause: Cause::Io(io::Error::other(error)),
-        };
         let hosting = Hosting { power: Power::AtFirstClient, ..Hosting::default() };
         let unit = Stage::bare(Unit::new(factory_setup(product, 0)));
-        let unit = HostedUnit::start(unit, hosting).map_err(|error| failed(error.into()))?;
         let id = LinkId::next();
-        let (lines, outgoing) = serial::open(unit.serial(), options, clock, id, inputs)?;
+        #[cfg(unix)]
+        let (unit, lines, outgoing) = {
+            let failed = |error| LinkError {
+                port: spec.to_string(),
+                operation: Operation::Open,
+                cause: Cause::Io(io::Error::other(anyhow::Error::new(error))),
+            };
+            let unit = HostedUnit::start(unit, hosting).map_err(failed)?;
+            let (lines, outgoing) = serial::open(unit.serial(), options, clock, id, inputs)?;
+            (unit, lines, outgoing)
+        };
+        #[cfg(not(unix))]
+        let (unit, lines, outgoing) =
+            super::unit::memory::open(unit, hosting, &spec.to_string(), (options, clock), id, inputs)?;
         let mut connection = Connection::new(id, (spec, options), lines, outgoing, Some("emulator".into()));
         connection.unit = Some((unit, product));
         Ok(connection)
-    }
-
-    #[cfg(not(unix))]
-    fn emulated(
-        spec: &LinkSpec,
-        _product: &'static Product,
-        _options: Options,
-        _clock: Clock,
-        _inputs: SyncSender<Input>,
-    ) -> Result<Self, LinkError> {
-        let cause = Cause::Io(io::Error::new(
-            io::ErrorKind::Unsupported,
-            "emulated units need pseudo-terminals, which this system does not have",
-        ));
-        Err(LinkError { port: spec.to_string(), operation: Operation::Open, cause })
     }
 
     fn new(
@@ -378,7 +369,6 @@ impl Connection {
         Connection {
             id,
             lines: lines.into(),
-            #[cfg(unix)]
             unit: None,
             outgoing: Some(outgoing),
             port: spec.to_string(),
@@ -434,17 +424,13 @@ impl Connection {
     }
 
     /// The emulated unit at the other end, if it lives in this process.
-    #[cfg(unix)]
-    pub fn unit(&self) -> Option<&super::unit::HostedUnit> {
+    pub fn unit(&self) -> Option<&HostedUnit> {
         self.unit.as_ref().map(|(unit, _)| unit)
     }
 
     /// Has something done to the emulated unit in this process, in the words of `axcon emulate`; `answered` hears what
     /// came of it, perhaps from another thread.
-    #[cfg(unix)]
-    pub fn order(&self, line: &str, answered: impl FnOnce(Result<Option<String>, String>) + Send + 'static) {
-        use crate::emulator::scenario::Verb;
-
+    pub fn order(&self, line: &str, answered: impl FnOnce(Answer) + Send + 'static) {
         let Some((unit, product)) = &self.unit else {
             return answered(Err("there is no emulated unit at the other end".into()));
         };
@@ -455,12 +441,6 @@ impl Connection {
                 unit.order(verb, answered);
             }
         }
-    }
-
-    /// The same where emulated units are not hosted.
-    #[cfg(not(unix))]
-    pub fn order(&self, _line: &str, answered: impl FnOnce(Result<Option<String>, String>) + Send + 'static) {
-        answered(Err("this system has no pseudo-terminals for emulated units".into()));
     }
 }
 

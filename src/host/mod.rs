@@ -11,13 +11,16 @@ pub mod journal;
 pub mod library;
 pub mod link;
 pub mod network;
+pub mod port_link;
 pub mod ports;
 pub mod pump;
 pub mod recorder;
 pub mod replay;
 pub mod save;
 pub mod signal;
+pub mod state;
 pub mod terminal;
+pub mod unit;
 
 #[cfg(any(windows, test))]
 mod duplex;
@@ -31,10 +34,6 @@ mod wait;
 
 #[cfg(unix)]
 pub mod pty;
-#[cfg(unix)]
-pub mod state;
-#[cfg(unix)]
-pub mod unit;
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -5,7 +5,6 @@
 //! last client has gone. The client's settings are read on our side: the line
 //! rate it chose, and whether it obeys XOFF.
 
-use std::fs;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::{Path, PathBuf};
@@ -14,6 +13,8 @@ use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
 use rustix::termios::{InputModes, OptionalActions, QueueSelector, ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr};
 
+use super::unit::port::{ClientSettings, Visit};
+
 /// Our side of a pseudo-terminal.
 #[derive(Debug)]
 pub struct Pty {
@@ -21,24 +22,6 @@ pub struct Pty {
     keeper: OwnedFd,
     path: PathBuf,
     watch: watch::Watch,
-}
-
-/// What the client has set on its side.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ClientSettings {
-    /// Line rate in baud; 0 means hung up.
-    pub baud: u32,
-    /// Whether the client's output stops at XOFF.
-    pub obeys_xoff: bool,
-}
-
-/// What a client did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Visit {
-    /// Somebody opened the port.
-    Opened,
-    /// Somebody closed it.
-    Closed,
 }
 
 impl Pty {
@@ -186,7 +169,7 @@ mod watch {
     use rustix::fs::inotify::{self, CreateFlags, ReadFlags, WatchFlags};
     use rustix::io::Errno;
 
-    use super::Visit;
+    use crate::host::unit::port::Visit;
 
     #[derive(Debug)]
     pub struct Watch {
@@ -236,7 +219,7 @@ mod watch {
     use std::os::fd::{AsFd, BorrowedFd};
     use std::path::Path;
 
-    use super::Visit;
+    use crate::host::unit::port::Visit;
 
     #[derive(Debug)]
     pub struct Watch {
@@ -259,90 +242,6 @@ mod watch {
     impl AsFd for Watch {
         fn as_fd(&self) -> BorrowedFd<'_> {
             self.silent.as_fd()
-        }
-    }
-}
-
-/// A name for a port that stays the same: a symbolic link, removed on drop if it is still ours.
-#[derive(Debug)]
-pub struct PortLink {
-    link: PathBuf,
-    target: PathBuf,
-}
-
-/// Why a link could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum PortLinkError {
-    /// Something else than a link to a pseudo-terminal has the name.
-    #[error("'{}' exists and is {what}; it is left as it is", link.display())]
-    Taken {
-        /// The name.
-        link: PathBuf,
-        /// What has it.
-        what: String,
-    },
-    /// The system refused.
-    #[error("cannot make the link '{}'", link.display())]
-    Io {
-        /// The name.
-        link: PathBuf,
-        /// Why.
-        #[source]
-        source: io::Error,
-    },
-}
-
-impl PortLink {
-    /// Makes `link` point at `target`. A link to a pseudo-terminal, which a killed emulator leaves behind, is replaced
-    /// in one step; anything else is not touched.
-    ///
-    /// # Errors
-    /// If the name is taken by something else, or the system refuses.
-    pub fn create(link: &Path, target: &Path) -> Result<Self, PortLinkError> {
-        let failed = |source| PortLinkError::Io { link: link.to_owned(), source };
-        match fs::symlink_metadata(link) {
-            Ok(metadata) if metadata.is_symlink() => {
-                let former = fs::read_link(link).map_err(failed)?;
-                // A dangling link is stale whatever it pointed at.
-                if !former.starts_with("/dev/pts") && link.exists() {
-                    let what = format!("a link to '{}', not to a pseudo-terminal", former.display());
-                    return Err(PortLinkError::Taken { link: link.to_owned(), what });
-                }
-                if let Some(host) = super::ports::other_host(link) {
-                    let what = format!("the port of a unit that {host} emulates");
-                    return Err(PortLinkError::Taken { link: link.to_owned(), what });
-                }
-            }
-            Ok(metadata) => {
-                let what = if metadata.is_dir() { "a directory" } else { "a file" };
-                return Err(PortLinkError::Taken { link: link.to_owned(), what: what.into() });
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-            Err(error) => return Err(failed(error)),
-        }
-        let mut temporary = link.as_os_str().to_owned();
-        temporary.push(format!(".{}.tmp", std::process::id()));
-        let temporary = PathBuf::from(temporary);
-        // Left behind by a process of the same number that was killed: in a container they all have the same.
-        let _ = fs::remove_file(&temporary);
-        std::os::unix::fs::symlink(target, &temporary).map_err(failed)?;
-        if let Err(error) = fs::rename(&temporary, link) {
-            let _ = fs::remove_file(&temporary);
-            return Err(failed(error));
-        }
-        Ok(PortLink { link: link.to_owned(), target: target.to_owned() })
-    }
-
-    /// The name.
-    pub fn path(&self) -> &Path {
-        &self.link
-    }
-}
-
-impl Drop for PortLink {
-    fn drop(&mut self) {
-        if fs::read_link(&self.link).is_ok_and(|target| target == self.target) {
-            let _ = fs::remove_file(&self.link);
         }
     }
 }
@@ -375,33 +274,5 @@ mod tests {
         let flags = rustix::fs::OFlags::RDWR | rustix::fs::OFlags::NOCTTY;
         drop(rustix::fs::open(pty.path(), flags, rustix::fs::Mode::empty()).expect("opened"));
         assert_eq!(pty.visits().expect("visits"), [Visit::Opened, Visit::Closed]);
-    }
-
-    #[test]
-    fn a_link_replaces_only_a_link_to_a_pseudo_terminal() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let name = folder.path().join("port");
-        let create = |name: &Path| PortLink::create(name, Path::new("/dev/pts/4711"));
-
-        let stale = folder.path().join("stale");
-        std::os::unix::fs::symlink("/dev/pts/4712", &stale).expect("a link");
-        let half_way = folder.path().join(format!("stale.{}.tmp", std::process::id()));
-        std::os::unix::fs::symlink("/dev/pts/4713", half_way).expect("a link");
-        drop(create(&stale).expect("replaced"));
-        assert!(fs::symlink_metadata(&stale).is_err(), "removed on drop");
-
-        let link = create(&name).expect("made");
-        fs::remove_file(&name).expect("removed");
-        fs::write(&name, "mine now").expect("a file");
-        drop(link);
-        assert!(name.exists(), "another's file stays");
-        let error = create(&name).expect_err("refused").to_string();
-        assert!(error.contains("exists and is a file"), "{error}");
-
-        let foreign = folder.path().join("foreign");
-        std::os::unix::fs::symlink(&name, &foreign).expect("a link");
-        let error = create(&foreign).expect_err("refused").to_string();
-        assert!(error.contains("not to a pseudo-terminal"), "{error}");
-        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 2, "nothing temporary is left");
     }
 }

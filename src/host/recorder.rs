@@ -403,6 +403,7 @@ pub(super) mod tests {
     }
 
     /// A recording that ends with the next byte: there is no place for its next part.
+    #[cfg(unix)]
     pub(in crate::host) fn doomed() -> Recorder {
         let folder = tempfile::tempdir().expect("a folder");
         let limits = Limits { bytes: 2_000, files: 100, part_bytes: 1 };

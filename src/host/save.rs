@@ -30,6 +30,21 @@ pub fn admit(path: &Path, overwrite: bool) -> Result<(), SaveError> {
     }
 }
 
+/// Whether bytes go there one behind the other, and no file may take its place.
+#[cfg(unix)]
+pub fn is_stream(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+
+    let kind = fs::metadata(path).map(|found| found.file_type());
+    kind.is_ok_and(|kind| kind.is_fifo() || kind.is_char_device())
+}
+
+/// The same where devices are no files.
+#[cfg(not(unix))]
+pub fn is_stream(_path: &Path) -> bool {
+    false
+}
+
 /// Writes a file. What is there already is replaced only if that is wanted; behind a symbolic link, what it leads to.
 ///
 /// # Errors

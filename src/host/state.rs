@@ -7,8 +7,7 @@
 //! product is an error, and nothing in it is touched.
 
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Read};
-use std::os::unix::fs::FileExt;
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::save::{self, SaveError};
@@ -150,7 +149,10 @@ impl State {
             match store.area {
                 Area::Flash => {
                     let file = self.folder.join(FLASH);
-                    self.flash.write_all_at(&store.bytes, store.offset as u64).map_err(failed("write", &file))?;
+                    self.flash
+                        .seek(SeekFrom::Start(store.offset as u64))
+                        .and_then(|_| self.flash.write_all(&store.bytes))
+                        .map_err(failed("write", &file))?;
                 }
                 Area::Parameters => {
                     let end = store.offset + store.bytes.len();
@@ -344,14 +346,15 @@ mod tests {
             (PARAMETERS, "it has more than the 4096 bytes of the parameter memory"),
         ] {
             // Larger than all memory, and blank as far as it is looked at.
-            let file = File::create(folder.path().join(name)).expect("created");
-            file.write_all_at(&[0xFF; 200_000], 0).and_then(|()| file.set_len(1 << 42)).expect("a sparse file");
+            let mut file = File::create(folder.path().join(name)).expect("created");
+            file.write_all(&[0xFF; 200_000]).and_then(|()| file.set_len(1 << 42)).expect("a sparse file");
             let Opened { contents, damaged, .. } = open(folder.path(), "AXTC4CO").expect("opened all the same");
             assert_eq!((contents, damaged.len()), (initial("AXTC4CO"), 1), "{name}");
             assert!(damaged[0].to_string().contains(complaint), "{}", damaged[0]);
         }
     }
 
+    #[cfg(unix)]
     #[test]
     fn what_is_no_file_is_not_waited_for() {
         let folder = tempfile::tempdir().expect("a folder");

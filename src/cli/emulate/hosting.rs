@@ -15,7 +15,7 @@ use crate::emulator::Unit;
 use crate::emulator::fault::{self, Fault};
 use crate::emulator::scenario::{LARGEST_FILE, Scenario, Stage, Verb};
 use crate::host::Input;
-use crate::host::pty::{PortLink, PortLinkError};
+use crate::host::port_link::{PortLink, PortLinkError};
 use crate::host::signal::Signals;
 use crate::host::state::{Contents, Opened, State};
 use crate::host::unit::{self, Answer, HostError, HostedUnit, Hosting, LineRate};
@@ -196,7 +196,11 @@ fn start(
         })),
         ..Hosting::default()
     };
-    let unit = HostedUnit::start(emulated, hosting).map_err(|error| CliError::new(Kind::Failed, error))?;
+    let unit = HostedUnit::start(emulated, hosting).map_err(|error| match error {
+        HostError::NoPseudoTerminals => CliError::new(Kind::Failed, error)
+            .hint(format!("'--port emu:{}' has a unit within the program", product.name.to_ascii_lowercase())),
+        HostError::Port(..) | HostError::State(_) => CliError::new(Kind::Failed, error),
+    })?;
     let pty = unit.serial().to_owned();
     let link = link(args, place, &pty)?;
     Ok(Running { link, unit, pty, product })

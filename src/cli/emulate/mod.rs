@@ -2,9 +2,7 @@
 //!
 //! `orders` reads what standard input says to them, `hosting` carries it out.
 
-#[cfg(unix)]
 mod hosting;
-#[cfg(unix)]
 mod orders;
 
 use std::path::PathBuf;
@@ -58,14 +56,4 @@ pub struct Args {
 /// Units of one run: each has a pseudo-terminal and a thread.
 const MOST_UNITS: usize = 256;
 
-/// Says that it cannot be done here.
-///
-/// # Errors
-/// Always.
-#[cfg(not(unix))]
-pub fn run(_args: Args, _global: &Global, _output: &mut Output) -> Result<(), CliError> {
-    Err(CliError::message(Kind::Failed, "emulated units need pseudo-terminals, which this system does not have"))
-}
-
-#[cfg(unix)]
 pub use hosting::run;

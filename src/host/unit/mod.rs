@@ -1,17 +1,22 @@
-//! An emulated unit on a pseudo-terminal, in real time, in a thread of its own.
+//! An emulated unit in real time, in a thread of its own.
 //!
-//! Here is what it is hosted as and what it can be told; `serving` is its thread.
+//! Here is what it is hosted as and what it can be told; `serving` is its thread, `port` what it hangs on: a
+//! pseudo-terminal, or where the system has none a cable within this process.
 
+#[cfg(any(not(unix), test))]
+pub(super) mod memory;
+pub(super) mod port;
+#[cfg(unix)]
+mod pty_port;
 mod serving;
 
-use std::io::{self, PipeWriter, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use super::pty::Pty;
 use super::state::{State, StateError};
 use crate::device::Product;
 use crate::emulator::scenario::{Stage, Verb};
@@ -19,6 +24,7 @@ use crate::emulator::{Setup, Store};
 use crate::endpoint::Endpoint;
 use crate::image::make;
 use crate::time::Instant;
+use port::{Bell, UnitPort};
 use serving::Host;
 
 /// What can be hosted: a unit's serial port with the knobs the host needs.
@@ -85,8 +91,8 @@ pub struct HostedUnit {
     serial: PathBuf,
     counts: Arc<Counts>,
     orders: SyncSender<Order>,
-    /// A byte on it says that there is a command; its end says that it is over.
-    bell: Option<PipeWriter>,
+    /// Rings when there is an order; its end says that it is over.
+    bell: Option<Box<dyn Bell>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -139,9 +145,12 @@ struct Order {
 /// Why a unit is not hosted, or no longer.
 #[derive(Debug, thiserror::Error)]
 pub enum HostError {
-    /// The pseudo-terminal.
-    #[error("cannot {0} a pseudo-terminal")]
-    Pty(&'static str, #[source] io::Error),
+    /// The system has none.
+    #[error("emulated units need pseudo-terminals, which this system does not have")]
+    NoPseudoTerminals,
+    /// What the unit hangs on.
+    #[error("cannot {0} the port of an emulated unit")]
+    Port(&'static str, #[source] io::Error),
     /// The state directory.
     #[error(transparent)]
     State(#[from] StateError),
@@ -172,25 +181,41 @@ impl HostedUnit {
     ///
     /// # Errors
     /// If the system gives no pseudo-terminal or no thread.
-    pub fn start<U: Hosted>(unit: U, mut hosting: Hosting) -> Result<Self, HostError> {
-        let pty = Pty::open(BAUD).map_err(|error| HostError::Pty("open", error))?;
-        let (ring, bell) = io::pipe().map_err(|error| HostError::Pty("watch", error))?;
+    #[cfg(unix)]
+    pub fn start<U: Hosted>(unit: U, hosting: Hosting) -> Result<Self, HostError> {
+        let (port, bell) = pty_port::PtyPort::open().map_err(|error| HostError::Port("open", error))?;
+        HostedUnit::on(port, bell, unit, hosting).map_err(|error| HostError::Port("serve", error))
+    }
+
+    /// The same where there are no pseudo-terminals.
+    ///
+    /// # Errors
+    /// Always.
+    #[cfg(not(unix))]
+    pub fn start<U: Hosted>(_unit: U, _hosting: Hosting) -> Result<Self, HostError> {
+        Err(HostError::NoPseudoTerminals)
+    }
+
+    /// Puts a unit on a port and lets time run.
+    fn on<U: Hosted>(
+        port: impl UnitPort,
+        bell: impl Bell + 'static,
+        unit: U,
+        mut hosting: Hosting,
+    ) -> Result<Self, io::Error> {
         let (sender, orders) = sync_channel(ORDERS);
         let counts = Arc::new(Counts::default());
-        let serial = pty.path().to_owned();
+        let serial = port.path().to_owned();
         let failed = hosting.failed.take();
-        let host = Host::new(unit, hosting, pty, counts.clone());
-        let thread = thread::Builder::new()
-            .name("emulated unit".into())
-            .spawn(move || {
-                if let Err(error) = host.run(ring, &orders)
-                    && let Some(failed) = failed
-                {
-                    failed(error);
-                }
-            })
-            .map_err(|error| HostError::Pty("serve", error))?;
-        Ok(HostedUnit { serial, counts, orders: sender, bell: Some(bell), thread: Some(thread) })
+        let host = Host::new(unit, hosting, port, counts.clone());
+        let thread = thread::Builder::new().name("emulated unit".into()).spawn(move || {
+            if let Err(error) = host.run(&orders)
+                && let Some(failed) = failed
+            {
+                failed(error);
+            }
+        })?;
+        Ok(HostedUnit { serial, counts, orders: sender, bell: Some(Box::new(bell)), thread: Some(thread) })
     }
 
     /// What a client opens, as long as nobody has pulled the cable.
@@ -210,7 +235,7 @@ impl HostedUnit {
             Ok(()) => true,
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
         };
-        queued && self.bell.as_ref().is_some_and(|mut bell| bell.write_all(&[1]).is_ok())
+        queued && self.bell.as_ref().is_some_and(|bell| bell.ring())
     }
 }
 

@@ -9,23 +9,18 @@
 //! unit's time for as long (`UnitClock`): what already lies in the pseudo-terminal must not look to the unit as if
 //! the line had been silent meanwhile, which is when a loader begins to write and is deaf.
 
-use std::io::{self, Read};
-use std::os::fd::AsFd;
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::thread;
 
-use rustix::event::PollFlags;
-
-use super::{AHEAD, BAUD, Counts, HostError, Hosted, Hosting, LineRate, ORDERS, Order, Power, Replugged};
+use super::port::{ClientSettings, UnitPort, Visit, Woken};
+use super::{AHEAD, BAUD, Counts, HostError, Hosted, Hosting, LineRate, Order, Power, Replugged};
 use crate::emulator::Store;
 use crate::emulator::cable::{Line, Plugged};
 use crate::host::clock::Clock;
-use crate::host::ports;
-use crate::host::pty::{ClientSettings, Pty, Visit};
 use crate::host::state::State;
-use crate::host::wait::ready;
 use crate::rng::Rng;
 use crate::time::{Duration, Instant, character_time};
 
@@ -75,9 +70,9 @@ fn late_beyond(now: Instant, wanted: Option<Instant>) -> Duration {
 }
 
 /// The thread's own things.
-pub(super) struct Host<U> {
+pub(super) struct Host<U, P> {
     plugged: Plugged<U>,
-    pty: Pty,
+    port: P,
     clock: UnitClock,
     /// How far the unit's time has come.
     at: Instant,
@@ -99,15 +94,15 @@ pub(super) struct Host<U> {
     counts: Arc<Counts>,
 }
 
-impl<U: Hosted> Host<U> {
-    pub(super) fn new(unit: U, hosting: Hosting, pty: Pty, counts: Arc<Counts>) -> Self {
+impl<U: Hosted, P: UnitPort> Host<U, P> {
+    pub(super) fn new(unit: U, hosting: Hosting, port: P, counts: Arc<Counts>) -> Self {
         let line = match hosting.line_rate {
             LineRate::Real => character_time(BAUD),
             LineRate::Off => Duration::ZERO,
         };
         Host {
             plugged: Plugged::new(unit, Line::new(line, Duration::ZERO)),
-            pty,
+            port,
             clock: UnitClock { clock: Clock::start(), overslept: Duration::ZERO },
             at: Instant::ZERO,
             line_rate: hosting.line_rate,
@@ -126,7 +121,7 @@ impl<U: Hosted> Host<U> {
     }
 
     /// Lets time run until the bell is taken away.
-    pub(super) fn run(mut self, mut ring: io::PipeReader, orders: &Receiver<Order>) -> Result<(), HostError> {
+    pub(super) fn run(mut self, orders: &Receiver<Order>) -> Result<(), HostError> {
         if self.power == Power::AtStart {
             self.plugged.unit_mut().power_on(self.at);
         }
@@ -136,19 +131,16 @@ impl<U: Hosted> Host<U> {
             self.catch_up(now)?;
 
             // While the line is full or the unit holds the client, bytes that wait must not wake us.
-            let input = if self.takes_bytes() && !self.backlog { PollFlags::IN } else { PollFlags::empty() };
+            let wants_bytes = self.takes_bytes() && !self.backlog;
             let timeout = self.wake_at().map(|at| self.clock.until(at));
-            let fds = [(self.pty.as_fd(), input), (self.pty.visits_fd(), PollFlags::IN), (ring.as_fd(), PollFlags::IN)];
-            let [_, _, rung] = ready(fds, timeout).map_err(|error| HostError::Pty("watch", error))?;
-            if rung.is_empty() {
-                continue;
+            match self.port.wait(wants_bytes, timeout).map_err(failed("watch"))? {
+                Woken::Line => {}
+                Woken::Bell => self.obey(orders)?,
+                Woken::End => {
+                    self.farewell();
+                    return Ok(());
+                }
             }
-            let mut rings = [0; ORDERS];
-            if matches!(ring.read(&mut rings), Ok(0)) {
-                self.farewell();
-                return Ok(());
-            }
-            self.obey(orders)?;
         }
     }
 
@@ -169,7 +161,7 @@ impl<U: Hosted> Host<U> {
     }
 
     fn note_visits(&mut self) -> Result<(), HostError> {
-        let visits = self.pty.visits().map_err(|error| HostError::Pty("watch", error))?;
+        let visits = self.port.visits().map_err(failed("watch"))?;
         if visits.contains(&Visit::Opened) {
             if !self.attended {
                 self.plugged.unit_mut().forget_hold();
@@ -183,11 +175,11 @@ impl<U: Hosted> Host<U> {
         }
         // Counting would be wrong: events of the same kind melt into one while we sleep.
         if visits.contains(&Visit::Closed) {
-            self.attended = ports::holder(self.pty.path()).is_some();
+            self.attended = self.port.is_attended();
             self.leaving = !self.attended;
         }
         if self.attended {
-            self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
+            self.client = self.port.client_settings().map_err(failed("ask"))?;
         }
         Ok(())
     }
@@ -237,12 +229,11 @@ impl<U: Hosted> Host<U> {
         self.cable_is_in = is_in;
         if is_in {
             if let Some(replugged) = &mut self.replugged {
-                replugged(self.pty.path());
+                replugged(self.port.path());
             }
             return Ok(());
         }
-        // The new one is there before the old one goes, so it cannot get its name: who opens that finds no port.
-        self.pty = Pty::open(BAUD).map_err(|error| HostError::Pty("open", error))?;
+        self.port.pull().map_err(failed("open"))?;
         self.client = ClientSettings { baud: BAUD, obeys_xoff: false };
         (self.attended, self.leaving, self.backlog) = (false, false, false);
         self.heard.clear();
@@ -262,7 +253,7 @@ impl<U: Hosted> Host<U> {
             return Ok(0);
         }
         let mut buffer = [0; BURST];
-        let count = self.pty.read(&mut buffer[..room.min(BURST)]).map_err(|error| HostError::Pty("read", error))?;
+        let count = self.port.read(&mut buffer[..room.min(BURST)]).map_err(failed("read"))?;
         // Few bytes need not be all: the system carries them over in its own time. The next slice looks again.
         self.backlog = count > 0;
         if count == 0 {
@@ -274,7 +265,7 @@ impl<U: Hosted> Host<U> {
         // Whoever sends is there, even if the system would not show us. And it may have changed its settings since it
         // opened the port.
         self.attended |= !self.leaving;
-        self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
+        self.client = self.port.client_settings().map_err(failed("ask"))?;
         let bytes = &mut buffer[..count];
         if self.at_wrong_rate() {
             garble(&mut self.garbage, bytes);
@@ -284,7 +275,7 @@ impl<U: Hosted> Host<U> {
         Ok(count)
     }
 
-    /// Whether what waits in the pseudo-terminal may go on the line: not while a client that obeys is held.
+    /// Whether what waits in the port may go on the line: not while a client that obeys is held.
     fn takes_bytes(&self) -> bool {
         !(self.plugged.unit().holds_sender() && self.client.obeys_xoff)
     }
@@ -304,11 +295,11 @@ impl<U: Hosted> Host<U> {
         }
         let mut taken = 0;
         if self.attended {
-            self.client = self.pty.client_settings().map_err(|error| HostError::Pty("ask", error))?;
+            self.client = self.port.client_settings().map_err(failed("ask"))?;
             if self.at_wrong_rate() {
                 garble(&mut self.garbage, &mut self.heard);
             }
-            taken = self.pty.write(&self.heard).map_err(|error| HostError::Pty("write", error))?;
+            taken = self.port.write(&self.heard).map_err(failed("write"))?;
         }
         self.counts.to_client.fetch_add(taken as u64, Ordering::Relaxed);
         self.counts.lost.fetch_add((self.heard.len() - taken) as u64, Ordering::Relaxed);
@@ -318,7 +309,7 @@ impl<U: Hosted> Host<U> {
 
     fn forget_client(&mut self) -> Result<(), HostError> {
         self.leaving = false;
-        self.pty.reset().map_err(|error| HostError::Pty("reset", error))
+        self.port.reset().map_err(failed("reset"))
     }
 
     fn at_wrong_rate(&self) -> bool {
@@ -339,11 +330,16 @@ impl<U: Hosted> Host<U> {
         while self.attended && clock.now() < Instant::ZERO + FAREWELL {
             // First a moment: what was just written takes one to reach the client's side.
             thread::sleep(FAREWELL_STEP);
-            if self.pty.unread() == 0 {
+            if self.port.unread() == 0 {
                 return;
             }
         }
     }
+}
+
+/// What it means that the system refuses something.
+fn failed(operation: &'static str) -> impl FnOnce(io::Error) -> HostError {
+    move |error| HostError::Port(operation, error)
 }
 
 /// What a receiver at another rate makes of characters: framing errors, and values nobody sent. Their top bit is set,
@@ -356,12 +352,11 @@ fn garble(garbage: &mut Rng, bytes: &mut [u8]) {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write;
-
     use super::*;
     use crate::emulator::scenario::Verb;
     use crate::endpoint::{Endpoint, Transmit};
     use crate::host::unit::Answer;
+    use crate::host::unit::memory::MemoryPort;
 
     /// A unit that only listens.
     #[derive(Default)]
@@ -401,17 +396,10 @@ mod tests {
 
     #[test]
     fn a_record_sent_at_once_reaches_the_unit_without_a_gap_however_late_the_slices_come() {
-        let pty = Pty::open(BAUD).expect("a pseudo-terminal");
-        let mut client = std::fs::OpenOptions::new().write(true).open(pty.path()).expect("it opens");
-        let mut host = Host::new(Ear::default(), Hosting::default(), pty, Arc::default());
+        let port = MemoryPort::holding(&[b'S'; 200]);
+        let mut host = Host::new(Ear::default(), Hosting::default(), port, Arc::default());
         host.attended = true;
-        client.write_all(&[b'S'; 200]).expect("written");
-        // The first slice is not before the system has carried them over.
-        let begun = Clock::start();
-        while !host.backlog {
-            assert!(begun.now() < Instant::from_millis(5_000), "they arrive");
-            host.step(Instant::from_millis(1)).expect("a slice");
-        }
+        host.step(Instant::from_millis(1)).expect("a slice");
         for millis in [2, 3, 4, 12, 13, 25] {
             host.catch_up(Instant::from_millis(millis)).expect("slices");
         }

@@ -75,7 +75,7 @@ impl Tree {
                 continue;
             }
             let is_chosen = chosen.iter().any(|chosen| Path::new(path).starts_with(chosen));
-            if is_chosen && path.ends_with(".rs") {
+            if is_chosen && path.ends_with(".rs") && !path.ends_with("/tests.rs") {
                 tree.add(path)?;
                 continue;
             }
