@@ -24,7 +24,7 @@ const QUICK: Duration = Duration::from_millis(200);
 /// Tests that take longer are left out: a survivor would need them all.
 const SLOWEST: Duration = Duration::from_secs(3);
 /// What starting a program and a busy computer may cost, before a mutant is said to hang.
-const GRACE: Duration = Duration::from_secs(3);
+const GRACE: Duration = Duration::from_secs(8);
 
 /// The steps in which a mutant is tried, the cheapest first.
 const STEPS: [&str; 4] = ["what caught its neighbours", "tests of its module", "other quick tests", "slow tests"];
