@@ -23,6 +23,8 @@ struct Object<'a> {
     product: Option<&'a str>,
     version: Option<String>,
     node_id: Option<u8>,
+    /// `false` where all that came behind the Yes is what the menu shows anyway.
+    restart_seen: bool,
 }
 
 /// Restores the defaults.
@@ -36,7 +38,9 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
     confirm("All parameters go back to their factory values and the unit resets itself", global, output)?;
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
-    let result = match talk.ask(Command::RestoreDefaults)? {
+    let outcome = talk.ask(Command::RestoreDefaults)?;
+    let restart_seen = outcome != Outcome::DefaultsTaken;
+    let result = match outcome {
         Outcome::NoAnswer { awaited: awaited @ Awaited::Banner, .. } => {
             let message = format!("the answer Yes has been given, but {awaited}");
             Err(CliError::message(Kind::NoAnswer, message)
@@ -51,10 +55,16 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
     let version = facts.version.as_ref().map(|known| known.value.to_string());
     if output.json {
         let node_id = facts.node_id.as_ref().map(|known| known.value);
-        return output.object(&Object { schema: "axcon.defaults/1", product, version, node_id });
+        return output.object(&Object { schema: "axcon.defaults/1", product, version, node_id, restart_seen });
     }
     let unit = product.unwrap_or("the unit");
     let version = version.map(|version| format!(" V{version}")).unwrap_or_default();
-    output.remark(&format!("axcon: the defaults are restored; {unit}{version} has started anew"));
+    output.remark(&match restart_seen {
+        true => format!("axcon: the defaults are restored; {unit}{version} has started anew"),
+        false => format!(
+            "axcon: {unit}{version} has taken the Yes and shows its menu; whether it has started anew is not to be seen\n  \
+             'axcon dictionary dump' shows its parameters"
+        ),
+    });
     Ok(())
 }

@@ -9,12 +9,15 @@ use super::Global;
 use super::ask::confirm;
 use super::error::{CliError, Kind};
 use super::files::Destination;
+use super::identify::PRE_OPERATIONAL;
+use super::numbers::counted;
 use super::output::{Closed, Output};
 use super::talk::{Ended, Talk};
 use super::{files, link, names};
 use crate::device::Product;
 use crate::dump::{self, Difference, Dump, DumpError};
-use crate::session::Command;
+use crate::session::{Command, DictionaryReading, Outcome, WalkEnd};
+use crate::wire::visible;
 
 /// Arguments of `axcon dictionary`.
 #[derive(Debug, clap::Args)]
@@ -131,8 +134,15 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     let facts = talk.session().facts().clone();
     let unix_millis = talk.calendar().at(talk.now()).as_millisecond();
     talk.close(output);
+    let is_interrupted = matches!(ended, Ended::Finished { interrupted: true, .. });
     let reading = match ended {
-        Ended::Finished { outcome, interrupted: false } => talk.expect_reading(outcome)?,
+        Ended::Finished { outcome: outcome @ Outcome::DictionaryRead(_), .. }
+        | Ended::Finished { outcome, interrupted: false } => {
+            talk.expect_reading(outcome).map_err(|error| match error.kind {
+                Kind::UnitRefused => error.hint(PRE_OPERATIONAL),
+                _ => error,
+            })?
+        }
         Ended::Finished { interrupted: true, .. } => {
             return Err(CliError::message(Kind::Interrupted, "interrupted; the view has been left"));
         }
@@ -162,12 +172,41 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     }
     // That it is not all of it counts, whoever still reads.
     written.or_else(|error| if error.error.is::<Closed>() { Ok(()) } else { Err(error) })?;
-    let message = match talk.is_recorded() {
-        true => "the recording does not show the end of the object dictionary",
-        false => "the unit stopped answering before the end of its object dictionary",
+    if is_interrupted {
+        let message = format!("interrupted; the view has been left; entries read: {}", dump.entries.len());
+        return Err(CliError::message(Kind::Interrupted, message).hint("what was read is written all the same"));
+    }
+    Err(not_all(&reading, &dump, talk.is_recorded()))
+}
+
+/// That a reading is not all there is, and why.
+fn not_all(reading: &DictionaryReading, dump: &Dump, is_recorded: bool) -> CliError {
+    let (missing, entries) = (dump.missing.len(), dump.entries.len());
+    let message = match &reading.end {
+        WalkEnd::NotUnderstood { first } => format!(
+            "the object dictionary is not all understood: {} not, the first is \"{}\"; entries read: {entries}, missing: \
+             {missing}",
+            counted(reading.unrecognised_lines, "line"),
+            visible::line(first.as_bytes()),
+        ),
+        WalkEnd::Restarted => {
+            format!("the unit started anew in the middle of its object dictionary; entries read: {entries}")
+        }
+        WalkEnd::Whole | WalkEnd::Stopped | WalkEnd::Cancelled if is_recorded => {
+            format!("the recording does not show the end of the object dictionary; entries read: {entries}")
+        }
+        WalkEnd::Whole | WalkEnd::Stopped | WalkEnd::Cancelled => {
+            format!("the unit stopped answering before the end of its object dictionary; entries read: {entries}")
+        }
     };
-    Err(CliError::message(Kind::NoAnswer, format!("{message}; entries read: {}", dump.entries.len()))
-        .hint("what was read is written all the same"))
+    let error = CliError::message(Kind::NoAnswer, message).hint("what was read is written all the same");
+    match reading.end {
+        WalkEnd::NotUnderstood { .. } => {
+            error.hint("the recording of this session has every line; 'axcon terminal' shows them")
+        }
+        WalkEnd::Restarted => error.hint("read it again; a unit that resets itself may be short of supply"),
+        WalkEnd::Whole | WalkEnd::Stopped | WalkEnd::Cancelled => error,
+    }
 }
 
 fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), CliError> {

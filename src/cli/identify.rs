@@ -92,13 +92,15 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     } else {
         talk.ask(Command::Identify)?;
     }
-    let deep = match talk.session().facts().state {
-        _ if args.deep && talk.is_recorded() => Some(Deep::read(&mut talk)?),
-        UnitState::Application if args.deep => Some(Deep::read(&mut talk)?),
-        _ => None,
+    let is_deep = args.deep && (talk.is_recorded() || talk.session().facts().state == UnitState::Application);
+    // What else is known of the unit is said all the same.
+    let (deep, unread) = match is_deep.then(|| Deep::read(&mut talk)) {
+        None => (Deep::default(), Ok(())),
+        Some(Ok(deep)) => (deep, Ok(())),
+        Some(Err(error)) if error.kind == Kind::PortGone || error.kind == Kind::Interrupted => return Err(error),
+        Some(Err(error)) => (Deep::default(), Err(error)),
     };
     let facts = talk.session().facts().clone();
-    let deep = deep.unwrap_or_default();
     let unfinished = Desk::of(&talk).note;
     if let Some(note) = &unfinished {
         let Note { product, image, .. } = note;
@@ -119,8 +121,19 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         Ok(())
     };
     talk.close(output);
-    found.and(written)
+    let is_unsaid = facts.product.is_none() || facts.version.is_none();
+    if is_unsaid && facts.state == UnitState::Application && !is_deep && !args.wait && !talk.is_recorded() {
+        output.remark(
+            "axcon: a unit says its product and version at power-up, and not every menu repeats them:\n  \
+             --wait listens for that, --deep reads the product from the object dictionary (scanning may halt meanwhile)",
+        );
+    }
+    found.and(unread).and(written)
 }
+
+/// What to do about a unit that shows no object dictionary (manuals, section 4.1.1).
+pub const PRE_OPERATIONAL: &str = "units show it in the pre-operational state only: switch the unit's power off and on, or \
+                                   set the state by the network's master";
 
 /// What only the object dictionary says.
 #[derive(Clone, Debug, Default)]
@@ -135,7 +148,10 @@ struct Deep {
 impl Deep {
     fn read(talk: &mut Talk) -> Result<Self, CliError> {
         let outcome = talk.ask(Command::ReadDictionary)?;
-        let reading = talk.expect_reading(outcome)?;
+        let reading = talk.expect_reading(outcome).map_err(|error| match error.kind {
+            Kind::UnitRefused => error.hint(PRE_OPERATIONAL),
+            _ => error,
+        })?;
         let entry = |index, sub| reading.entries.iter().find(|entry| entry.at == ObjectAddress::new(index, sub));
         let bits = |index, sub| entry(index, sub)?.value?.as_integer().and_then(|bits| u32::try_from(bits).ok());
         Ok(Deep {

@@ -18,7 +18,7 @@ use crate::dump::Dump;
 use crate::host::clock;
 use crate::monitor::{Monitor, Scrollback};
 use crate::report::Contents;
-use crate::session::{Command, DictionaryReading, Event, Outcome, Session};
+use crate::session::{Awaited, Command, DictionaryReading, Event, Outcome, Session};
 use crate::time::Duration;
 use crate::wire::stream::Source;
 
@@ -147,7 +147,7 @@ impl Findings {
         self.monitor.fold(event, product);
         if let Event::Overheard { reading, .. } = event {
             // What was broken off later does not undo what was read to its end.
-            if reading.complete || self.reading.as_ref().is_none_or(|before| !before.complete) {
+            if reading.is_complete() || self.reading.as_ref().is_none_or(|before| !before.is_complete()) {
                 self.reading = Some((**reading).clone());
             }
         }
@@ -188,10 +188,12 @@ impl Findings {
             return self.listen(talk, seconds);
         }
         let begun = self.ask(talk, Command::StreamOn { source: Source::FieldValue, period: PERIOD }, "the stream");
-        let was_on = matches!(begun, Ok(Some(Outcome::StreamRuns { was_on: true })));
+        let was_on = matches!(begun, Ok(Outcome::StreamRuns { was_on: true }));
         let watched = match begun {
-            Ok(Some(_)) => self.listen(talk, seconds),
-            Ok(None) => Ok(()),
+            Ok(Outcome::StreamRuns { .. }) => self.listen(talk, seconds),
+            // Nothing has been switched on, and nobody knows what the unit would make of another T.
+            Ok(Outcome::NoAnswer { awaited: Awaited::SourceQuestion | Awaited::PeriodQuestion, .. }) => return Ok(()),
+            Ok(_) => Ok(()),
             Err(error) => Err(error),
         };
         // However it ended.
@@ -206,8 +208,8 @@ impl Findings {
         })
     }
 
-    /// Asks for something that the report can do without: `None` if the unit does not show it.
-    fn ask(&mut self, talk: &mut Talk, command: Command, what: &str) -> Result<Option<Outcome>, CliError> {
+    /// Asks for something that the report can do without: where the unit does not show it, it is among what is missing.
+    fn ask(&mut self, talk: &mut Talk, command: Command, what: &str) -> Result<Outcome, CliError> {
         let ended = talk.run(command, |session, event| {
             self.fold(session, event);
             Ok(())
@@ -220,12 +222,9 @@ impl Findings {
         if let Outcome::DictionaryRead(reading) = &outcome {
             self.reading = Some((**reading).clone());
         }
-        match talk.expect_done(&outcome) {
-            Ok(()) => Ok(Some(outcome)),
-            Err(error) => {
-                self.missing.push(format!("Not found out: {what}. {error}."));
-                Ok(None)
-            }
+        if let Err(error) = talk.expect_done(&outcome) {
+            self.missing.push(format!("Not found out: {what}. {error}."));
         }
+        Ok(outcome)
     }
 }

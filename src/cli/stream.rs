@@ -274,42 +274,68 @@ impl Stream {
     }
 
     fn write_rows(&mut self, output: &mut Output) -> Result<(), CliError> {
-        if let Some(duration) = self.limits.duration
-            && self.until == Instant::NEVER
-        {
-            self.until = self.talk.now() + duration;
-        }
-        let count = self.limits.count;
+        let Limits { count, duration } = self.limits;
         if count.is_some_and(|count| self.sink.rows >= count) {
             return Ok(());
         }
         let mut last = self.talk.now();
         loop {
+            // The first row begins the time.
+            if let Some(duration) = duration
+                && self.until == Instant::NEVER
+                && self.sink.rows > 0
+            {
+                self.until = last + duration;
+            }
+            let awaits_first = duration.is_some() && self.until == Instant::NEVER;
             // A recording ends by itself.
             let silent_at = if self.talk.is_recorded() { Instant::NEVER } else { last + self.patience };
             let before = self.sink.rows;
             let sink = &mut self.sink;
+            let mut has_all = false;
             let undisturbed = self.talk.listen(self.until.min(silent_at), |session, event| {
                 if let Event::Row { at, span, row } = event {
                     sink.row(*at, row, &session.record().bytes(*span), output)?;
                     last = *at;
                 }
-                Ok(if count.is_some_and(|count| sink.rows >= count) {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                })
+                has_all = count.is_some_and(|count| sink.rows >= count) || (awaits_first && sink.rows > 0);
+                Ok(if has_all { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             })?;
             let is_enough = count.is_some_and(|count| self.sink.rows >= count);
-            if !undisturbed && !is_enough {
+            if !undisturbed && !has_all {
                 return self.had_enough();
             }
-            if is_enough || self.talk.is_recorded() || self.until <= self.talk.now() {
+            if !is_enough && awaits_first && self.sink.rows > 0 {
+                continue;
+            }
+            if is_enough || self.until <= self.talk.now() {
                 return Ok(());
+            }
+            if self.talk.is_recorded() {
+                return self.recording_is_over(output);
             }
             if self.sink.rows == before && last + self.patience <= self.talk.now() {
                 return Err(self.no_rows());
             }
+        }
+    }
+
+    /// A recording has no more rows than it has.
+    fn recording_is_over(&self, output: &mut Output) -> Result<(), CliError> {
+        let rows = counted(self.sink.rows, "row");
+        match (self.sink.rows, self.limits.count) {
+            (0, _) => {
+                let what = self.sink.source.map_or("", |source| match source {
+                    Source::FieldValue => " with field values",
+                    Source::ProcessValue => " with process values",
+                });
+                Err(CliError::message(Kind::NoAnswer, format!("the recording has no row of the stream{what}")))
+            }
+            (_, Some(count)) => {
+                output.remark(&format!("axcon: the recording has no more: {rows} of {count} written"));
+                Ok(())
+            }
+            _ => Ok(()),
         }
     }
 
@@ -380,10 +406,18 @@ pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
     Ok(first.zip(last).map(|(begun, (ended, source))| {
         let period = (rows > 1).then(|| ended.since(begun) / (rows - 1));
         // Rows come at whole milliseconds; the clock that saw them is not that exact.
-        let period =
-            period.map(|period| Duration::from_millis((period.as_secs_f64() * 1000.0).round().max(1.0) as u64));
+        let period = period.map(|period| Duration::from_millis(likely_millis(period)));
         Found { source, period }
     }))
+}
+
+/// What a person will have typed where this is measured: the roundest number within a hundredth and a millisecond.
+fn likely_millis(period: Duration) -> u64 {
+    const STEPS: [u64; 6] = [1000, 500, 100, 50, 10, 5];
+    let measured = period.as_secs_f64() * 1000.0;
+    let round = STEPS.into_iter().map(|step| (measured / step as f64).round() as u64 * step);
+    let is_close = |millis: &u64| *millis > 0 && (*millis as f64 - measured).abs() <= (measured / 100.0).max(1.0);
+    round.filter(is_close).next().unwrap_or((measured.round() as u64).max(1))
 }
 
 /// Puts the stream back to what it was.

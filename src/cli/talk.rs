@@ -406,9 +406,11 @@ impl Talk {
     /// If the outcome is not what was wanted.
     pub fn expect_done(&self, outcome: &Outcome) -> Result<(), CliError> {
         let (error, heard) = match outcome {
-            Outcome::Identified | Outcome::Done(_) | Outcome::StreamRuns { .. } | Outcome::DictionaryRead(_) => {
-                return Ok(());
-            }
+            Outcome::Identified
+            | Outcome::Done(_)
+            | Outcome::DefaultsTaken
+            | Outcome::StreamRuns { .. }
+            | Outcome::DictionaryRead(_) => return Ok(()),
             Outcome::Cancelled(_) => return Err(CliError::interrupted()),
             Outcome::Loaded(report) => return Err(CliError::message(Kind::Failed, report.what.clone())),
             Outcome::FileSent { end: FileEnd::Whole, .. } => return Ok(()),
@@ -460,17 +462,20 @@ impl Talk {
     }
 }
 
-/// The error of a job that has waited in vain. Only a question that did not come was left as it stood; a row or a page
-/// is awaited when the unit has been told already.
+/// The error of a job that has waited in vain. A question that was not understood is left, and what its unit makes of
+/// that nobody knows; a row or a page is awaited when the unit has been told already.
 fn unanswered(awaited: Awaited) -> CliError {
     let message = format!("the unit did not answer as expected: {awaited}");
     let error = CliError::message(Kind::NoAnswer, message);
-    if matches!(awaited, Awaited::SourceQuestion | Awaited::PeriodQuestion | Awaited::DefaultsQuestion) {
-        error
-            .hint("no guess was made: the question was left with Enter, and nothing is changed")
-            .hint("'axcon terminal' shows what the unit prints, and takes the answer by hand")
-    } else {
-        error.hint("'axcon terminal' shows what the unit prints")
+    const BY_HAND: &str = "'axcon terminal' shows what the unit prints, and takes the answer by hand";
+    match awaited {
+        Awaited::SourceQuestion | Awaited::PeriodQuestion => error
+            .hint("no guess was made: the question was left with Enter. A unit that then takes a value of its own may keep it")
+            .hint(BY_HAND),
+        Awaited::DefaultsQuestion => {
+            error.hint("no guess was made: whatever the unit asked was answered with No").hint(BY_HAND)
+        }
+        _ => error.hint("'axcon terminal' shows what the unit prints"),
     }
 }
 
@@ -517,14 +522,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_of_a_question_it_is_said_that_nothing_is_changed() {
-        let says_so = |awaited| {
+    fn of_a_question_it_is_said_how_it_was_left() {
+        let hints = |awaited| {
             let error = unanswered(awaited);
             assert_eq!(error.kind, Kind::NoAnswer);
-            error.hints.iter().any(|hint| hint.contains("nothing is changed"))
+            error.hints.join(" ")
         };
-        assert!(says_so(Awaited::SourceQuestion) && says_so(Awaited::DefaultsQuestion));
-        assert!(!says_so(Awaited::Row) && !says_so(Awaited::StreamOff));
+        assert!(hints(Awaited::SourceQuestion).contains("left with Enter"));
+        assert!(hints(Awaited::DefaultsQuestion).contains("answered with No"));
+        assert!(!hints(Awaited::Row).contains("guess") && !hints(Awaited::StreamOff).contains("guess"));
     }
 
     #[test]

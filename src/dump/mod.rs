@@ -139,7 +139,7 @@ impl Dump {
             product: facts.product.as_ref().map(|known| known.value.clone()),
             version: facts.version.as_ref().map(|known| known.value.to_string()),
             factory: false,
-            complete: reading.complete,
+            complete: reading.is_complete(),
             unrecognised_lines: reading.unrecognised_lines,
             entries: entries.collect(),
             missing: missing.collect(),
@@ -362,6 +362,7 @@ pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Fac
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::WalkEnd;
 
     #[test]
     fn what_is_measured_and_shown_as_nothing_is_no_reading() {
@@ -372,7 +373,7 @@ mod tests {
             |value| ReadEntry { at, value, text: "TC1 0xFFFFFFFF".into(), span: Default::default(), known: true };
         let dump = |value| {
             let entries = vec![read(value)];
-            Dump::of(&DictionaryReading { entries, complete: true, unrecognised_lines: 0 }, Some(product), &facts)
+            Dump::of(&DictionaryReading { entries, end: WalkEnd::Whole, unrecognised_lines: 0 }, Some(product), &facts)
         };
         let (nothing, something) = (dump(None), dump(Some(Value::Real32(23.5))));
         assert_eq!(nothing.entries[0].meaning.as_deref(), Some("no reading"));

@@ -1,7 +1,8 @@
-//! Talks with the firmware: switching the stream (T) and restoring the defaults (D).
+//! Talks with the firmware: switching the stream (T).
 //!
 //! Questions are answered by what they offer. Where a question is not understood the job leaves the dialogue, with
-//! Enter and no answer, and says what it was waiting for; it never guesses.
+//! Enter and no answer, and says what it was waiting for; it never guesses. A unit may take the Enter for a value that it
+//! offers itself, and stream: then it is switched off again.
 
 use super::event::{Awaited, Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
@@ -24,8 +25,10 @@ const MOST_TOGGLES: u32 = 3;
 const TAKEN: Duration = Duration::from_millis(600);
 /// No values come for 3 s after power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO): rows may take that long.
 pub(super) const FIRST_VALUES: Duration = Duration::from_secs(6);
-/// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
-const RESET: Duration = Duration::from_secs(10);
+/// How long behind a question that was left its unit may ask another one, or begin to stream all the same.
+const LEFT: Duration = Duration::from_millis(2500);
+/// Questions that are left one behind the other.
+const MOST_LEFT: u32 = 3;
 
 /// Switches the stream on.
 #[derive(Debug)]
@@ -50,6 +53,8 @@ enum OnStage {
     Period { again: bool },
     /// Nobody has refused it: the stream is on, and its first row proves that.
     Row,
+    /// A question was not understood and has been left, as this many before it.
+    Left { awaited: Awaited, questions: u32, heard: Option<Span> },
 }
 
 impl StreamOn {
@@ -85,7 +90,13 @@ impl StreamOn {
                 desk.leave_dialogue();
                 return Some(self.refused(desk));
             }
-            (OnStage::Toggled, Message::Prompt(_)) => return Some(self.give_up(desk)),
+            (OnStage::Toggled, Message::Prompt(_)) => return self.give_up(desk),
+            // It has taken the Enter for its own values. One that streamed before does so again, as it was found.
+            (OnStage::Left { .. }, Message::Row(_)) if !self.was_on => {
+                desk.send(b"t");
+                desk.facts.stream = None;
+                return Some(self.left());
+            }
             (OnStage::Toggled, Message::Row(_)) => {}
             (OnStage::Toggled, _) => {
                 let soon = desk.now + NO_QUESTION;
@@ -124,7 +135,14 @@ impl StreamOn {
                 self.deadline = Some(desk.now + FIRST_VALUES + self.period * 2);
                 None
             }
-            OnStage::Toggled | OnStage::Source { enter_sent: true } | OnStage::Row => Some(self.give_up(desk)),
+            OnStage::Left { awaited, questions, heard } if desk.pending.is_some() && questions < MOST_LEFT => {
+                desk.leave_dialogue();
+                self.stage = OnStage::Left { awaited, questions: questions + 1, heard };
+                self.deadline = Some(desk.now + LEFT);
+                None
+            }
+            OnStage::Left { .. } => Some(self.left()),
+            OnStage::Toggled | OnStage::Source { enter_sent: true } | OnStage::Row => self.give_up(desk),
         }
     }
 
@@ -138,22 +156,37 @@ impl StreamOn {
 
     /// Whether the unit has a question open.
     fn is_asked(&self) -> bool {
-        !matches!(self.stage, OnStage::Period { again: false } | OnStage::Row)
+        !matches!(self.stage, OnStage::Period { again: false } | OnStage::Row | OnStage::Left { .. })
     }
 
-    fn give_up(&mut self, desk: &mut Desk<'_>) -> Outcome {
+    fn give_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let awaited = match self.stage {
-            OnStage::Toggled => Awaited::SourceQuestion,
             OnStage::Source { .. } => Awaited::PeriodQuestion,
+            OnStage::Toggled | OnStage::Left { .. } => Awaited::SourceQuestion,
             OnStage::Period { .. } | OnStage::Row => {
                 desk.facts.stream = None;
                 Awaited::Row
             }
         };
-        if self.is_asked() {
-            desk.leave_dialogue();
-        }
         let heard = desk.pending.map(|text| text.span).or(self.heard);
+        if !self.is_asked() {
+            return Some(Outcome::NoAnswer { job: Job::StreamOn, awaited, heard });
+        }
+        desk.leave_dialogue();
+        self.stage = OnStage::Left { awaited, questions: 1, heard };
+        if heard.is_none() {
+            return Some(self.left());
+        }
+        self.deadline = Some(desk.now + LEFT);
+        None
+    }
+
+    /// How it ended, of a question that was left.
+    fn left(&self) -> Outcome {
+        let (awaited, heard) = match self.stage {
+            OnStage::Left { awaited, heard, .. } => (awaited, heard),
+            _ => (Awaited::SourceQuestion, self.heard),
+        };
         Outcome::NoAnswer { job: Job::StreamOn, awaited, heard }
     }
 }
@@ -259,66 +292,6 @@ impl Work for StreamOff {
                 Some(Outcome::Cancelled(Job::StreamOff))
             }
             Signal::LinkLost => Some(Outcome::Cancelled(Job::StreamOff)),
-        }
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        self.deadline
-    }
-}
-
-/// Restores the default object dictionary and waits for the unit to come back.
-#[derive(Debug, Default)]
-pub(super) struct RestoreDefaults {
-    confirmed: bool,
-    deadline: Option<Instant>,
-    heard: Option<Span>,
-}
-
-impl Work for RestoreDefaults {
-    fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
-        match signal {
-            Signal::Begin => {
-                desk.send(b"d");
-                self.deadline = Some(desk.now + ANSWER);
-                None
-            }
-            Signal::Heard(text, message) => {
-                self.heard = Some(text.span);
-                match message {
-                    Message::Prompt(Prompt::ConfirmDefaults) if !self.confirmed => {
-                        desk.send(b"Yes\r");
-                        self.confirmed = true;
-                        self.deadline = Some(desk.now + RESET);
-                        None
-                    }
-                    Message::Refusal if self.confirmed => {
-                        let reason = "the unit did not restore its defaults".into();
-                        Some(Outcome::Refused { job: Job::RestoreDefaults, reason, heard: self.heard })
-                    }
-                    // Only the banner shows that the unit has reset itself.
-                    Message::Software(name) if self.confirmed && name.product.is_some() => {
-                        Some(Outcome::Done(Job::RestoreDefaults))
-                    }
-                    _ => None,
-                }
-            }
-            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => {
-                if !self.confirmed {
-                    desk.leave_dialogue();
-                }
-                let awaited = if self.confirmed { Awaited::Banner } else { Awaited::DefaultsQuestion };
-                let heard = desk.pending.map(|text| text.span).or(self.heard);
-                Some(Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard })
-            }
-            Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
-            Signal::Cancel => {
-                if !self.confirmed {
-                    desk.leave_dialogue();
-                }
-                Some(Outcome::Cancelled(Job::RestoreDefaults))
-            }
-            Signal::LinkLost => Some(Outcome::Cancelled(Job::RestoreDefaults)),
         }
     }
 

@@ -252,6 +252,9 @@ pub enum Outcome {
     Identified,
     /// The job has done what it should.
     Done(Job),
+    /// The unit has taken the Yes that restores its defaults, and shows what its menu shows anyway: that it has started
+    /// anew is not to be seen.
+    DefaultsTaken,
     /// The stream runs as asked; rows have come.
     StreamRuns {
         /// Whether it was on before, with whatever settings.
@@ -341,15 +344,41 @@ pub enum FileEnd {
     LinkLost,
 }
 
+/// How far a walk through the object dictionary came.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum WalkEnd {
+    /// To its end.
+    Whole,
+    /// No further: the unit answered no more, or nobody went on.
+    #[default]
+    Stopped,
+    /// As far as the user wanted.
+    Cancelled,
+    /// The unit started anew in the middle of it.
+    Restarted,
+    /// Perhaps to its end, but lines of it were not understood, and may be the entries that are missing.
+    NotUnderstood {
+        /// The first of them.
+        first: String,
+    },
+}
+
 /// What the unit showed of its object dictionary.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DictionaryReading {
     /// Entries by index and sub-index.
     pub entries: Vec<ReadEntry>,
-    /// Whether the walk came to its end.
-    pub complete: bool,
+    /// How far the walk came.
+    pub end: WalkEnd,
     /// Lines of the view with a number in them that nobody understood: neither an entry nor anything else known.
     pub unrecognised_lines: u64,
+}
+
+impl DictionaryReading {
+    /// Whether this is all that the unit has.
+    pub fn is_complete(&self) -> bool {
+        self.end == WalkEnd::Whole
+    }
 }
 
 /// An entry as the unit showed it.

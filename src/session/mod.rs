@@ -19,6 +19,7 @@ mod overheard;
 mod pages;
 mod password;
 mod redactor;
+mod restore;
 mod sending;
 mod toggled;
 mod transmitter;
@@ -190,7 +191,7 @@ impl Session {
                 (Job::StreamOn, Box::new(console::StreamOn::new(source, period)))
             }
             Command::StreamOff => (Job::StreamOff, Box::new(console::StreamOff::default())),
-            Command::RestoreDefaults => (Job::RestoreDefaults, Box::new(console::RestoreDefaults::default())),
+            Command::RestoreDefaults => (Job::RestoreDefaults, Box::new(restore::RestoreDefaults::default())),
             Command::ReadDictionary => (Job::ReadDictionary, Box::new(dictionary::ReadDictionary::new())),
             Command::Diagnostics { pages } => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::new(pages))),
             Command::DiagnosticsOff => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::off())),

@@ -2,7 +2,7 @@
 
 use super::diagnostics::Page;
 use super::dictionary::Collector;
-use super::event::{Awaited, DictionaryReading, Event, Job, Outcome};
+use super::event::{Awaited, DictionaryReading, Event, Job, Outcome, WalkEnd};
 use super::hearing::MENU_ANSWER;
 use super::job::{Desk, Signal, Work};
 use super::keys::Key;
@@ -39,9 +39,9 @@ impl Dictionary {
         if self.collector.count() == 0 {
             return None;
         }
-        let complete = self.is_complete();
+        let end = if self.is_complete() { WalkEnd::Whole } else { WalkEnd::Stopped };
         let product = self.collector.product;
-        let reading = std::mem::take(&mut self.collector).take(complete);
+        let reading = std::mem::take(&mut self.collector).take(end);
         self.collector.product = product;
         self.left = None;
         Some((self.at, reading))
@@ -55,7 +55,8 @@ impl Dictionary {
     /// one.
     fn keep(&mut self) {
         if let Some(ended) = self.break_off() {
-            let is_better = self.before.as_ref().is_none_or(|(_, before)| !before.complete || ended.1.complete);
+            let is_better =
+                self.before.as_ref().is_none_or(|(_, before)| !before.is_complete() || ended.1.is_complete());
             self.before = if is_better { Some(ended) } else { self.before.take() };
         }
     }
@@ -289,7 +290,7 @@ mod tests {
 
     fn told(reading: &DictionaryReading) -> String {
         let entries: Vec<String> = reading.entries.iter().map(|entry| entry.at.to_string()).collect();
-        format!("{}{}", entries.join(" "), if reading.complete { "" } else { " ..." })
+        format!("{}{}", entries.join(" "), if reading.is_complete() { "" } else { " ..." })
     }
 
     /// The dictionaries that were walked through, to whoever listens to everything: when the last entry came, which ones,

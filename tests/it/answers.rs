@@ -114,7 +114,7 @@ fn a_silent_line_ends_every_job_by_its_own_deadlines() {
     let table = [
         (on(), no_answer(Job::StreamOn, Awaited::SourceQuestion), "0:t 1500:t 3000:~", 3000),
         (Command::StreamOff, no_answer(Job::StreamOff, Awaited::StreamOff), "0:t 1500:m", 3000),
-        (Command::RestoreDefaults, no_answer(Job::RestoreDefaults, Awaited::DefaultsQuestion), "0:d 1500:~", 1500),
+        (Command::RestoreDefaults, no_answer(Job::RestoreDefaults, Awaited::DefaultsQuestion), "0:d 1500:No~", 1500),
         (Command::Diagnostics { pages: Some(1) }, no_answer(Job::Diagnostics, Awaited::Page), "1300:s", 1300 + 6500),
         (
             Command::ReadDictionary,
@@ -244,7 +244,7 @@ fn a_dialogue_that_is_cancelled_is_left_with_enter_and_one_that_is_over_is_not()
         (on(), &stream, ":f", Job::StreamOn, "~"),
         (on(), &stream, ":200~", Job::StreamOn, "200~"),
         (Command::StreamOff, &[], ":t", Job::StreamOff, "~"),
-        (Command::RestoreDefaults, &defaults, ":d", Job::RestoreDefaults, "~"),
+        (Command::RestoreDefaults, &defaults, ":d", Job::RestoreDefaults, "No~"),
         (Command::RestoreDefaults, &defaults, ":Yes~", Job::RestoreDefaults, "Yes~"),
     ];
     for (command, script, behind, job, last) in table {
@@ -360,12 +360,25 @@ fn a_loader_that_wants_a_key_gets_three_and_then_is_asked_who_it_is() {
 #[test]
 fn the_question_for_yes_is_answered_once_and_only_a_banner_is_the_end() {
     let question = "Enter Yes to restore the default object dictionary: ";
-    let script = [("d", 3, question), ("Yes~", 50, "\r\nV1.0.0\r\n"), ("", 2_000, "AXTC4CO V1.1.0\r\n")];
+    let script =
+        [("d", 3, question), ("Yes~", 50, "\r\nV1.0.0\r\n"), ("", 2_000, "AXTC4CO V1.1.0\r\n"), ("m", 5, MENU)];
     let mut alone = Alone::with(&script);
     let (outcome, time) = alone.ask(Command::RestoreDefaults);
     assert_eq!(outcome, Outcome::Done(Job::RestoreDefaults));
     let (at, _) = alone.sent[1];
-    assert_eq!((alone.sent.len(), time), (2, at + 2_000), "a version alone is no banner: {}", alone.log());
+    // It has a second to go on, and so has the menu.
+    assert_eq!((alone.sent.len(), time), (3, at + 4_005), "a version alone is no banner: {}", alone.log());
+    // What the menu shows anyway is none either, and what tells of a failure counts for more than a banner.
+    let restored = |behind: &'static str| {
+        Alone::with(&[("d", 3, question), ("Yes~", 50, behind), ("m", 5, MENU)]).ask(Command::RestoreDefaults).0
+    };
+    assert_eq!(restored(MENU), Outcome::DefaultsTaken);
+    for failed in
+        ["Restoring failed\r\nAXTC4CO V1.1.0\r\n", "EEPROM write error\r\n(c) Axiomatic\r\nAXTC4CO V1.1.0\r\n"]
+    {
+        let Outcome::Refused { reason, .. } = restored(failed) else { panic!("{failed}") };
+        assert!(reason.contains(failed.split("\r").next().expect("a line")), "{reason}");
+    }
     // It never comes back.
     let mut alone = Alone::with(&[("d", 3, question), ("Yes~", 50, question)]);
     let (outcome, time) = alone.ask(Command::RestoreDefaults);

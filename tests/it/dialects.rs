@@ -128,7 +128,7 @@ fn every_dialects_dictionary_is_read_to_the_same_facts() {
         }
         let outcome = bench.ask(Command::ReadDictionary);
         let Outcome::DictionaryRead(reading) = outcome else { return Err(format!("{outcome:?}")) };
-        if !reading.complete {
+        if !reading.is_complete() {
             return Err(format!("not complete, {} entries", reading.entries.len()));
         }
         let mut wrong = Vec::new();

@@ -18,7 +18,7 @@ use crate::host::Input;
 use crate::host::port_link::{PortLink, PortLinkError};
 use crate::host::signal::Signals;
 use crate::host::state::{Contents, Opened, State};
-use crate::host::unit::{self, Answer, HostError, HostedUnit, Hosting, LineRate};
+use crate::host::unit::{self, Answer, Cable, HostError, HostedUnit, Hosting, LineRate};
 use crate::wire::visible;
 
 /// One unit, as the first lines of the output tell it.
@@ -50,7 +50,11 @@ enum News {
         verb: String,
         answer: Answer,
     },
-    /// The cable of a unit is in again.
+    /// The cable of a unit has been pulled.
+    Unplugged {
+        place: usize,
+    },
+    /// It is in again.
     Replugged {
         place: usize,
         pty: PathBuf,
@@ -188,8 +192,11 @@ fn start(
         state,
         seed,
         // The unit's thread must not wait for us: should this be dropped, `unplug` and `plug` bring it again.
-        replugged: Some(Box::new(move |pty| {
-            let _ = plugs.try_send(News::Replugged { place, pty: pty.to_owned() });
+        cable: Some(Box::new(move |cable| {
+            let _ = plugs.try_send(match cable {
+                Cable::Out => News::Unplugged { place },
+                Cable::In(pty) => News::Replugged { place, pty: pty.to_owned() },
+            });
         })),
         failed: Some(Box::new(move |error| {
             let _ = news.send(News::Failed(error));
@@ -260,6 +267,8 @@ fn serve(
                 }
             }
             Ok(News::Answered { place, verb, answer }) => report(place, &verb, &answer, units.len(), output)?,
+            // Its pseudo-terminal's number is somebody else's soon: the link must not lead there.
+            Ok(News::Unplugged { place }) => units[place].link = None,
             Ok(News::Replugged { place, pty }) => {
                 let prefix = prefix(place, units.len());
                 let running = &mut units[place];

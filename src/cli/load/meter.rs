@@ -184,7 +184,6 @@ impl Board {
     /// What a line says now.
     pub fn set(&self, line: usize, text: String) {
         let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let first_word = |text: &str| text.split_whitespace().next().map(str::to_owned);
         let is_news = first_word(&state.lines[line]) != first_word(&text);
         state.lines[line] = text;
         let (columns, rows) = (self.size)();
@@ -197,13 +196,24 @@ impl Board {
             let lines = lines.map(|(name, line)| format!("\r{}\x1b[K\r\n", cut(&format!("{name}  {line}"), room)));
             up + &lines.collect::<String>()
         } else if is_news {
-            format!("{}  {}\n", self.names[line], state.lines[line])
+            let said = match self.on_terminal {
+                true => state.lines[line].clone(),
+                // Without its bar, which only a person looks at.
+                false => state.lines[line]
+                    .split_once(" [")
+                    .map_or_else(|| state.lines[line].clone(), |(phase, _)| format!("{phase} ...")),
+            };
+            format!("{}  {said}\n", self.names[line])
         } else {
             return;
         };
         state.painted = in_place;
         let _ = state.to.write_all(painted.as_bytes()).and_then(|()| state.to.flush());
     }
+}
+
+fn first_word(text: &str) -> Option<&str> {
+    text.split_whitespace().next()
 }
 
 #[cfg(test)]

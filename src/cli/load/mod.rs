@@ -333,7 +333,7 @@ fn plan(
     report: &Report,
     image: &CheckedImage,
     name: &str,
-    Args { loader, pack: packed, .. }: &Args,
+    Args { loader, pack: packed, dry_run, .. }: &Args,
     unit: Option<(&Facts, &str, Option<&Note>)>,
     output: &mut Output,
 ) -> Result<(), CliError> {
@@ -341,11 +341,20 @@ fn plan(
         return Ok(());
     }
     let (loader, packed) = (*loader, *packed);
+    // Of a dry run this is what was asked for.
+    let is_data = *dry_run;
+    let mut say = |line: String| match is_data {
+        true => output.data(format!("{line}\n").as_bytes()),
+        false => {
+            output.remark(&line);
+            Ok(())
+        }
+    };
     let contents = image.identity().map_or_else(
         || "it does not say what it is".to_owned(),
         |identity| format!("{} V{}", identity.product, identity.version),
     );
-    output.remark(&format!("image  {name}: {contents}, {}", counted(report.facts.records, "record")));
+    say(format!("image  {name}: {contents}, {}", counted(report.facts.records, "record")))?;
     if let Some((facts, port, note)) = unit {
         let version = facts.version.as_ref().map_or_else(String::new, |known| format!(" V{}", known.value));
         let unit = match (&facts.product, facts.state) {
@@ -362,7 +371,7 @@ fn plan(
             },
             (None, _) => "does not say what it is".to_owned(),
         };
-        output.remark(&format!("unit   {port}: {unit}"));
+        say(format!("unit   {port}: {unit}"))?;
     }
     let said = unit.and_then(|(facts, ..)| Some(facts.product.as_ref()?.value.as_str()));
     let noted = || unit.and_then(|(_, _, note)| Some(note?.product.as_str()));
@@ -382,8 +391,7 @@ fn plan(
         Some(_) | None => "enter the loader, ",
     };
     let records = size.map_or_else(String::new, |size| format!(" in {} records", size.records_total));
-    output.remark(&format!(
+    say(format!(
         "plan   {enter}send {characters} characters{records} (some {seconds:.0} s), then believe only the new banner"
-    ));
-    Ok(())
+    ))
 }

@@ -96,8 +96,17 @@ pub struct HostedUnit {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Hears what a client opens now that the cable is in again.
-pub type Replugged = Box<dyn FnMut(&Path) + Send>;
+/// What has become of the cable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cable<'a> {
+    /// It has been pulled: what a client opened before is no port any more.
+    Out,
+    /// It is in again; this is what a client opens from then on.
+    In(&'a Path),
+}
+
+/// Hears of the cable.
+pub type CableNews = Box<dyn FnMut(Cable<'_>) + Send>;
 
 /// How a unit is hosted.
 #[derive(Default)]
@@ -110,8 +119,8 @@ pub struct Hosting {
     pub state: Option<State>,
     /// Decides what garbage looks like.
     pub seed: u64,
-    /// Called from the unit's thread when a cable that was pulled is in again, with what a client opens from then on.
-    pub replugged: Option<Replugged>,
+    /// Called from the unit's thread when the cable is pulled, and when it is in again.
+    pub cable: Option<CableNews>,
     /// Called once, from the unit's thread, if hosting fails later on.
     pub failed: Option<Box<dyn FnOnce(HostError) + Send>>,
 }

@@ -1,15 +1,18 @@
 //! Entries of the object dictionary from lines, in whatever order and layout they come.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::canopen::ObjectAddress;
 use crate::device::Product;
 use crate::record::Span;
-use crate::session::event::{DictionaryReading, ReadEntry};
+use crate::session::event::{DictionaryReading, ReadEntry, WalkEnd};
 use crate::wire::{Message, Text, dictionary};
 
 /// Entries that are kept at most; and lines, as long as nobody knows whose objects they are.
 const MOST_ENTRIES: usize = 20_000;
+
+/// So many different lines that nobody understands are no titles.
+const MANY_UNREAD: usize = 10;
 
 /// Where an object dictionary says which product it is: its code (manuals, object 1018h).
 const PRODUCT_CODE: ObjectAddress = ObjectAddress::new(0x1018, 2);
@@ -32,6 +35,9 @@ pub(in crate::session) struct Collector {
     pub(in crate::session) product: Option<&'static Product>,
     entries: BTreeMap<ObjectAddress, ReadEntry>,
     unrecognised_lines: u64,
+    /// The same, each once: what a unit repeats hides no entry. And which of them came first.
+    unread: BTreeSet<String>,
+    first_unread: Option<String>,
     /// All lines, as long as the product is not known: with it they say more. And whether they mean something else.
     lines: Vec<(Text, bool)>,
     /// The object whose entries follow.
@@ -53,8 +59,35 @@ impl Collector {
         }
         let read = self.read(text);
         let counts = read == Read::Nothing && !otherwise && may_be_an_entry(&text.text);
-        self.unrecognised_lines += u64::from(counts);
+        if counts {
+            self.unrecognised_lines += 1;
+            self.unread(&text.text);
+        }
         read == Read::Understood
+    }
+
+    fn unread(&mut self, line: &str) {
+        if self.unread.len() < MOST_ENTRIES {
+            let line = line.trim();
+            self.first_unread.get_or_insert_with(|| line.to_owned());
+            self.unread.insert(line.to_owned());
+        }
+    }
+
+    /// How many different lines nobody understood.
+    pub(in crate::session) fn unread_lines(&self) -> usize {
+        self.unread.len()
+    }
+
+    /// The first line that nobody understood, if so many were not that they may well be what is missing. A unit whose
+    /// software lacks objects has titles and hints of its own, but few of them.
+    fn hidden(&self) -> Option<&String> {
+        let missing = match self.product {
+            Some(_) => self.missing(),
+            None => self.count(),
+        };
+        let hides = missing > 0 && self.unread.len() >= missing.min(MANY_UNREAD);
+        self.first_unread.as_ref().filter(|_| hides)
     }
 
     fn read(&mut self, text: &Text) -> Read {
@@ -169,12 +202,16 @@ impl Collector {
         })
     }
 
-    /// Gives what was read, in the order of the addresses.
-    pub(in crate::session) fn take(&mut self, complete: bool) -> DictionaryReading {
+    /// Gives what was read, in the order of the addresses, of a walk that came so far.
+    pub(in crate::session) fn take(&mut self, end: WalkEnd) -> DictionaryReading {
         self.read_again();
+        let end = match (end, self.hidden()) {
+            (WalkEnd::Whole, Some(first)) => WalkEnd::NotUnderstood { first: first.clone() },
+            (end, _) => end,
+        };
         DictionaryReading {
             entries: std::mem::take(&mut self.entries).into_values().collect(),
-            complete,
+            end,
             unrecognised_lines: self.unrecognised_lines,
         }
     }
@@ -217,7 +254,7 @@ mod tests {
 
     /// Addresses and values of what has been read, and the lines that nobody understands.
     fn taken(mut collector: Collector) -> (String, u64) {
-        let reading = collector.take(true);
+        let reading = collector.take(WalkEnd::Whole);
         let shown = |entry: &ReadEntry| match &entry.value {
             Some(value) => format!("{}={value:?}", entry.at),
             None => format!("{}?{}", entry.at, entry.text),
@@ -268,6 +305,24 @@ mod tests {
         assert_eq!(collector.product_shown().map(|(product, _)| product.name.as_str()), Some("AXTC4CO"));
         let (read, unrecognised) = taken(collector);
         assert_eq!((read.as_str(), unrecognised), ("1018:02=Unsigned32(65812) 6126:01=Real32(16.0)", 1));
+    }
+
+    #[test]
+    fn many_lines_that_nobody_understands_hide_entries_and_a_few_titles_do_not() {
+        let whole = "6126h:01 TC1 = 16.000";
+        let ends_as = |unread: &dyn Fn(usize) -> String, count: usize| {
+            let mut collector = of("AXTC4CO");
+            take(&mut collector, &[whole]);
+            (0..count).for_each(|number| take(&mut collector, &[&unread(number)]));
+            collector.take(WalkEnd::Whole).end
+        };
+        let page = |number: usize| format!("page {number} of 40");
+        assert_eq!(ends_as(&page, 9), WalkEnd::Whole);
+        assert_eq!(ends_as(&page, 10), WalkEnd::NotUnderstood { first: "page 0 of 40".into() });
+        assert_eq!(ends_as(&|_| "more than 1 page".into(), 50), WalkEnd::Whole, "the same again and again");
+        let mut collector = of("AXTC4CO");
+        (0..20).for_each(|number| take(&mut collector, &[&page(number)]));
+        assert_eq!(collector.take(WalkEnd::Stopped).end, WalkEnd::Stopped, "it is not the end in any case");
     }
 
     #[test]

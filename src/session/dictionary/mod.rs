@@ -8,7 +8,7 @@ mod collector;
 
 pub(super) use collector::Collector;
 
-use super::event::{Awaited, Event, Job, Known, Origin, Outcome};
+use super::event::{Awaited, Event, Job, Known, Origin, Outcome, WalkEnd};
 use super::job::{Desk, Signal, Work};
 use crate::device::Product;
 use crate::record::Span;
@@ -34,6 +34,9 @@ const MENU_ENTRIES: u32 = 3;
 /// Entries in a hundred that may be missing behind a walk for a second one to be worth its time: what a line loses are
 /// single lines; other software may lack whole objects.
 const LOST_ON_THE_LINE: usize = 10;
+/// Answers in a row that are only lines which nobody understands, before the walk is given up: they may be entries in a
+/// layout of their own, of which others can be read. The largest product has 56 objects.
+const UNREAD_ANSWERS: u32 = 400;
 /// Letters of a prompt at least: fewer are in any half of a line.
 const PROMPT_LETTERS: usize = 3;
 /// How often leaving is tried.
@@ -47,6 +50,12 @@ pub(super) struct ReadDictionary {
     fresh: bool,
     /// The last answer had any text.
     answered: bool,
+    /// The last answer named a product and its version, as a banner does and many a menu.
+    named: bool,
+    /// Lines that nobody understood before the last answer.
+    unread_before: usize,
+    /// Answers in a row that were nothing but new lines of that kind.
+    unread: u32,
     /// Where an entry without a line end ended when it was first looked at.
     unended: Option<u64>,
     /// Answers whose last entry had a line end, and those whose last had none.
@@ -60,8 +69,8 @@ pub(super) struct ReadDictionary {
     steps: u32,
     menu: u32,
     asked_at: Instant,
-    /// The view has been walked through once, and is again.
-    again: bool,
+    /// The view has been walked through once, with so many keys, and is again.
+    again: Option<u32>,
     most_steps: u32,
     deadline: Option<Instant>,
     heard: Option<Span>,
@@ -83,6 +92,9 @@ impl ReadDictionary {
             stage: Stage::Opening,
             fresh: false,
             answered: false,
+            named: false,
+            unread_before: 0,
+            unread: 0,
             unended: None,
             ended: 0,
             not_ended: 0,
@@ -92,7 +104,7 @@ impl ReadDictionary {
             steps: 0,
             menu: 0,
             asked_at: Instant::ZERO,
-            again: false,
+            again: None,
             most_steps: MOST_STEPS,
             deadline: None,
             heard: None,
@@ -105,13 +117,14 @@ impl ReadDictionary {
         let before = self.collector.count();
         let understood = self.collector.line(text, message);
         // The second time round everything has been read before.
-        self.fresh |= self.collector.count() > before || (self.again && understood);
+        self.fresh |= self.collector.count() > before || (self.again.is_some() && understood);
         understood
     }
 
     fn step(&mut self, desk: &mut Desk<'_>) {
         self.steps += 1;
-        (self.fresh, self.answered) = (false, false);
+        (self.fresh, self.answered, self.named) = (false, false, false);
+        self.unread_before = self.collector.unread_lines();
         desk.send(b"\r");
         self.stage = Stage::Walking;
         self.asked_at = desk.now;
@@ -132,16 +145,19 @@ impl ReadDictionary {
         self.deadline = Some(desk.now + QUIET);
     }
 
-    /// Opens the view once more if the line has lost some of it.
+    /// Opens the view once more if the line has lost some of it, or if it may have been a banner that ended it: a unit
+    /// that starts anew does not do so in the same place twice.
     fn walks_again(&mut self, desk: &mut Desk<'_>) -> bool {
         let (missing, count) = (self.collector.missing(), self.collector.count());
-        if self.again || missing == 0 || missing * 100 > count * LOST_ON_THE_LINE {
+        let is_little = missing * 100 <= count * LOST_ON_THE_LINE;
+        if self.again.is_some() || missing == 0 || !(is_little || self.named) {
             return false;
         }
-        self.again = true;
-        self.most_steps = self.steps + IDLE_ANSWERS;
+        self.again = Some(self.steps);
+        self.most_steps = if self.named { MOST_STEPS } else { self.steps + IDLE_ANSWERS };
         self.collector.interrupt();
         (self.fresh, self.answered, self.unended, self.idle, self.steps, self.menu) = (false, false, None, 0, 0, 0);
+        (self.named, self.unread) = (false, 0);
         desk.send(b"v");
         self.stage = Stage::Opening;
         self.asked_at = desk.now;
@@ -149,12 +165,22 @@ impl ReadDictionary {
         true
     }
 
-    fn finished(&mut self, complete: bool, desk: &mut Desk<'_>) -> Outcome {
+    /// The menu is back: by itself at the end of the view, or because the unit has started anew.
+    fn back_at_menu(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if self.walks_again(desk) {
+            return None;
+        }
+        let is_start =
+            self.named && self.collector.missing() > 0 && self.again.is_some_and(|steps| steps != self.steps);
+        Some(self.finished(if is_start { WalkEnd::Restarted } else { WalkEnd::Whole }, desk))
+    }
+
+    fn finished(&mut self, end: WalkEnd, desk: &mut Desk<'_>) -> Outcome {
         // Not every menu names its unit.
         if let (None, Some((product, span))) = (&desk.facts.product, self.collector.product_shown()) {
             desk.facts.product = Some(Known { value: product.name.clone(), origin: Origin::Dictionary, span });
         }
-        Outcome::DictionaryRead(Box::new(self.collector.take(complete)))
+        Outcome::DictionaryRead(Box::new(self.collector.take(end)))
     }
 
     fn no_answer(&self, awaited: Awaited) -> Outcome {
@@ -225,22 +251,25 @@ impl ReadDictionary {
                 None
             }
             Stage::Walking => {
-                self.idle = if self.fresh { 0 } else { self.idle + 1 };
+                let is_unread = !self.fresh && self.collector.unread_lines() > self.unread_before;
+                self.unread = if is_unread { self.unread + 1 } else { 0 };
+                let goes_on = self.fresh || (is_unread && self.collector.count() > 0 && self.unread < UNREAD_ANSWERS);
+                self.idle = if goes_on { 0 } else { self.idle + 1 };
                 if menu_is_back && !self.fresh {
-                    return (!self.walks_again(desk)).then(|| self.finished(true, desk));
+                    return self.back_at_menu(desk);
                 }
                 if self.idle >= IDLE_ANSWERS || self.steps >= self.most_steps {
-                    let complete = self.again || self.answered && self.steps < self.most_steps;
+                    let is_whole = self.again.is_some() || self.answered && self.steps < self.most_steps;
                     let outcome = if self.collector.count() == 0 {
                         self.no_answer(Awaited::Entry)
                     } else {
-                        self.finished(complete, desk)
+                        self.finished(if is_whole { WalkEnd::Whole } else { WalkEnd::Stopped }, desk)
                     };
                     self.leave(desk, outcome);
                     return None;
                 }
                 if menu_is_back {
-                    return (!self.walks_again(desk)).then(|| self.finished(true, desk));
+                    return self.back_at_menu(desk);
                 }
                 self.step(desk);
                 None
@@ -277,6 +306,8 @@ impl Work for ReadDictionary {
             Signal::Heard(text, message) => {
                 self.heard = Some(text.span);
                 self.deadline = Some((desk.now + QUIET).min(self.asked_at + LONGEST_ANSWER));
+                self.named |=
+                    matches!(message, Message::Software(name) if name.product.is_some() && name.version.is_some());
                 match (message, &self.stage) {
                     (Message::MenuKey(key), _) => self.menu |= 1 << (*key as u32),
                     (_, Stage::Leaving { .. }) => {}
@@ -302,7 +333,11 @@ impl Work for ReadDictionary {
             Signal::Tick => None,
             Signal::Cancel => {
                 if !matches!(self.stage, Stage::Leaving { .. }) {
-                    self.leave(desk, Outcome::Cancelled(Job::ReadDictionary));
+                    let outcome = match self.collector.count() {
+                        0 => Outcome::Cancelled(Job::ReadDictionary),
+                        _ => self.finished(WalkEnd::Cancelled, desk),
+                    };
+                    self.leave(desk, outcome);
                 }
                 None
             }

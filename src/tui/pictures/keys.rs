@@ -7,7 +7,7 @@ use ratatui::crossterm::event::{
 use super::stage::*;
 use crate::canopen::{ObjectAddress, Value};
 use crate::record::Span;
-use crate::session::{DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry};
+use crate::session::{DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry, WalkEnd};
 use crate::time::Duration;
 use crate::tui::{Effect, Input, LinkInfo, Pace, Playback, Playing};
 use crate::wire::stream::Source;
@@ -100,7 +100,7 @@ fn a_dictionary_of_no_known_product_is_compared_with_nothing_until_it_is_known()
     let at = ObjectAddress::new(0x6110, 2);
     let value = Some(Value::Unsigned16(2));
     let entry = ReadEntry { at, value, text: "type = 2".into(), span: Span::default(), known: true };
-    let reading = DictionaryReading { entries: vec![entry], complete: true, unrecognised_lines: 0 };
+    let reading = DictionaryReading { entries: vec![entry], end: WalkEnd::Whole, unrecognised_lines: 0 };
     stage.finished(Outcome::DictionaryRead(Box::new(reading)));
     assert!(stage.shows("1 of 1, compared with nothing") && !stage.shows("not as"), "{}", stage.picture());
     stage.keys("o");

@@ -16,6 +16,7 @@ use crate::image::{DefectId, make};
 use crate::record::Span;
 use crate::session::{
     DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, UnitState, Verdict,
+    WalkEnd,
 };
 use crate::time::{Duration, Instant};
 use crate::tui::{
@@ -149,7 +150,7 @@ impl Stage {
         };
         let entries = axtc4co().dictionary.entries().filter(|(at, _, _)| *at != ObjectAddress::new(0x5010, 0));
         let reading =
-            DictionaryReading { entries: entries.map(reading).collect(), complete: true, unrecognised_lines: 3 };
+            DictionaryReading { entries: entries.map(reading).collect(), end: WalkEnd::Whole, unrecognised_lines: 3 };
         stage.fold(Event::Finished(Outcome::DictionaryRead(Box::new(reading))));
         stage
     }

@@ -8,7 +8,9 @@ use crate::device::Product;
 use crate::dump::Dump;
 use crate::image::DefectId;
 use crate::record::Span;
-use crate::session::{Awaited, DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry, UnitState};
+use crate::session::{
+    Awaited, DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry, UnitState, WalkEnd,
+};
 use crate::tui::popup::ORDERS;
 use crate::tui::{Effect, Input, LinkInfo};
 use crate::wire::stream::Source;
@@ -326,8 +328,10 @@ fn one_is_one_and_not_ones() {
     stage.keys("v").press(KeyCode::Enter);
     let at = ObjectAddress::new(0x1001, 0);
     let entry = ReadEntry { at, value: None, text: "?".into(), span: Span::default(), known: true };
-    for (complete, told) in [(true, "The dictionary is read: 1 entry, "), (false, "was shown: 1 entry was read.")] {
-        let reading = DictionaryReading { entries: vec![entry.clone()], complete, unrecognised_lines: 0 };
+    let ends =
+        [(WalkEnd::Whole, "The dictionary is read: 1 entry, "), (WalkEnd::Stopped, "was shown: 1 entry was read.")];
+    for (end, told) in ends {
+        let reading = DictionaryReading { entries: vec![entry.clone()], end, unrecognised_lines: 0 };
         stage.finished(Outcome::DictionaryRead(Box::new(reading)));
         assert!(stage.shows(told), "{}", stage.picture());
     }

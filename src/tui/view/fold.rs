@@ -6,9 +6,10 @@ use crate::canopen::{ObjectAddress, Value};
 use crate::dump::Dump;
 use crate::monitor::Mark;
 use crate::record::LINK_LOST;
-use crate::session::{DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitState, Verdict};
+use crate::session::{DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitState, Verdict, WalkEnd};
 use crate::time::Instant;
 use crate::tui::widgets::format;
+use crate::wire::visible;
 
 /// Serial number of the identity object (CiA 301; both manuals, section 3.3).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
@@ -133,10 +134,24 @@ impl View {
                 // Its view was left again.
                 self.viewing = false;
                 self.monitor.stream.interrupt();
-                self.dictionary_read(now, reading);
+                let is_cancelled = reading.end == WalkEnd::Cancelled;
+                // A whole one stays.
+                if !is_cancelled || self.current_dictionary().is_none_or(|read| !read.reading.is_complete()) {
+                    self.dictionary_read(now, reading);
+                }
+                if is_cancelled {
+                    self.tell(Tone::Quiet, format!("Cancelled, {}.", Job::ReadDictionary.doing()));
+                }
             }
             Outcome::Identified => self.identified(),
             // The end of a recording is told by whoever has read it, with its reason.
+            Outcome::DefaultsTaken => {
+                self.outdate_dictionary();
+                self.tell(
+                    Tone::Good,
+                    "The unit has taken the Yes and shows its menu; that it has started anew is not to be seen.",
+                );
+            }
             Outcome::Done(Job::Overhear) => {}
             Outcome::StreamRuns { was_on } => {
                 let period = self.wanted_period.take();
@@ -195,7 +210,7 @@ impl View {
     /// In a recording: what was broken off later does not undo what was read to its end.
     fn dictionary_overheard(&mut self, at: Instant, reading: &DictionaryReading) {
         match self.current_dictionary() {
-            Some(read) if read.reading.complete && !reading.complete => {
+            Some(read) if read.reading.is_complete() && !reading.is_complete() => {
                 self.tell(Tone::Bad, "The object dictionary was read once more, not to its end.");
             }
             _ => self.dictionary_read(at, reading),
@@ -213,8 +228,19 @@ impl View {
             self.tell(Tone::Good, format!("The dictionary is read: {entries}, {compared}."));
         } else {
             let were = if dump.entries.len() == 1 { "was" } else { "were" };
-            let text = format!("Not all of the object dictionary was shown: {entries} {were} read.");
-            self.tell(Tone::Bad, text);
+            self.tell(
+                Tone::Bad,
+                match &reading.end {
+                    WalkEnd::NotUnderstood { first } => {
+                        let first = visible::line(first.as_bytes());
+                        format!("Not all of it is understood, first: \"{first}\". {entries} {were} read.")
+                    }
+                    WalkEnd::Restarted => format!("The unit started anew in the middle of it: {entries} {were} read."),
+                    WalkEnd::Whole | WalkEnd::Stopped | WalkEnd::Cancelled => {
+                        format!("Not all of the object dictionary was shown: {entries} {were} read.")
+                    }
+                },
+            );
         }
         let serial = reading.entries.iter().find(|read| read.at == SERIAL_NUMBER).and_then(|read| read.value);
         self.serial = serial.and_then(Value::as_integer).and_then(|number| u32::try_from(number).ok());

@@ -6,7 +6,7 @@ use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::record::Span;
-use crate::session::{DictionaryReading, Event, Job, Outcome, ReadEntry};
+use crate::session::{DictionaryReading, Event, Job, Outcome, ReadEntry, WalkEnd};
 use crate::tui::Input;
 use crate::tui::pictures::stage::*;
 
@@ -39,7 +39,7 @@ pictures! {
         stage.keys("v").press(KeyCode::Enter);
         let at = ObjectAddress::new(0x1001, 0);
         let entry = ReadEntry { at, value: Some(Value::Unsigned8(0)), text: "Error Register = 0".into(), span: Span::default(), known: true };
-        let reading = DictionaryReading { entries: vec![entry], complete: false, unrecognised_lines: 0 };
+        let reading = DictionaryReading { entries: vec![entry], end: WalkEnd::Stopped, unrecognised_lines: 0 };
         stage.finished(Outcome::DictionaryRead(Box::new(reading)));
         stage
     };

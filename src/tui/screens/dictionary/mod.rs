@@ -339,7 +339,7 @@ impl Dictionary {
                     None => "compared with nothing".into(),
                 });
                 time = Some(format::time_of_day(scene.start_of_day, read.at));
-                Some(match read.reading.complete {
+                Some(match read.reading.is_complete() {
                     true => format!("{shown} of {total}"),
                     false if shown == total => format!("incomplete: {} of {total} read", read.dump.entries.len()),
                     false => format!("{shown} of {total}, incomplete"),
