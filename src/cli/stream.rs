@@ -602,7 +602,18 @@ mod tests {
         assert_eq!(error.to_string(), "no row has come for 0.2 s: the unit does not stream any more");
         assert!(error.hints.iter().any(|hint| hint.contains("stream --off")), "{:?}", error.hints);
         stream.limits.duration = Some(Duration::from_millis(50));
-        assert!(stream.write_rows(&mut nowhere()).is_ok(), "the time that was asked for is over before");
+        assert!(stream.write_rows(&mut nowhere()).is_err(), "a first row begins the time that was asked for");
+        stream.sink.rows = 1;
+        assert!(stream.write_rows(&mut nowhere()).is_ok(), "and now it is over before");
+    }
+
+    #[test]
+    fn a_period_that_was_measured_is_the_one_that_somebody_has_typed() {
+        for (measured_us, millis) in
+            [(703_000, 700), (198_400, 200), (1_003_000, 1_000), (59_600, 60), (473_000, 475), (1_040, 1), (10, 1), (251_000, 250)]
+        {
+            assert_eq!(likely_millis(Duration::from_micros(measured_us)), millis, "{measured_us}");
+        }
     }
 
     #[test]
