@@ -8,9 +8,9 @@ use super::job::Signal;
 use super::redactor::Piece;
 use super::watching::Saw;
 use crate::endpoint::Secrecy;
-use crate::record::Direction;
+use crate::record::{Direction, REDACTED};
 use crate::time::{Duration, Instant};
-use crate::wire::{Confidence, Item, LoaderText, Message, NmtState, Prompt, Text};
+use crate::wire::{Confidence, Item, LoaderText, MenuKey, Message, NmtState, Prompt, Text};
 
 /// Silence behind a text without a line end that makes a prompt of it: several character times, and more than an
 /// adapter's latency of 16 ms.
@@ -45,8 +45,7 @@ impl PromptWatch {
 }
 
 impl Session {
-    /// Appends to the record; what may echo the password is secret up to the next line end, and the password itself
-    /// wherever it stands.
+    /// Appends to the record; the echo of the password is secret, and the password itself wherever it stands.
     pub(super) fn append(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -64,12 +63,12 @@ impl Session {
 
     fn take_in(&mut self, pieces: Vec<Piece>) {
         for (bytes, secrecy) in pieces {
-            if secrecy == Secrecy::Secret {
-                let from = self.record.received();
-                self.password.received(from..from + bytes.len() as u64);
-            }
             self.record.push(self.dated, Direction::FromUnit, secrecy, &bytes);
-            self.frame(&bytes);
+            // What is read from here on is what the record shows.
+            match secrecy {
+                Secrecy::Open => self.frame(&bytes),
+                Secrecy::Secret => self.frame(&vec![REDACTED; bytes.len()]),
+            }
         }
     }
 
@@ -90,7 +89,7 @@ impl Session {
         let asks_password = pending.as_ref().is_some_and(|text| {
             text.text.len() <= LONGEST_PROMPT
                 && text.span.end > self.prompt.seen
-                && self.vocabulary.asks_password(&text.text)
+                && self.vocabulary.asks_password(&text.text, self.is_behind_load())
         });
         if asks_password {
             self.password.question();
@@ -125,16 +124,11 @@ impl Session {
             }
             let row = Text { text: text.text.split_off(at), ..text.clone() };
             if !self.prompt.was(&text) {
-                self.hear_line(text, Message::Prompt(prompt));
+                self.heard(text, Message::Prompt(prompt));
             }
             text = row;
         }
         let message = self.understand(&text.text);
-        self.hear_line(text, message);
-    }
-
-    fn hear_line(&mut self, mut text: Text, message: Message) {
-        self.password.conceal(&mut text);
         self.heard(text, message);
     }
 
@@ -144,15 +138,22 @@ impl Session {
         let Some(mut text) = self.framer.pending() else { return };
         self.password.scrub(&mut text.text);
         self.prompt.seen = text.span.end;
+        let is_password = self.vocabulary.asks_password(&text.text, self.is_behind_load());
         let message = match self.vocabulary.prompt(&text.text) {
+            _ if is_password => Message::Prompt(Prompt::Password),
             Some(prompt) => Message::Prompt(prompt),
             None => self.understand(&text.text),
         };
-        self.password.conceal(&mut text);
         if message != Message::Text {
             self.prompt.heard = Some(text.clone());
             self.heard(text, message);
         }
+    }
+
+    /// L has been sent, and nothing has been answered since: a question that comes now is that for the password, or leads
+    /// to it.
+    fn is_behind_load(&self) -> bool {
+        self.keys.question() == Some(MenuKey::Load)
     }
 
     /// No sign of the stream has come for so long that it has stopped.

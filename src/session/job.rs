@@ -66,7 +66,7 @@ impl Desk<'_> {
     pub(super) fn send_secret(&mut self, secret: &[u8]) {
         self.transmitter.push_piece(Transmit { bytes: secret.to_vec(), secrecy: Secrecy::Secret });
         self.transmitter.push_piece(Transmit::open(*b"\r"));
-        self.password.sent();
+        self.password.sent(secret);
         self.cut = true;
     }
 

@@ -8,6 +8,7 @@ mod console;
 mod diagnostics;
 mod dialogue;
 mod dictionary;
+mod echo;
 mod event;
 #[doc(hidden)]
 pub mod flaw;
@@ -392,7 +393,7 @@ impl Session {
     /// Words without a line end behind them, the last thing the unit has printed.
     fn pending(&self) -> Option<Text> {
         let mut text = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric))?;
-        self.password.conceal(&mut text);
+        self.password.scrub(&mut text.text);
         Some(text)
     }
 

@@ -5,23 +5,20 @@
 //!   and its end; rows of the stream that go on meanwhile are no end.
 //! - *The keys.* Behind an L of the menu what follows up to Enter may be the password, even if the unit asks for it in
 //!   words that nobody knows; and a password that has been begun is one up to its Enter, whatever becomes of the question.
-//! - *The answers.* What comes behind a secret that was typed or sent may be its echo, in whatever form, up to the end of
-//!   the line. Wherever else the unit repeats it, the [`Redactor`] finds it.
+//! - *The answers.* Behind a secret that was typed or sent comes its echo, up to the end of the line: the [`Echo`] tells
+//!   it from what the unit says itself. Wherever else the unit repeats it, the [`Redactor`] finds it.
 //!
 //! What holds whatever happens:
 //! - What has been called secret is never called open later, and nothing that is typed or received is lost by being secret.
 //! - A limit makes more secret, never less: what is typed beyond [`LONGEST`] is as secret as what is before it.
 //! - It has no `Debug`, so that nothing that holds it can be printed with the password in it.
 
-use std::ops::Range;
-
 use zeroize::Zeroizing;
 
+use super::echo::Echo;
 use super::redactor::{LONGEST, Piece, Redactor};
 use crate::endpoint::Secrecy;
-use crate::record::REDACTED;
 use crate::time::{Duration, Instant};
-use crate::wire::Text;
 
 /// How long bytes that may be the beginning of the password wait for the next ones.
 const ECHO_QUIET: Duration = Duration::from_millis(30);
@@ -31,14 +28,13 @@ const ECHO_QUIET: Duration = Duration::from_millis(30);
 pub(super) struct PasswordGuard {
     /// The unit asks for the password.
     asked: bool,
-    /// A password has been typed or sent, and the unit may echo it: what comes is secret until its line ends.
+    /// A password has been typed or sent, and the unit may echo it until its line ends.
     echoes: bool,
+    echo: Echo,
     typed: Typed,
     redactor: Redactor,
-    /// When bytes that the redactor keeps back are handed out.
+    /// When bytes that are kept back are handed out.
     due: Option<Instant>,
-    /// Where in what was received the last secret lies.
-    received: Range<u64>,
 }
 
 /// What has been typed by hand since the last Enter.
@@ -132,9 +128,17 @@ impl PasswordGuard {
         };
         self.typed = match typed {
             Typed::Secret(mut secret) => {
+                if !stroke.keys.is_empty() {
+                    // What is typed behind a password whose echo has not ended may come back with it.
+                    if !self.echoes && secret.is_empty() {
+                        self.echo.begin();
+                    }
+                    self.echo.typed(stroke.keys);
+                    self.echoes = true;
+                }
                 secret.type_in(stroke.keys);
-                self.echoes |= !stroke.keys.is_empty();
                 if !stroke.enter.is_empty() {
+                    self.echo.entered();
                     self.redactor.look_for(&secret.kept);
                 }
                 Typed::Secret(secret)
@@ -154,8 +158,11 @@ impl PasswordGuard {
         }
     }
 
-    /// A secret has been queued by a job: what comes back until the next line end may echo it.
-    pub(super) fn sent(&mut self) {
+    /// This secret has been queued by a job: what comes back until the next line end may echo it.
+    pub(super) fn sent(&mut self, secret: &[u8]) {
+        self.echo.begin();
+        self.echo.typed(secret);
+        self.echo.entered();
         self.echoes = true;
     }
 
@@ -163,23 +170,41 @@ impl PasswordGuard {
     /// none are left: each time what was given has been looked at first, since a job may answer to it with a secret.
     pub(super) fn take(&mut self, bytes: &mut &[u8]) -> Vec<Piece> {
         let is_line_end = |byte: &u8| matches!(byte, b'\r' | b'\n');
-        if self.echoes && bytes.first().is_some_and(is_line_end) {
-            self.echoes = false;
-        }
         if !self.echoes {
-            return self.redactor.push(std::mem::take(bytes));
+            let pieces = self.echo.flush();
+            let mut pieces = self.redact(pieces);
+            pieces.extend(self.redactor.push(std::mem::take(bytes)));
+            return pieces;
         }
         let end = bytes.iter().position(is_line_end).unwrap_or(bytes.len());
-        let (echo, rest) = bytes.split_at(end);
+        let (line, rest) = bytes.split_at(end);
         *bytes = rest;
-        let mut pieces = self.hand_out();
-        pieces.push((echo.to_vec(), Secrecy::Secret));
-        pieces
+        let mut pieces = self.echo.push(line);
+        if !rest.is_empty() {
+            self.echo.finish();
+            pieces.extend(self.echo.flush());
+            self.echoes = false;
+        }
+        self.redact(pieces)
+    }
+
+    /// What is no echo may hold the password all the same, or another one.
+    fn redact(&mut self, pieces: Vec<Piece>) -> Vec<Piece> {
+        let mut redacted = Vec::new();
+        for (bytes, secrecy) in pieces {
+            if secrecy == Secrecy::Open {
+                redacted.extend(self.redactor.push(&bytes));
+            } else {
+                redacted.extend(self.redactor.flush());
+                redacted.push((bytes, secrecy));
+            }
+        }
+        redacted
     }
 
     /// All that has come has been taken: what is kept back waits for a moment from now on.
     pub(super) fn wait_for_more(&mut self, now: Instant) {
-        self.due = self.redactor.keeps_back().then(|| now + ECHO_QUIET);
+        self.due = (self.echo.keeps_back() || self.redactor.keeps_back()).then(|| now + ECHO_QUIET);
     }
 
     /// When what is kept back is to be [handed out](PasswordGuard::hand_out).
@@ -190,21 +215,10 @@ impl PasswordGuard {
     /// What looked like the beginning of the password has stood still for long enough.
     pub(super) fn hand_out(&mut self) -> Vec<Piece> {
         self.due = None;
-        self.redactor.flush()
-    }
-
-    /// Secret bytes lie here in what was received. Those that follow upon each other are one echo.
-    pub(super) fn received(&mut self, secret: Range<u64>) {
-        let begins = if self.received.end == secret.start { self.received.start } else { secret.start };
-        self.received = begins..secret.end;
-    }
-
-    /// Makes a text unreadable that may be an echo of the password, in whatever form the unit or the line gave it.
-    pub(super) fn conceal(&self, text: &mut Text) {
-        if text.span.start < self.received.end && self.received.start < text.span.end {
-            let star = |c: char| if c.is_whitespace() { c } else { char::from(REDACTED) };
-            text.text = text.text.chars().map(star).collect();
-        }
+        let pieces = self.echo.flush();
+        let mut pieces = self.redact(pieces);
+        pieces.extend(self.redactor.flush());
+        pieces
     }
 
     /// Replaces the password in a text.
@@ -250,7 +264,7 @@ impl TypedSecret {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Span;
+    use crate::record::REDACTED;
 
     /// Types it, and gives what of it is secret as stars.
     fn type_in(guard: &mut PasswordGuard, typed: &str) -> String {
@@ -324,14 +338,29 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_is_secret_in_any_form_up_to_the_end_of_its_line() {
+    fn an_echo_is_secret_in_any_form_and_what_the_unit_says_around_it_is_not() {
         let mut guard = PasswordGuard::default();
         guard.look_for(b"AXIO-2010");
         assert_eq!(hear(&mut guard, "so AXIO-2010, and AX"), "so *********, and ");
-        guard.sent();
-        assert_eq!(hear(&mut guard, "io"), "AX**", "what was kept back comes first");
-        assert_eq!(hear(&mut guard, "-2010 ok"), "********");
-        assert_eq!(hear(&mut guard, "\rok"), "\rok");
+        guard.sent(b"AXIO-2010");
+        assert_eq!(hear(&mut guard, "io"), "", "it may be its beginning");
+        assert_eq!(guard.due(), Some(Instant::ZERO + ECHO_QUIET));
+        assert_eq!(shown(guard.hand_out()), "AX**", "what was kept back comes first");
+        assert_eq!(hear(&mut guard, "-2010 ok."), "***** ok.");
+        assert_eq!(hear(&mut guard, "\rio"), "\rio");
+        assert!(!guard.is_open());
+        // A unit that echoes nothing, not even the line end, and says it again on the same line.
+        guard.sent(b"AXIO-2010");
+        assert_eq!(hear(&mut guard, "Axis: no AXIO-2010 here\r\n"), "Axis: no ********* here\r\n");
+    }
+
+    #[test]
+    fn what_was_kept_back_of_an_echo_when_the_link_was_lost_comes_first() {
+        let mut guard = PasswordGuard::default();
+        guard.sent(b"AXIO-2010");
+        assert_eq!(hear(&mut guard, "AX"), "");
+        guard.cut_off();
+        assert_eq!(hear(&mut guard, "Hello"), "**Hello");
     }
 
     #[test]
@@ -366,18 +395,5 @@ mod tests {
         assert!(!guard.is_open());
         assert_eq!(type_in(&mut guard, "mlAXIO-2010\r"), "ml*********/");
         assert_eq!(hear(&mut guard, "\r\nAXIO-2010"), "\r\n*********", "and not AXIAXIO-2010");
-    }
-
-    #[test]
-    fn a_text_that_touches_an_echo_is_concealed() {
-        let mut guard = PasswordGuard::default();
-        guard.received(10..14);
-        guard.received(14..18);
-        for (start, end, expected) in [(0, 10, "a b"), (17, 30, "* *"), (18, 30, "a b"), (0, 40, "* *"), (9, 11, "* *")]
-        {
-            let mut text = Text { text: "a b".into(), span: Span { start, end } };
-            guard.conceal(&mut text);
-            assert_eq!(text.text, expected, "{start}..{end}");
-        }
     }
 }

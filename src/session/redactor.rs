@@ -1,7 +1,6 @@
 //! Keeps the password out of the record wherever the unit repeats it.
 //!
-//! Behind the password's own prompt everything is secret up to the end of the line (`password.rs`). This is for the rest:
-//! a unit that says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
+//! Its echo on the line where it was typed is found in whatever form it comes (`echo.rs`). This is for the rest: a unit that says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
 //! next ones tell, for a moment at most: they are handed out when the line has been silent, or when flow control stands
 //! among them, which cannot wait. The password is looked for across either, so no more of it than its first three
 //! characters can be seen.
@@ -13,7 +12,7 @@ use crate::record::REDACTED;
 use crate::wire::{XOFF, XON};
 
 /// A password shorter than this is found in too much that has nothing to do with it, and so is its beginning.
-const SHORTEST: usize = 4;
+pub(super) const SHORTEST: usize = 4;
 /// Longer ones are compared as far as this.
 pub(super) const LONGEST: usize = 128;
 
@@ -120,10 +119,18 @@ impl Redactor {
 
 /// Bytes in their order, those of the same nature together.
 #[derive(Default)]
-struct Pieces(Vec<Piece>);
+pub(super) struct Pieces(Vec<Piece>);
 
 impl Pieces {
-    fn push(&mut self, bytes: &[u8], secrecy: Secrecy) {
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(super) fn into_inner(self) -> Vec<Piece> {
+        self.0
+    }
+
+    pub(super) fn push(&mut self, bytes: &[u8], secrecy: Secrecy) {
         match self.0.last_mut() {
             _ if bytes.is_empty() => {}
             Some((last, nature)) if *nature == secrecy => last.extend_from_slice(bytes),

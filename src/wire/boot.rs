@@ -129,6 +129,46 @@ fn error(line: &str, words: &Words) -> Option<LoaderError> {
     }
 }
 
+/// Whether somebody who takes records says in words of his own that something is wrong.
+pub fn complains(text: &str) -> bool {
+    let words = Words::of(text);
+    // "No errors", "0 errors", "Errors: 0" is what a loader says that counts them; "verified", "verify ok" one that is
+    // content. "Error 0" is a number like any other.
+    let counts_none = |at: usize, word: &str| {
+        let before = at.checked_sub(1).and_then(|at| words.get(at));
+        let beside = before.into_iter().chain(words.get(at + 1));
+        before == Some("no") || word == "errors" && beside.into_iter().any(|word| number(word) == Some(0))
+    };
+    let is_content = words.has_any(&["ok", "pass", "success", "good", "done", "verified"]);
+    words.iter().enumerate().any(|(at, word)| {
+        let begins = |beginnings: &[&str]| beginnings.iter().any(|beginning| word.starts_with(beginning));
+        match word {
+            "bad" | "err" | "nak" => true,
+            _ if begins(&["error", "fehler"]) => !counts_none(at, word),
+            _ if begins(&["verif"]) => !is_content,
+            _ => begins(&[
+                "abort",
+                "abbruch",
+                "fail",
+                "retry",
+                "retries",
+                "invalid",
+                "illegal",
+                "wrong",
+                "incorrect",
+                "mismatch",
+                "corrupt",
+                "overrun",
+                "overflow",
+                "refused",
+                "rejected",
+                "denied",
+                "timeout",
+            ]),
+        }
+    })
+}
+
 /// Hexadecimal digits of a status word.
 const STATUS_DIGITS: usize = 4;
 
@@ -167,6 +207,45 @@ mod tests {
         ];
         for (line, expected) in table {
             assert_eq!(recognise(line, &Words::of(line)), expected, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn complaints_are_known_in_words_of_any_loader() {
+        for text in [
+            "Transfer aborted: reason 6",
+            "*** Fehler 6",
+            "...Error",
+            "Verify error at line 6, please retry",
+            "Verifying page 3",
+            "Bad record",
+            "err 5",
+            "NAK",
+            "FAILED",
+            "programming failure",
+            "Invalid S-record",
+            "wrong check sum",
+            "Error # 00\u{fffd}4",
+            "Error 0",
+        ] {
+            assert!(complains(text), "{text:?}");
+        }
+        for text in [
+            "",
+            "....",
+            "Sector written",
+            "Erasing sector 5",
+            "Badge 7",
+            "07%",
+            "Verify ok",
+            "Page 3 verified",
+            "0 errors",
+            "Errors: 0",
+            "no errors so far",
+            "S3150000BAD0",
+            "terror",
+        ] {
+            assert!(!complains(text), "{text:?}");
         }
     }
 

@@ -15,7 +15,7 @@ pub mod visible;
 mod words;
 
 pub use crate::record::{XOFF, XON};
-pub use boot::{LoaderError, LoaderText};
+pub use boot::{LoaderError, LoaderText, complains};
 pub use framer::{Framer, Item, LONGEST_LINE, Text};
 pub use menu::{Confidence, MenuKey, Network, NmtState, SoftwareName};
 pub use prompt::{Prompt, SourceKeys};
@@ -113,14 +113,15 @@ impl Vocabulary<'_> {
         })
     }
 
-    /// Whether a text without a line end asks for the password. Asked with every byte that comes, so cheap where it does
-    /// not.
-    pub fn asks_password(&self, text: &str) -> bool {
+    /// Whether a text without a line end asks for the password; `behind_load` if it answers an L, behind which more words
+    /// can mean nothing else. Asked with every byte that comes, so cheap where it does not.
+    pub fn asks_password(&self, text: &str, behind_load: bool) -> bool {
         let speaks_of_it = text
             .as_bytes()
             .windows(3)
             .any(|letters| letters.eq_ignore_ascii_case(b"pas") || letters.eq_ignore_ascii_case(b"pwd"));
-        speaks_of_it && self.prompt(text) == Some(Prompt::Password)
+        (speaks_of_it && self.prompt(text) == Some(Prompt::Password))
+            || (behind_load && prompt::asks_password_behind_load(text))
     }
 
     /// What a text without a line end asks for, once the unit has fallen silent behind it.

@@ -59,6 +59,28 @@ pub(super) fn recognise(text: &str, words: &Words) -> Option<Prompt> {
     None
 }
 
+/// Whether a question behind an L asks for the password in other words: `Code:`, `PW>`. It has to look like a question, and
+/// to be about nothing else: a key to be pressed, an error's code.
+pub(super) fn asks_password_behind_load(text: &str) -> bool {
+    if !text.trim_end().ends_with([':', '>']) {
+        return false;
+    }
+    let words = Words::of(text);
+    if super::boot::recognise(text, &words).is_some() || words.has_any(&ABOUT_SOMETHING_ELSE) {
+        return false;
+    }
+    // The echo of the key may stand before it: "lPW:".
+    words.iter().any(|word| SECRETS.iter().any(|name| word == *name || word.strip_prefix('l') == Some(name)))
+}
+
+/// What a password may be called where nothing else can be asked for.
+const SECRETS: [&str; 11] =
+    ["password", "passcode", "passphrase", "passwd", "passwort", "kennwort", "pass", "code", "pin", "pw", "key"];
+
+/// Words that make another question of it, or none.
+const ABOUT_SOMETHING_ELSE: [&str; 12] =
+    ["any", "press", "hit", "strike", "error", "product", "vendor", "order", "wrong", "invalid", "yes", "sure"];
+
 /// Which keys a question for the source offers: `(F)ield value or (P)rocess value`, `1=FV 6100h, 2=PV`,
 /// `field value <F> / process value <P>`, `F/P`. Both keys stand in the same place to their names.
 fn source_keys(text: &str) -> Option<SourceKeys> {
@@ -155,6 +177,36 @@ mod tests {
         ];
         for (text, expected) in table {
             assert_eq!(recognise(text, &Words::of(text)), expected, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn behind_an_l_a_password_may_have_other_names() {
+        for text in [
+            "Please enter the access code you have received from us (case sensitive): ",
+            "Code: ",
+            "PW:",
+            "lPW:",
+            "PIN >",
+            "Access key> ",
+            "Passwort:",
+        ] {
+            assert!(asks_password_behind_load(text), "{text:?}");
+        }
+        for text in [
+            "Code",
+            "PIN?",
+            "Your choice: ",
+            "Decode: ",
+            "Press a key to go on:",
+            "Hit Enter key >",
+            "Error code: ",
+            "Wrong code:",
+            "Erase the code? Enter Yes: ",
+            "Waiting for application S-Record, code:",
+            ":",
+        ] {
+            assert!(!asks_password_behind_load(text), "{text:?}");
         }
     }
 }

@@ -357,6 +357,67 @@ fn a_loader_that_wants_a_key_gets_three_and_then_is_asked_who_it_is() {
     assert_eq!((time - begun + 20) / 100 * 100, 10_400);
 }
 
+/// What becomes of an upload to a unit that says this behind L, and behind the password.
+fn upload_behind(script: &[(&'static str, u64, &'static str)]) -> (LoadReport, Alone) {
+    let mut alone = Alone::with(&[&[("\u{11}m", 3, MENU)][..], script].concat());
+    match alone.ask(Command::Load(Box::new(order(small_image("AXRTD8CO", "1.2.0"))))) {
+        (Outcome::Loaded(report), _) => (*report, alone),
+        (other, _) => panic!("{other:?}"),
+    }
+}
+
+/// How many milliseconds behind L the password was sent, if it was.
+fn password_at(alone: &Alone) -> Option<u64> {
+    let at = |key: &str| alone.sent.iter().find(|(_, text)| text == key).map(|(at, _)| *at);
+    Some(at("AXIO-2010")? - at("l").expect("L"))
+}
+
+#[test]
+fn the_password_is_asked_for_in_many_words_and_sent_when_the_question_is_complete() {
+    for asks in ["Please enter the access code (case sensitive): ", "Code: ", "lPW:", "PIN > ", "Password: "] {
+        let (report, alone) = upload_behind(&[("l", 5, asks)]);
+        assert!(report.password_sent && password_at(&alone).is_some_and(|at| at < 100), "{asks:?}: {}", alone.log());
+    }
+    // In pieces, and without a sign at its end.
+    let pieces = [("l", 5, "Pass"), ("", 305, "word"), ("", 605, ": ")];
+    let (_, alone) = upload_behind(&pieces);
+    assert!(password_at(&alone).is_some_and(|at| (665..700).contains(&at)), "{}", alone.log());
+    let (_, alone) = upload_behind(&[("l", 5, "Enter password")]);
+    assert!(password_at(&alone).is_some_and(|at| (565..600).contains(&at)), "{}", alone.log());
+}
+
+#[test]
+fn a_question_behind_l_that_is_not_understood_is_quoted_and_gets_no_password() {
+    for (script, heard) in [
+        (&[("l", 5, "Parole bitte: ")][..], "Parole bitte:"),
+        (&[("l", 5, "Das Zauberwort\r\n> ")], "Das Zauberwort"),
+        (&[("l", 5, "Load new software? Enter Yes: ")], "Load new software? Enter Yes:"),
+    ] {
+        let (report, alone) = upload_behind(script);
+        assert_eq!((report.verdict, report.unit), (Verdict::NoAnswer, UnitNow::Application), "{report:?}");
+        assert_eq!((report.heard.as_str(), report.password_sent), (heard, false), "{report:?}");
+        assert!(!report.advice().contains("check the password"), "{}", report.advice());
+        assert_eq!((password_at(&alone), alone.sent.last().map(|(_, text)| text.as_str())), (None, Some("~")));
+    }
+    let (report, _) = upload_behind(&[]);
+    assert_eq!((report.verdict, report.heard.as_str()), (Verdict::UnitRefused, ""), "no old line: {report:?}");
+}
+
+#[test]
+fn what_a_unit_says_where_it_does_not_echo_is_recorded_and_quoted_as_it_says_it() {
+    let record = |alone: &Alone| {
+        let bytes: Vec<u8> = alone.session.record().entries().flat_map(|entry| entry.bytes.clone()).collect();
+        bytes.escape_ascii().to_string()
+    };
+    let (report, alone) = upload_behind(&[("l", 5, "Password: "), ("AXIO", 5, "Password wrong\r\n")]);
+    assert_eq!((report.verdict, report.heard.as_str()), (Verdict::UnitRefused, "Password wrong"), "{report:?}");
+    assert!(record(&alone).contains("Password: *********\\rPassword wrong\\r\\n"), "{}", record(&alone));
+    let accepted = [("l", 5, "Password: "), ("AXIO", 5, "Password AXIO-2010 accepted\r\n")];
+    let (_, alone) = upload_behind(&accepted);
+    assert!(record(&alone).contains("Password ********* accepted"), "{}", record(&alone));
+    assert!(!record(&alone).contains("AXIO"), "{}", record(&alone));
+}
+
 #[test]
 fn the_question_for_yes_is_answered_once_and_only_a_banner_is_the_end() {
     let question = "Enter Yes to restore the default object dictionary: ";

@@ -382,6 +382,51 @@ fn words_among_the_records_are_heard_out_and_many_of_them_are_no_loaders() {
 }
 
 #[test]
+fn a_complaint_in_any_words_stops_the_sender_within_one_record_and_is_quoted() {
+    for says in [
+        "\r\nTransfer aborted: reason 6\r\n",
+        "\r\n*** Fehler 6\r\n",
+        "07%\rVerify error at line 6, please retry\r\n",
+        "\r\nInvalid record\r\n",
+        // Nothing says that its line will end.
+        "\r\nBad record",
+        "\r\nErr 6",
+    ] {
+        let upload = Upload::to("AXTC4CO", move |number, _| if number == 5 { vec![(0, says)] } else { Vec::new() });
+        let report = &upload.report;
+        assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Unknown), "{says:?}: {report:?}");
+        assert!(upload.counts()[1] <= 6, "{says:?}: {:?}", upload.counts());
+        let quoted = says.trim().trim_start_matches("07%\r");
+        assert_eq!(report.heard, quoted);
+        assert_eq!(report.what, format!("the loader complains: \"{quoted}\""));
+    }
+    // One that says behind it that it waits again is believed.
+    let upload = Upload::to("AXTC4CO", move |number, _| match number {
+        5 => vec![(0, "\r\nTransfer aborted: reason 6\r\n"), (200_000, WAITS)],
+        _ => Vec::new(),
+    });
+    let report = &upload.report;
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
+    assert!(report.what.contains("reason 6") && upload.counts()[1] <= 6, "{report:?}");
+}
+
+#[test]
+fn a_unit_that_starts_anew_in_the_middle_of_the_file_is_told_with_its_version_and_not_called_unchanged() {
+    let banner: Says = vec![(0, "\r\nAXTC4CO V1.1.0\r\n"), (5_000, "V - View Object Dictionary\r\n")];
+    let menu: Says = vec![(0, "V - View Object Dictionary\r\n"), (90_000, "\r\nAXTC4CO V1.1.0\r\n")];
+    for says in [banner, menu] {
+        let upload = Upload::to("AXTC4CO", |number, _| if number == 5 { says.clone() } else { Vec::new() });
+        let report = &upload.report;
+        assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Application), "{report:?}");
+        assert_eq!(report.what, "the unit left its loader in the middle of the file; it runs AXTC4CO V1.1.0 now");
+        assert_eq!(report.version_after.map(|version| version.to_string()).as_deref(), Some("1.1.0"));
+        let advice = report.advice();
+        assert!(advice.contains("is not known: send the file again") && !advice.contains("nothing"), "{advice}");
+        assert!(upload.counts()[1] <= 6, "{:?}", upload.counts());
+    }
+}
+
+#[test]
 fn behind_its_prompt_a_loader_is_let_finish_and_what_is_none_gets_no_record() {
     let entered = |says: &[(u64, &'static str)]| Upload::entered("AXTC4CO", WORDS, says, &[], with_pages);
     // It goes on printing: the header leaves when it has been silent for a moment.

@@ -153,7 +153,8 @@ pub fn conclude(
     output: &mut Output,
 ) -> Result<(), CliError> {
     let kind = exit_kind(report, lost.is_some());
-    let next = report.advice();
+    let next = next_step(report);
+    let next = next.as_str();
     if output.json {
         let written = output.object(&LoadObject {
             schema: "axcon.load/1",
@@ -208,13 +209,19 @@ pub fn conclude(
     if let Some(lost) = lost {
         error = error.hint(format!("the port: {lost}"));
     }
-    if report.verdict == Verdict::NoAnswer {
+    if report.verdict == Verdict::NoAnswer && report.unit != UnitNow::Application {
         error = no_answer_hints(error);
     }
-    if report.verdict == Verdict::Refused && report.product.is_none() {
-        error = error.hint("say it with --product, for example: --product AXTC4CO");
-    }
     Err(error.hint(next))
+}
+
+/// What to do next, and how it is said on a command line.
+fn next_step(report: &LoadReport) -> String {
+    let advice = report.advice();
+    match (report.verdict, &report.product) {
+        (Verdict::Refused, None) => format!("{advice}: --product NAME, for example --product AXTC4CO"),
+        _ => advice.to_owned(),
+    }
 }
 
 /// The verdict could not be written: what is true of the unit is worth more than that, and is told beside it.
@@ -271,5 +278,36 @@ pub fn phase_name(phase: Phase) -> &'static str {
         Phase::Transfer => "transfer",
         Phase::Finish => "finish",
         Phase::Verify => "verify",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Duration;
+
+    #[test]
+    fn whoever_has_to_say_which_product_it_is_is_told_how() {
+        let report = LoadReport {
+            verdict: Verdict::Refused,
+            phase: Phase::Check,
+            unit: UnitNow::Application,
+            found_in_loader: false,
+            password_sent: false,
+            product: None,
+            version_before: None,
+            version_after: None,
+            records: 0,
+            records_total: 0,
+            address: None,
+            duration: Duration::ZERO,
+            what: String::new(),
+            heard: String::new(),
+            misfit: None,
+            remark: None,
+        };
+        assert!(next_step(&report).contains("--product NAME"), "{}", next_step(&report));
+        let other = LoadReport { product: Some("AXTC4CO".into()), ..report };
+        assert!(!next_step(&other).contains("--product"), "{}", next_step(&other));
     }
 }

@@ -3,14 +3,18 @@
 use super::super::event::{Facts, Outcome, UnitState};
 use super::super::identify::Identify;
 use super::super::job::{Desk, Signal, Work};
+use super::telling::quoted;
 use super::{FILLER, Stage, Transfer, Unheard, UnitNow, Upload, Verdict, shows_application};
 use crate::device::{Product, longest_erase};
 use crate::image::Software;
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderText, Message, Prompt};
+use crate::wire::{LoaderText, Message, Prompt, Text};
 
 /// How long the unit may take to ask for the password.
 const PASSWORD_PROMPT: Duration = Duration::from_millis(2500);
+/// How long the rest of a question may take that has no sign at its end: a slow unit prints it in pieces, and what is typed
+/// among them may be lost.
+const REST_OF_THE_QUESTION: Duration = Duration::from_millis(500);
 /// How long a reset into the loader may take, or the refusal of a password.
 const LOADER_PROMPT: Duration = Duration::from_secs(8);
 /// Silence behind the loader's prompt before the first record: whatever else it prints should be out.
@@ -91,7 +95,9 @@ impl Upload {
             self.deadline = Some(desk.now + CLEAR_LINE);
         } else {
             desk.send(b"l");
-            self.stage = Stage::AskedForLoader;
+            // What was heard before is no answer to it.
+            self.heard.clear();
+            self.stage = Stage::AskedForLoader { asked: false };
             self.deadline = Some(desk.now + PASSWORD_PROMPT);
         }
         self.report_progress(desk);
@@ -99,7 +105,7 @@ impl Upload {
     }
 
     /// Something was heard while a loader is being asked for.
-    pub(super) fn entering(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
+    pub(super) fn entering(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
         let password_sent = matches!(self.stage, Stage::PasswordSent);
         match message {
             // Some units ask for no password.
@@ -107,15 +113,11 @@ impl Upload {
                 return self.entered(desk);
             }
             Message::Prompt(Prompt::Password) if !password_sent => {
-                let Some(password) = &self.order.password else {
-                    desk.leave_dialogue();
-                    let what = "the unit asks for its password, and none was given";
-                    return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
-                };
-                desk.send_secret(password.reveal());
-                self.stage = Stage::PasswordSent;
-                self.deadline = Some(desk.now + LOADER_PROMPT);
-                self.unheard = self.asks_for_key().then_some((desk.now + UNASKED_KEY, Unheard::Key));
+                if text.text.trim_end().ends_with(|end: char| !end.is_alphanumeric()) {
+                    return self.send_password(desk);
+                }
+                self.stage = Stage::AskedForLoader { asked: true };
+                self.deadline = Some(desk.now + REST_OF_THE_QUESTION);
             }
             Message::Prompt(Prompt::AnyKey) | Message::Loader(LoaderText::AnyKey) => self.send_key(desk),
             Message::Loader(LoaderText::Header) if password_sent && self.asks_for_key() => {
@@ -131,7 +133,7 @@ impl Upload {
             Message::Prompt(_) if !password_sent => {
                 desk.leave_dialogue();
                 let what = "the unit asks something else than the password";
-                return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+                return self.end(desk, Verdict::NoAnswer, UnitNow::Application, what);
             }
             Message::Refusal => {
                 let what = "the unit refuses to load new software";
@@ -140,6 +142,37 @@ impl Upload {
             _ => {}
         }
         None
+    }
+
+    /// The unit asks for the password.
+    pub(super) fn send_password(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let Some(password) = &self.order.password else {
+            desk.leave_dialogue();
+            let what = "the unit asks for its password, and none was given";
+            return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+        };
+        desk.send_secret(password.reveal());
+        self.password_sent = true;
+        self.stage = Stage::PasswordSent;
+        self.deadline = Some(desk.now + LOADER_PROMPT);
+        self.unheard = self.asks_for_key().then_some((desk.now + UNASKED_KEY, Unheard::Key));
+        None
+    }
+
+    /// The unit has not asked for the password in its time, or in words that nobody knows.
+    pub(super) fn not_asked(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if let Some(question) = desk.pending {
+            self.heard = quoted(question);
+        }
+        desk.leave_dialogue();
+        let (verdict, what) = match (desk.pending, self.heard.is_empty()) {
+            (Some(_), _) => {
+                (Verdict::NoAnswer, "the unit asks something that is not understood, and not for its password")
+            }
+            (None, false) => (Verdict::NoAnswer, "the unit does not ask for its password in words that are understood"),
+            (None, true) => (Verdict::UnitRefused, "the unit does not ask for the password"),
+        };
+        self.end(desk, verdict, UnitNow::Application, what)
     }
 
     /// The loader asks for a file.

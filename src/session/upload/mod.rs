@@ -44,6 +44,8 @@ pub(super) struct Upload {
     deadline: Option<Instant>,
     /// What is to be sent if nothing is heard until then.
     unheard: Option<(Instant, Unheard)>,
+    /// The password has left.
+    password_sent: bool,
     /// Keys a loader that wants one has got.
     keys_sent: u32,
     /// What speaks against the image for this unit.
@@ -78,8 +80,10 @@ pub(super) struct Upload {
 
 enum Stage {
     Check(Identify),
-    /// L is out.
-    AskedForLoader,
+    /// L is out. `asked`: the unit asks for the password, and may still be printing its question.
+    AskedForLoader {
+        asked: bool,
+    },
     /// The password is out.
     PasswordSent,
     /// No loader has asked for the file: who is there is asked.
@@ -131,6 +135,7 @@ impl Upload {
             stage: Stage::Check(Identify::default()),
             deadline: None,
             unheard: None,
+            password_sent: false,
             keys_sent: 0,
             misfit: None,
             found_in_loader: false,
@@ -157,7 +162,7 @@ impl Upload {
                 let unit = self.as_found(desk);
                 self.end(desk, Verdict::Interrupted, unit, "cancelled before anything was changed")
             }
-            Stage::AskedForLoader => {
+            Stage::AskedForLoader { .. } => {
                 desk.leave_dialogue();
                 let what = "cancelled before anything was changed";
                 self.end(desk, Verdict::Interrupted, UnitNow::Application, what)
@@ -181,10 +186,7 @@ impl Upload {
             Stage::Failing { then: Some(_), .. } => {
                 self.end(desk, Verdict::Interrupted, UnitNow::Loader, "cancelled in the middle of the file")
             }
-            Stage::Failing { what, unit, .. } => {
-                let (what, unit) = (what.clone(), *unit);
-                self.end(desk, Verdict::Failed, unit, what)
-            }
+            Stage::Failing { .. } => self.failed(desk),
         }
     }
 
@@ -201,7 +203,9 @@ impl Upload {
     fn link_lost(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let (unit, what) = match self.stage {
             Stage::Check(_) => (self.as_found(desk), "the connection was lost before anything was changed"),
-            Stage::AskedForLoader => (UnitNow::Application, "the connection was lost before anything was changed"),
+            Stage::AskedForLoader { .. } => {
+                (UnitNow::Application, "the connection was lost before anything was changed")
+            }
             Stage::PasswordSent | Stage::AskWho(_) => {
                 (UnitNow::Unknown, "the connection was lost while the unit reset into its loader")
             }
@@ -232,11 +236,8 @@ impl Upload {
                 self.deadline = identify.deadline();
                 outcome.and_then(|_| self.checked(desk))
             }
-            Stage::AskedForLoader if due => {
-                desk.leave_dialogue();
-                let what = "the unit does not ask for the password";
-                self.end(desk, Verdict::UnitRefused, UnitNow::Application, what)
-            }
+            Stage::AskedForLoader { asked: true } if due => self.send_password(desk),
+            Stage::AskedForLoader { asked: false } if due => self.not_asked(desk),
             Stage::PasswordSent if due => self.ask_who(desk),
             Stage::AskWho(identify) => {
                 let outcome = identify.handle(Signal::Tick, desk);
@@ -256,10 +257,7 @@ impl Upload {
                 self.deadline = identify.deadline();
                 outcome.and_then(|_| self.judge(desk))
             }
-            Stage::Failing { what, unit, .. } if due => {
-                let (what, unit) = (what.clone(), *unit);
-                self.end(desk, Verdict::Failed, unit, what)
-            }
+            Stage::Failing { .. } if due => self.failed(desk),
             _ => None,
         }
     }
@@ -314,7 +312,7 @@ impl Work for Upload {
                         }
                         None
                     }
-                    Stage::AskedForLoader | Stage::PasswordSent if is_news => self.entering(message, desk),
+                    Stage::AskedForLoader { .. } | Stage::PasswordSent if is_news => self.entering(text, message, desk),
                     &mut Stage::Settle { until } => self.settling(message, until, desk),
                     Stage::Transfer if is_news => {
                         self.transferring(text, message, desk);

@@ -80,6 +80,8 @@ pub struct LoadReport {
     pub unit: UnitNow,
     /// It was waiting in its loader when it was found: what software it has was not known before either.
     pub found_in_loader: bool,
+    /// The password has been sent to it.
+    pub password_sent: bool,
     /// Product, as far as known.
     pub product: Option<String>,
     /// Version before, if the unit said it.
@@ -120,8 +122,15 @@ impl LoadReport {
                 "nothing was changed: take newer software, unless the old one is wanted"
             }
             (Verdict::Refused, _) => "nothing was changed: take the file that is made for this unit",
+            (Verdict::UnitRefused, UnitNow::Application) if !self.password_sent => {
+                "the unit runs what it ran, and has got no password: look at what it says, then try again"
+            }
             (Verdict::UnitRefused, UnitNow::Application) => {
                 "the unit runs what it ran: check the password, capital and small letters count, and try again"
+            }
+            (Verdict::NoAnswer, UnitNow::Application) => {
+                "nothing was changed: no password was sent, and the question was left with Enter; press L in a terminal to \
+                 see what the unit asks, and keep the recording"
             }
             (Verdict::NoAnswer, _) => "nothing was changed: look at power, cable and port, then try again",
             (_, UnitNow::Loader) if self.records == 0 && self.found_in_loader => {
@@ -138,7 +147,13 @@ impl LoadReport {
                 "keep the unit powered and send the file again: it waits in its loader and has no complete software; a \
                  power cycle does no harm, it comes back to the loader"
             }
-            (_, UnitNow::Application) => "the unit runs its software: nothing was changed, try again",
+            (_, UnitNow::Application) if self.records == 0 => {
+                "the unit runs its software: nothing was changed, try again"
+            }
+            (_, UnitNow::Application) => {
+                "the unit runs software again, and whether parts of its flash were changed is not known: send the file \
+                 again before it goes into service"
+            }
             (_, UnitNow::Unknown) => {
                 "switch the unit off and on, then send again: what it says at power-up tells whether software runs or a \
                  loader waits"
@@ -156,7 +171,7 @@ pub enum Verdict {
     Refused,
     /// The unit refused: wrong password, or it did not leave the menu.
     UnitRefused,
-    /// Nobody answered; nothing was sent but the question.
+    /// Nobody answered, or asked in words that are not understood; nothing was sent but the question.
     NoAnswer,
     /// The upload failed.
     Failed,
@@ -196,6 +211,7 @@ mod tests {
             what: String::new(),
             heard: String::new(),
             found_in_loader: false,
+            password_sent: true,
             misfit: None,
             remark: None,
         }
@@ -231,6 +247,22 @@ mod tests {
         {
             assert!(waits(records, phase, found).contains("no complete software"), "{records} {phase:?}");
         }
+    }
+
+    #[test]
+    fn nobody_is_told_to_check_a_password_that_was_not_sent_or_that_nothing_was_changed_by_records() {
+        let refused = || report(Verdict::UnitRefused, UnitNow::Application, 0);
+        assert!(refused().advice().contains("check the password"), "{}", refused().advice());
+        let unsent = LoadReport { password_sent: false, ..refused() }.advice();
+        assert!(unsent.contains("has got no password") && !unsent.contains("check"), "{unsent}");
+        let asked = report(Verdict::NoAnswer, UnitNow::Application, 0).advice();
+        assert!(asked.contains("no password was sent") && !asked.contains("cable"), "{asked}");
+        let nothing = report(Verdict::NoAnswer, UnitNow::Unknown, 0).advice();
+        assert!(nothing.contains("cable"), "{nothing}");
+        let untouched = report(Verdict::Failed, UnitNow::Application, 0).advice();
+        assert!(untouched.contains("nothing was changed"), "{untouched}");
+        let touched = report(Verdict::Failed, UnitNow::Application, 1).advice();
+        assert!(touched.contains("is not known: send the file again"), "{touched}");
     }
 
     #[test]

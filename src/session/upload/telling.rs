@@ -70,7 +70,9 @@ impl Upload {
     pub(super) fn phase(&self) -> Phase {
         match self.stage {
             Stage::Check(_) => Phase::Check,
-            Stage::AskedForLoader | Stage::PasswordSent | Stage::AskWho(_) | Stage::Settle { .. } => Phase::EnterLoader,
+            Stage::AskedForLoader { .. } | Stage::PasswordSent | Stage::AskWho(_) | Stage::Settle { .. } => {
+                Phase::EnterLoader
+            }
             Stage::Transfer if self.transfer.as_ref().is_some_and(Transfer::is_erasing) => Phase::Erase,
             Stage::Transfer => Phase::Transfer,
             Stage::Failing { phase, .. } => phase,
@@ -94,6 +96,7 @@ impl Upload {
             phase: if verdict == Verdict::Done { Phase::Verify } else { self.phase() },
             unit,
             found_in_loader: self.found_in_loader,
+            password_sent: self.password_sent,
             product: self.product.clone(),
             version_before: self.version_before,
             version_after: self.after.version.map(|(_, version)| version),
@@ -111,7 +114,12 @@ impl Upload {
 
     pub(super) fn quote(&mut self, text: &Text, message: &Message) {
         if !matches!(message, Message::Row(_)) {
-            self.heard = visible::line(text.text.trim().as_bytes()).chars().take(QUOTED).collect();
+            self.heard = quoted(text);
         }
     }
+}
+
+/// What a unit has said, for a report.
+pub(super) fn quoted(text: &Text) -> String {
+    visible::line(text.text.trim().as_bytes()).chars().take(QUOTED).collect()
 }

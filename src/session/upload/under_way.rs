@@ -3,11 +3,12 @@
 use super::super::event::Outcome;
 use super::super::flaw::Flaw;
 use super::super::job::Desk;
+use super::telling::quoted;
 use super::transfer::Stall;
 use super::verify::NEW_BANNER;
 use super::{Again, Stage, Unheard, UnitNow, Upload, Verdict, records, shows_application};
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text};
+use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text, complains};
 
 /// How long the loader may take after an error to say that it waits again.
 const RESTART: Duration = Duration::from_secs(2);
@@ -19,6 +20,8 @@ const RECORDS_TO_A_PAGE: usize = 4;
 /// How long words are given to become something that is known: text whose line end the line has lost is looked at when it
 /// has stood still for 60 ms, an adapter of 20 ms on the way.
 const HEARD_OUT: Duration = Duration::from_millis(100);
+/// How long an application that shows itself there may take for the rest of its banner.
+const BANNER_REST: Duration = Duration::from_millis(300);
 /// How long a loader with a ring may be silent behind the end record, before it is taken to wait for the rest of it.
 const END_UNHEARD: Duration = Duration::from_millis(1500);
 /// How late a loader that was found waiting may answer what it was asked before the first record, on a busy computer.
@@ -42,7 +45,7 @@ impl Upload {
             _ if self.is_echo_of_header(text) => None,
             Message::Loader(LoaderText::Progress) => None,
             _ if self.order.flaw == Some(Flaw::SendsBehindErrors) => None,
-            Message::Text | Message::Refusal => {
+            Message::Text if !complains(&text.text) => {
                 let sent = self.transfer.as_ref().map_or(0, |transfer| transfer.reached().sent);
                 if self.strange == 0 {
                     self.strange_from = sent;
@@ -54,6 +57,9 @@ impl Upload {
                 let pages = (sent - self.strange_from.min(sent)) / RECORDS_TO_A_PAGE;
                 let what = "what answers does not talk as a loader does".to_owned();
                 (self.strange > MOST_STRANGE.max(pages)).then_some((what, UnitNow::Unknown))
+            }
+            Message::Text | Message::Refusal => {
+                Some((format!("the loader complains: \"{}\"", quoted(text)), UnitNow::Unknown))
             }
             Message::Loader(LoaderText::Error(error)) => {
                 Some((format!("the loader reports error {error}"), UnitNow::Loader))
@@ -89,6 +95,7 @@ impl Upload {
                     desk.leave_dialogue();
                 }
                 let then = self.deserves_another(message, desk);
+                self.after.note(message);
                 self.fail(desk, text.span.end, what, unit, then);
             }
         }
@@ -98,8 +105,8 @@ impl Upload {
     /// first ones of a unit that has started anew, whose keys the records would be.
     pub(super) fn hears_out(&mut self, desk: &Desk<'_>) -> Option<Instant> {
         let words = desk.pending.map_or("", |text| &text.text);
-        let letters =
-            if has_a_word(words) { words.chars().filter(char::is_ascii_alphabetic).collect() } else { String::new() };
+        let talks = has_a_word(words) || desk.pending.is_some_and(|text| self.is_complaint(text));
+        let letters = if talks { words.chars().filter(char::is_ascii_alphabetic).collect() } else { String::new() };
         if self.talk != letters {
             self.talks_until = (!letters.is_empty()).then_some(desk.now + HEARD_OUT).or(self.talks_until);
             self.talk = letters;
@@ -107,9 +114,21 @@ impl Upload {
         self.talks_until.filter(|&until| desk.now < until && self.order.flaw != Some(Flaw::SendsBehindErrors))
     }
 
+    /// Whether a text without a line end says that something is wrong. The line end may be lost, or a question follow.
+    fn is_complaint(&self, text: &Text) -> bool {
+        self.order.flaw != Some(Flaw::SendsBehindErrors) && !self.is_echo_of_header(text) && complains(&text.text)
+    }
+
     pub(super) fn transfer(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         if let Some(until) = self.hears_out(desk) {
             self.deadline = Some(until);
+            return None;
+        }
+        if let Some(complaint) = desk.pending.filter(|text| self.is_complaint(text)) {
+            self.heard = quoted(complaint);
+            desk.transmitter.clear();
+            let what = format!("the loader complains: \"{}\"", self.heard);
+            self.fail(desk, complaint.span.end, what, UnitNow::Unknown, None);
             return None;
         }
         let transfer = self.transfer.as_mut()?;
@@ -164,9 +183,21 @@ impl Upload {
         self.deadline = Some(desk.now + RESTART);
     }
 
+    /// Nothing more will be heard that says what the unit is now.
+    pub(super) fn failed(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let Stage::Failing { what, unit, .. } = &self.stage else { return None };
+        let (mut what, unit) = (what.clone(), *unit);
+        if unit == UnitNow::Application
+            && let (Some(product), Some((_, version))) = (&self.after.product, self.after.version)
+        {
+            what += &format!("; it runs {product} V{version} now");
+        }
+        self.end(desk, Verdict::Failed, unit, what)
+    }
+
     /// Something was heard behind a failure: the loader may wait for a file again.
     pub(super) fn failing(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let Stage::Failing { what, then, .. } = &self.stage else { return None };
+        let Stage::Failing { what, phase, then, .. } = &self.stage else { return None };
         match message {
             Message::Loader(LoaderText::Waiting | LoaderText::AnyKey)
             | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
@@ -184,7 +215,13 @@ impl Upload {
             _ if shows_application(message) => {
                 let what = what.clone();
                 self.after.note(message);
-                self.end(desk, Verdict::Failed, UnitNow::Application, what)
+                self.stage = Stage::Failing { what, unit: UnitNow::Application, phase: *phase, then: None };
+                // Which software it runs stands on a line of its own, before or behind.
+                if self.after.is_complete() {
+                    return self.failed(desk);
+                }
+                self.deadline = self.deadline.min(Some(desk.now + BANNER_REST));
+                None
             }
             _ => None,
         }
@@ -202,7 +239,7 @@ impl Upload {
                 }
             }
             Stage::Check(_)
-            | Stage::AskedForLoader
+            | Stage::AskedForLoader { .. }
             | Stage::PasswordSent
             | Stage::AskWho(_)
             | Stage::Settle { .. }

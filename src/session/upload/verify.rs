@@ -52,7 +52,7 @@ impl After {
         }
     }
 
-    fn is_complete(&self) -> bool {
+    pub(super) fn is_complete(&self) -> bool {
         self.product.is_some() && self.version.is_some()
     }
 }

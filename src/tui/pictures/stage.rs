@@ -439,6 +439,7 @@ pub(super) fn report(verdict: Verdict, unit: UnitNow) -> LoadReport {
         what: "The loader reported error 0004 (wrong checksum) and restarted.".into(),
         heard: "Error # 0004\u{1b}[2J Restarting.".into(),
         found_in_loader: false,
+        password_sent: true,
         misfit: None,
         remark: None,
     }

@@ -20,6 +20,9 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
         Verdict::Done => ("Done", theme.good()),
         Verdict::Refused => ("Refused, nothing was changed", theme.warning()),
         Verdict::UnitRefused => ("The unit refused", theme.bad()),
+        Verdict::NoAnswer if report.unit == UnitNow::Application => {
+            ("The unit's question is not understood", theme.bad())
+        }
         Verdict::NoAnswer => ("No answer", theme.bad()),
         Verdict::Failed => ("Failed", theme.bad()),
         Verdict::WrongApplication => ("The unit does not run what was sent", theme.bad()),
@@ -46,7 +49,7 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
     let mut paragraph = |label, text: &str| told.push((label, format::wrap(&visible::text(text), room)));
     paragraph("Happened", &visible::sentence(&report.what));
     paragraph("Unit now", unit);
-    let is_untouched = matches!(report.verdict, Verdict::Refused | Verdict::UnitRefused);
+    let is_untouched = matches!(report.verdict, Verdict::Refused | Verdict::UnitRefused | Verdict::NoAnswer);
     let versions = match (report.version_before, report.version_after) {
         (Some(before), None) if is_untouched && report.unit == UnitNow::Application => format!("{before}, as before"),
         (before, after) => format!("before {}, after {}", version(before), version(after)),
