@@ -325,7 +325,15 @@ fn one_is_one_and_not_ones() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("v").press(KeyCode::Enter);
     let at = ObjectAddress::new(0x1001, 0);
-    let entry = ReadEntry { at, value: None, text: "?".into(), span: Span::default(), known: true };
+    let entry = ReadEntry {
+        at,
+        value: None,
+        text: "?".into(),
+        span: Span::default(),
+        numeral: None,
+        doubtful: false,
+        known: true,
+    };
     for (complete, told) in [(true, "The dictionary is read: 1 entry, "), (false, "was shown: 1 entry was read.")] {
         let reading = DictionaryReading { entries: vec![entry.clone()], complete, unrecognised_lines: 0 };
         stage.finished(Outcome::DictionaryRead(Box::new(reading)));
