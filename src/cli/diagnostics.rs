@@ -40,7 +40,8 @@ struct PageObject {
 #[derive(Serialize)]
 struct ValueObject {
     label: String,
-    value: f64,
+    /// `null` where the number on the page can be read in more than one way.
+    value: Option<f64>,
     unit: Option<String>,
 }
 

@@ -167,6 +167,12 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
         },
     };
     let written = out.save(text.as_bytes(), output);
+    if dump.doubtful() > 0 {
+        let values = counted(dump.doubtful() as u64, "value");
+        output.remark(&format!(
+            "{values} left open: the unit prints hexadecimal numbers without a mark, so digits may be either"
+        ));
+    }
     if dump.complete {
         return written;
     }

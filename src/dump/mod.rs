@@ -85,6 +85,9 @@ pub struct Missing {
 /// What FFFFFFFFh, `nan`, or dashes stand for in an entry that is measured (AXTC4CO manual, section 3.3.3).
 const NO_READING: &str = "no reading";
 
+/// What digits stand for that may be decimal or hexadecimal ones.
+const DOUBTFUL: &str = "not certain: hexadecimal?";
+
 /// Why a text is no dump.
 #[derive(Debug, thiserror::Error)]
 pub enum DumpError {
@@ -119,13 +122,15 @@ impl Dump {
                 subindex: read.at.sub,
                 name: object.zip(entry).map_or_else(String::new, |(object, entry)| name(object, entry)),
                 value: read.value.and_then(number),
-                text: visible::line(value_text(read).as_bytes()),
+                text: visible::line(read.numeral.as_deref().unwrap_or(&read.text).as_bytes()),
                 default: default.and_then(number),
                 deviates: entry.is_some_and(|entry| deviates(read, entry, default)),
                 unit: entry.and_then(|entry| entry.unit.clone()),
                 meaning: entry.and_then(|entry| match read.value {
                     Some(value) => meaning(product?, read.at, entry, value),
-                    None => (entry.data_type == DataType::Real32).then(|| NO_READING.to_owned()),
+                    None if read.doubtful => Some(DOUBTFUL.to_owned()),
+                    // What could not be read may be anything.
+                    None => (read.known && entry.data_type == DataType::Real32).then(|| NO_READING.to_owned()),
                 }),
                 bits: entry.is_some_and(is_bits),
             }
@@ -217,6 +222,11 @@ impl Dump {
                 && entry.value.as_ref().and_then(serde_json::Number::as_u64).is_some_and(|bits| bits != 0)
         };
         self.entries.iter().filter(listed).map(|entry| entry.meaning.as_deref().unwrap_or(&entry.text))
+    }
+
+    /// How many entries show a value that nobody can be certain of.
+    pub fn doubtful(&self) -> usize {
+        self.entries.iter().filter(|entry| entry.value.is_none() && entry.meaning.as_deref() == Some(DOUBTFUL)).count()
     }
 
     /// How many parameters are not what the factory made them.
@@ -316,22 +326,6 @@ fn rounding(text: &str, value: f64) -> f64 {
     shown.map(half_a_unit).fold(least, f64::max)
 }
 
-/// The numeral of a value in the text that was read, or all of the text.
-fn value_text(read: &ReadEntry) -> &str {
-    let Some(value) = read.value else { return &read.text };
-    let is_it = |word: &str| match (value, value.as_integer()) {
-        (Value::Real32(real), _) => word.parse::<f32>().is_ok_and(|shown| shown == real),
-        (_, Some(integer)) => {
-            let hexadecimal = word.strip_prefix("0x").or_else(|| word.strip_suffix(['h', 'H'])).unwrap_or(word);
-            word.parse::<i64>().is_ok_and(|shown| shown == integer)
-                || i64::from_str_radix(hexadecimal, 16).is_ok_and(|shown| shown == integer)
-        }
-        (_, None) => false,
-    };
-    let mut words = read.text.rsplit(|c: char| !(c.is_ascii_alphanumeric() || "+-.".contains(c)));
-    words.find(|word| is_it(word)).unwrap_or(&read.text)
-}
-
 /// Half a unit of a numeral's last digit.
 fn half_a_unit(numeral: &str) -> f64 {
     let (mantissa, exponent) = numeral.split_once(['e', 'E']).unwrap_or((numeral, "0"));
@@ -369,8 +363,15 @@ mod tests {
         let product = Product::named("AXTC4CO").expect("built in");
         let facts = Facts::default();
         let at = ObjectAddress::new(0x6100, 1);
-        let read =
-            |value| ReadEntry { at, value, text: "TC1 0xFFFFFFFF".into(), span: Default::default(), known: true };
+        let read = |value| ReadEntry {
+            at,
+            value,
+            text: "TC1 0xFFFFFFFF".into(),
+            span: Default::default(),
+            numeral: Some("0xFFFFFFFF".into()),
+            doubtful: false,
+            known: true,
+        };
         let dump = |value| {
             let entries = vec![read(value)];
             Dump::of(&DictionaryReading { entries, end: WalkEnd::Whole, unrecognised_lines: 0 }, Some(product), &facts)
@@ -378,6 +379,15 @@ mod tests {
         let (nothing, something) = (dump(None), dump(Some(Value::Real32(23.5))));
         assert_eq!(nothing.entries[0].meaning.as_deref(), Some("no reading"));
         assert!(nothing.table().contains(" -  no reading\n"), "{}", nothing.table());
+        assert_eq!(nothing.entries[0].text, "0xFFFFFFFF", "without what the line calls it");
+        let entries = vec![ReadEntry { doubtful: true, numeral: Some("41E80000".into()), ..read(None) }];
+        let reading = DictionaryReading { entries, end: WalkEnd::Whole, unrecognised_lines: 1 };
+        let doubtful = Dump::of(&reading, Some(product), &facts);
+        assert_eq!((doubtful.doubtful(), doubtful.entries[0].meaning.as_deref()), (1, Some(DOUBTFUL)));
+        assert_eq!((nothing.doubtful(), something.doubtful()), (0, 0));
+        let entries = vec![ReadEntry { known: false, numeral: None, text: "TC1: 23,500".into(), ..read(None) }];
+        let unread = Dump::of(&DictionaryReading { entries, ..reading }, Some(product), &facts);
+        assert_eq!((unread.entries[0].meaning.as_deref(), unread.entries[0].text.as_str()), (None, "TC1: 23,500"));
         assert_eq!(something.entries[0].meaning, None);
         assert!(something.table().contains("23.5 °C"), "{}", something.table());
     }

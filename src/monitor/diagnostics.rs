@@ -37,11 +37,12 @@ pub struct Tracked {
     pub max: f64,
 }
 
-impl From<Quantity> for Tracked {
-    /// As it stands on its first page.
-    fn from(quantity: Quantity) -> Self {
+impl Tracked {
+    /// As it stands on its first page; `None` if its value is not certain.
+    pub fn first(quantity: Quantity) -> Option<Self> {
         let Quantity { label, value, decimals, unit } = quantity;
-        Tracked { label, unit, decimals, value: Some(value), min: value, max: value }
+        let value = value?;
+        Some(Tracked { label, unit, decimals, value: Some(value), min: value, max: value })
     }
 }
 
@@ -53,6 +54,7 @@ impl Diagnostics {
         self.found.iter_mut().for_each(|tracked| tracked.value = None);
         let found: Vec<_> = self.lines.iter().flat_map(|line| diagnostics::quantities(line)).collect();
         for quantity in found {
+            let Some(value) = quantity.value else { continue };
             let same = |tracked: &Tracked| {
                 // Two of one name stand on a page one after the other.
                 tracked.value.is_none() && tracked.label == quantity.label && tracked.unit == quantity.unit
@@ -61,11 +63,11 @@ impl Diagnostics {
                 Some(place) => {
                     let tracked = &mut self.found[place];
                     tracked.decimals = tracked.decimals.max(quantity.decimals);
-                    tracked.value = Some(quantity.value);
-                    tracked.min = tracked.min.min(quantity.value);
-                    tracked.max = tracked.max.max(quantity.value);
+                    tracked.value = Some(value);
+                    tracked.min = tracked.min.min(value);
+                    tracked.max = tracked.max.max(value);
                 }
-                None if self.found.len() < MOST_TRACKED => self.found.push(quantity.into()),
+                None if self.found.len() < MOST_TRACKED => self.found.extend(Tracked::first(quantity)),
                 None => {}
             }
         }
@@ -110,8 +112,10 @@ mod tests {
         let ohm = Tracked { decimals: 2, ..supply.clone() };
         let below = [-0.001, -0.004, -0.006].map(|value| ohm.text(value));
         assert_eq!(below, ["0.00", "0.00", "-0.01"], "nothing is less than nothing");
+        diagnostics.page(Instant::ZERO, &page(&["Supply: 24,061 V"]));
+        assert_eq!((diagnostics.found[0].value, diagnostics.found.len()), (None, 3), "no number that is not certain");
         diagnostics.page(Instant::ZERO, &page(&["nothing of that"]));
         assert!(diagnostics.found.iter().all(|found| found.value.is_none()));
-        assert_eq!((diagnostics.pages, diagnostics.lines.len()), (4, 1));
+        assert_eq!((diagnostics.pages, diagnostics.lines.len()), (5, 1));
     }
 }

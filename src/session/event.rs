@@ -386,12 +386,16 @@ impl DictionaryReading {
 pub struct ReadEntry {
     /// Where it lies.
     pub at: ObjectAddress,
-    /// Its value; `None` where the unit shows none, or the entry is not known.
+    /// Its value; `None` where the unit shows none, it is doubtful, or the entry is not known.
     pub value: Option<Value>,
     /// What the line says besides index and sub-index.
     pub text: String,
     /// Where in the record it was read.
     pub span: Span,
+    /// What of the text says the value, where something does.
+    pub numeral: Option<String>,
+    /// Something says a value, and nobody can be certain which: this unit prints hexadecimal numbers without a mark.
+    pub doubtful: bool,
     /// Whether the product's manual has it.
     pub known: bool,
 }

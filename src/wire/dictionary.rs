@@ -4,7 +4,11 @@
 //! spellings, a sub-index beside it or at the head of a line below, and what is left, out of which somebody who knows the
 //! entry picks its value ([`value`]). A line that leaves a doubt stays text.
 
-use crate::canopen::{DataType, Value};
+mod columns;
+mod value;
+
+pub use columns::several;
+pub use value::{Expected, Reading, Shown, value};
 
 /// Which entry a line speaks of, and what else it says.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,19 +49,15 @@ impl SubIndex {
     }
 }
 
-/// What a line says an entry holds.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Shown {
-    /// A value.
-    Value(Value),
-    /// Nothing: the unit has no number for it at the moment.
-    Nothing,
-}
+/// What stands between two columns of [`ViewLine::rest`].
+const COLUMNS: &str = "  ";
 
 /// Reads a line. `knows` says whether an index is that of an object: spellings that could be something else count only
 /// for these.
 pub fn line(text: &str, knows: impl Fn(u16) -> bool) -> Option<ViewLine> {
-    let tokens: Vec<&str> = text.split_whitespace().collect();
+    let columns = columns::of(text);
+    let placed: Vec<(usize, &str)> = columns::words(&columns);
+    let tokens: Vec<&str> = placed.iter().map(|(_, token)| *token).collect();
     let head = sub_at_head(&tokens);
     for (place, token) in tokens.iter().enumerate() {
         // Behind a sub-index a number of four digits is a value: `01h RTD1 = 2711h`.
@@ -66,21 +66,26 @@ pub fn line(text: &str, knows: impl Fn(u16) -> bool) -> Option<ViewLine> {
         if !((marked || place == 0) && knows(index) || marked && index >= 0x1000 && names_object) {
             continue;
         }
-        let mut rest = tokens.clone();
-        rest.remove(place);
+        let behind = &tokens[place + 1..];
         let (sub, taken) = match sub {
             Some(sub) => (Some(sub), 0),
-            None => sub_behind(&rest[place..]),
+            None => sub_behind(token, behind),
         };
-        rest.drain(place..place + taken);
-        return Some(ViewLine { index: Some(index), sub, rest: rest.join(" ") });
+        let mut rest = placed[..place].to_vec();
+        // `Name (6126h, 01h): 16.0`: the colon is that of the value.
+        let last = tokens[place + taken];
+        if place > 0 && last.ends_with(':') {
+            rest.push((placed[place + taken].0, ":"));
+        }
+        rest.extend(&placed[place + taken + 1..]);
+        return Some(ViewLine { index: Some(index), sub, rest: columns::join(&rest) });
     }
     let (sub, taken) = head?;
-    Some(ViewLine { index: None, sub: Some(sub), rest: tokens[taken..].join(" ") })
+    Some(ViewLine { index: None, sub: Some(sub), rest: columns::join(&placed[taken..]) })
 }
 
 /// Index and sub-index of a token, and whether it is marked as hexadecimal: `6126h`, `0x6126`, `$6126`, `[6126:01]`,
-/// `6126sub1`, `6126h.1`, `6126/1`.
+/// `6126sub1`, `6126h.1`, `6126/1`, `6126h[1]`.
 fn address(token: &str) -> Option<(u16, Option<SubIndex>, bool)> {
     let bare = token.trim_matches(['[', ']', '(', ')', '<', '>', ',', ';']).trim_end_matches([':', '.', '=']);
     let (plain, prefixed) = match bare.strip_prefix("0x").or(bare.strip_prefix("0X")).or(bare.strip_prefix('$')) {
@@ -102,7 +107,7 @@ fn address(token: &str) -> Option<(u16, Option<SubIndex>, bool)> {
         return Some((index, None, marked));
     }
     let lower = rest.to_ascii_lowercase();
-    let (separator, sub) = ["sub", ":", ".", "/", ","]
+    let (separator, sub) = ["sub", ":", ".", "/", ",", "[", "("]
         .iter()
         .find_map(|separator| Some((*separator, SubIndex::of(lower.strip_prefix(separator)?)?)))?;
     // A number like 6126.01 is no address unless something marks it.
@@ -110,16 +115,14 @@ fn address(token: &str) -> Option<(u16, Option<SubIndex>, bool)> {
     Some((index, Some(sub), marked || bracketed || matches!(separator, "sub" | ":")))
 }
 
-/// A sub-index in tokens of its own behind an index, and how many tokens it takes: `sub 1`, `sub-index: 01`, `[1]`, `01h`.
-fn sub_behind(tokens: &[&str]) -> (Option<SubIndex>, usize) {
-    match sub_at_head(tokens) {
-        Some((sub, taken))
-            if taken == 2 || tokens[0].starts_with(['[', '(', ':', '.', '/']) || is_marked(tokens[0]) =>
-        {
-            (Some(sub), taken)
-        }
-        _ => (None, 0),
-    }
+/// A sub-index in tokens of its own behind an index, and how many tokens it takes: `sub 1`, `sub-index: 01`, `[1]`, `01h`;
+/// also within the brackets of the index: `(6126h, 1)`.
+fn sub_behind(index: &str, tokens: &[&str]) -> (Option<SubIndex>, usize) {
+    let Some((sub, taken)) = sub_at_head(tokens) else { return (None, 0) };
+    let first = tokens[0];
+    let closes = index.starts_with(['(', '[']) && first.trim_end_matches(':').ends_with([')', ']']);
+    let is_its = taken == 2 || closes || first.starts_with(['[', '(', ':', '.', '/']) || is_marked(first);
+    if is_its { (Some(sub), taken) } else { (None, 0) }
 }
 
 fn is_marked(token: &str) -> bool {
@@ -146,88 +149,10 @@ fn sub_at_head(tokens: &[&str]) -> Option<(SubIndex, usize)> {
     (marked && tokens.len() > 1).then(|| SubIndex::of(digits)).flatten().map(|sub| (sub, 1))
 }
 
-/// The value a line shows of an entry of a type, given the names it may carry. `None` if there is none, or more than one
-/// that could be meant.
-pub fn value(rest: &str, data_type: DataType, names: &[&str]) -> Option<Shown> {
-    let mut tokens: Vec<Option<&str>> = rest.split_whitespace().map(Some).collect();
-    // A name may begin another: `Heartbeat Time` and `Heartbeat Time 1`.
-    let mut names = names.to_vec();
-    names.sort_by_key(|name| std::cmp::Reverse(name.len()));
-    for name in names {
-        forget(&mut tokens, name);
-    }
-    // What stands behind an equals sign is meant, then what stands behind a colon or leaders, then what is left.
-    let mut found: [Vec<Shown>; 3] = [Vec::new(), Vec::new(), Vec::new()];
-    let mut rank = 2;
-    for token in tokens {
-        let Some(token) = token else {
-            rank = if rank == 0 { 0 } else { 2 };
-            continue;
-        };
-        let (before, word) = token.rsplit_once('=').map_or(("", token), |(_, word)| ("=", word));
-        if before == "=" {
-            rank = 0;
-        }
-        let bare = word.trim_matches(['(', ')', '[', ']', '<', '>', ',', ';', '"', '\'']);
-        let bare = bare.trim_end_matches(':');
-        if let Some(shown) = parse(bare, data_type) {
-            found[rank].push(shown);
-            rank = 2;
-        } else if word.ends_with(':') || (word.len() >= 2 && word.bytes().all(|sign| sign == b'.' || sign == b'_')) {
-            rank = 1;
-        } else if !bare.is_empty() {
-            rank = 2;
-        }
-    }
-    let [first, second, third] = found;
-    let candidates = [first, second, third].into_iter().find(|candidates| !candidates.is_empty())?;
-    let one = candidates.first()?.clone();
-    candidates.iter().all(|other| *other == one).then_some(one)
-}
-
-/// Takes a name's words out of the tokens, where they stand one behind the other.
-fn forget(tokens: &mut [Option<&str>], name: &str) {
-    let words: Vec<String> = name.split_whitespace().map(plain).collect();
-    if words.is_empty() || words.len() > tokens.len() {
-        return;
-    }
-    for start in 0..=tokens.len() - words.len() {
-        let matches =
-            |(place, word): (usize, &String)| tokens[start + place].is_some_and(|token| plain(token) == *word);
-        if words.iter().enumerate().all(matches) {
-            tokens[start..start + words.len()].fill(None);
-            return;
-        }
-    }
-}
-
-fn plain(word: &str) -> String {
-    word.trim_matches(|c: char| !c.is_alphanumeric()).to_lowercase()
-}
-
-fn parse(word: &str, data_type: DataType) -> Option<Shown> {
-    let lower = word.to_ascii_lowercase();
-    let dashes = lower.len() >= 2 && lower.bytes().all(|sign| sign == b'-');
-    let no_number = data_type == DataType::Real32 && matches!(lower.as_str(), "nan" | "-nan" | "+nan" | "inf");
-    if dashes || no_number || lower == "n/a" {
-        return Some(Shown::Nothing);
-    }
-    if data_type == DataType::Boolean {
-        match lower.as_str() {
-            "on" | "yes" => return Some(Shown::Value(Value::Boolean(true))),
-            "off" | "no" => return Some(Shown::Value(Value::Boolean(false))),
-            _ => {}
-        }
-    }
-    match data_type.parse(word)? {
-        Value::Real32(number) if number.is_nan() => Some(Shown::Nothing),
-        value => Some(Shown::Value(value)),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::canopen::DataType;
     use proptest::prelude::*;
 
     fn read(text: &str) -> Option<(Option<u16>, Option<u8>, String)> {
@@ -255,6 +180,11 @@ mod tests {
             ("6126h [3] 16.0", entry(Some(3), "16.0")),
             ("6126 Scaling Factor", entry(None, "Scaling Factor")),
             ("16.000 6126h.4 TC4", entry(Some(4), "16.000 TC4")),
+            ("6126h[1] TC1 (REAL32) = 16.0", entry(Some(1), "TC1 (REAL32) = 16.0")),
+            ("TC1 (6126h, 01h): 16.0", entry(Some(1), "TC1 : 16.0")),
+            ("TC1 [6126h, 1]: 16.0", entry(Some(1), "TC1 : 16.0")),
+            ("6126h/1  TC1  16.0  min 0 max 65535", entry(Some(1), "TC1  16.0  min 0 max 65535")),
+            ("│ 6126h:01 │ TC1 │ 16.0 │", entry(Some(1), "TC1  16.0")),
             ("  01h TC1 = 16.000", Some((None, Some(1), "TC1 = 16.000".into()))),
             ("    sub 1: 16.000", Some((None, Some(1), "16.000".into()))),
             ("sub1: 16.000", Some((None, Some(1), "16.000".into()))),
@@ -283,54 +213,12 @@ mod tests {
         assert_eq!((sub("sub A: 0").behind(Some(9)), sub("sub 1: 0").behind(None)), (10, 1));
     }
 
-    #[test]
-    fn the_value_is_what_the_line_leaves_no_doubt_about() {
-        let names = ["Thermocouple Scaling Factor", "TC1"];
-        let real = |rest: &str| value(rest, DataType::Real32, &names);
-        let number = |number: f32| Some(Shown::Value(Value::Real32(number)));
-        for (rest, expected) in [
-            ("TC1 = 16.000", number(16.0)),
-            ("Thermocouple Scaling Factor TC1 ........ 16.000", number(16.0)),
-            ("Thermocouple Scaling Factor TC1: 1.6E+01 degC", number(16.0)),
-            ("16.000 Thermocouple Scaling Factor TC1", number(16.0)),
-            ("16.000\tTC1", number(16.0)),
-            ("TC1=16.000", number(16.0)),
-            ("TC1 = nan", Some(Shown::Nothing)),
-            ("TC1 = 0xFFFFFFFF", Some(Shown::Nothing)),
-            ("TC1 = ----", Some(Shown::Nothing)),
-            ("input 1 factor = 16.0", number(16.0)),
-            ("input 1 factor 16.0", None),
-            ("REAL32 RW -1000.0 1000.0 16.0", None),
-            ("REAL32 RW (-1000.0 to 1000.0) value: 16.0", number(16.0)),
-            ("TC1", None),
-            ("", None),
-        ] {
-            assert_eq!(real(rest), expected, "{rest:?}");
-        }
-        let whole = |rest: &str, data_type, names: &[&str]| match value(rest, data_type, names) {
-            Some(Shown::Value(value)) => value.as_integer(),
-            _ => None,
-        };
-        for (rest, data_type, names, expected) in [
-            ("Mapped object 1 = 0x71300110", DataType::Unsigned32, &["Mapped object 1"][..], Some(0x7130_0110)),
-            ("= 60 Hz (60 Hz)", DataType::Unsigned8, &[], Some(60)),
-            ("RTD1 = 10001 (3-wire RTD)", DataType::Unsigned16, &["RTD1"], Some(10_001)),
-            ("RTD1 = 1 (IEC 0.00385)", DataType::Unsigned16, &["RTD1"], Some(1)),
-            ("Bank 1 (TC1, TC2): 4768", DataType::Integer16, &["Bank 1 (TC1, TC2)"], Some(4_768)),
-            ("Start in Operational Mode = off", DataType::Boolean, &["Start in Operational Mode"], Some(0)),
-            ("COB-ID 400001FFh", DataType::Unsigned32, &["COB-ID"], Some(0x4000_01FF)),
-            ("Status = 0x02 2", DataType::Unsigned8, &[], Some(2)),
-            ("-200 (0.1 C)", DataType::Integer16, &[], Some(-200)),
-        ] {
-            assert_eq!(whole(rest, data_type, names), expected, "{rest:?}");
-        }
-    }
-
     proptest! {
         #[test]
         fn any_text_is_read_without_complaint(text in "\\PC{0,120}") {
             if let Some(line) = line(&text, |_| true) {
-                let _ = value(&line.rest, DataType::Real32, &["TC1", "a b"]);
+                let expected = Expected { data_type: DataType::Real32, names: &["TC1", "a b"], unit: Some("ms") };
+                let _ = value(&line.rest, &expected);
             }
         }
 
@@ -339,7 +227,8 @@ mod tests {
             text in "((6126h|0x6126|sub|1|=|:|16\\.0|\\[|\\]|0x|h|\\.\\.\\.|é)[ ]?){0,12}"
         ) {
             if let Some(line) = line(&text, |_| true) {
-                let _ = value(&line.rest, DataType::Unsigned16, &["sub 1"]);
+                let expected = Expected { data_type: DataType::Unsigned16, names: &["sub 1"], unit: None };
+                let _ = value(&line.rest, &expected);
             }
         }
     }

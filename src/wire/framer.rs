@@ -184,19 +184,22 @@ fn moves_cursor(escape: Escape, byte: u8) -> bool {
     )
 }
 
-/// Bytes as text: tabs as blanks; NUL and BEL, which old devices send between words, left out; any other control
+/// Bytes as text: tabs as two blanks, since what parts columns is more than one; NUL and BEL, which old devices send between words, left out; any other control
 /// character is damage, and shows as what is not UTF-8 does.
 fn clean(bytes: &[u8]) -> String {
     if bytes.iter().all(|byte| matches!(byte, b' '..=b'~')) {
         return String::from_utf8_lossy(bytes).into_owned();
     }
-    let shown = |c: char| match c {
-        '\t' => Some(' '),
-        '\0' | '\u{7}' => None,
-        c if c.is_control() => Some(char::REPLACEMENT_CHARACTER),
-        c => Some(c),
-    };
-    String::from_utf8_lossy(bytes).chars().filter_map(shown).collect()
+    let mut text = String::with_capacity(bytes.len());
+    for c in String::from_utf8_lossy(bytes).chars() {
+        match c {
+            '\t' => text.push_str("  "),
+            '\0' | '\u{7}' => {}
+            c if c.is_control() => text.push(char::REPLACEMENT_CHARACTER),
+            c => text.push(c),
+        }
+    }
+    text
 }
 
 #[cfg(test)]
@@ -257,6 +260,7 @@ mod tests {
     #[test]
     fn colours_vanish_and_cursor_moves_part_lines() {
         assert_eq!(lines(b"\x1b[1;32mAXTC4CO\x1b[0m V1.1.0\r\n"), ["AXTC4CO V1.1.0"]);
+        assert_eq!(lines(b"6126\t1\t16.0\r\n"), ["6126  1  16.0"], "a tab parts columns");
         assert_eq!(lines(b"\x1b[2J\x1b[1;1HSupply 24.1\x1b[2;1HErrors 0\x1b[3;1H"), ["Supply 24.1", "Errors 0"]);
         assert_eq!(lines(b"\x1b]0;title\x07a\x1b]52;c;AAAA\x1b\\b\r\n"), ["ab"]);
     }

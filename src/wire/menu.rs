@@ -1,9 +1,9 @@
-//! Banner, main menu and the CANopen network variables (AXTC4CO manual, section 4.1).
+//! Banner and main menu (AXTC4CO manual, section 4.1).
 //!
 //! Stable are the keys, the subjects behind them, the product name and a version of three numbers. Wording and layout
 //! are unknown, so a line is taken for what its words and numbers say, in any order.
 
-use super::words::{Words, number};
+use super::words::Words;
 use crate::version::Version;
 
 /// An entry of the main menu.
@@ -57,39 +57,6 @@ pub enum Confidence {
     Named,
     /// It stands beside the product name.
     WithProduct,
-}
-
-/// CANopen network variables, as far as a line names them.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Network {
-    /// Node-ID, 1 to 127.
-    pub node_id: Option<u8>,
-    /// Bit rate in kbit/s.
-    pub can_kbps: Option<u16>,
-    /// State.
-    pub nmt_state: Option<NmtState>,
-}
-
-/// CANopen state of a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum NmtState {
-    /// Configured by SDO, no PDOs.
-    PreOperational,
-    /// In normal service.
-    Operational,
-    /// Neither.
-    Stopped,
-}
-
-impl NmtState {
-    /// The name CANopen uses.
-    pub const fn name(self) -> &'static str {
-        match self {
-            NmtState::PreOperational => "pre-operational",
-            NmtState::Operational => "operational",
-            NmtState::Stopped => "stopped",
-        }
-    }
 }
 
 /// The menu entry a line offers: its key as a word of its own (or bracketed within its word), and its subject.
@@ -185,22 +152,6 @@ fn subject(words: &Words, version_at: usize, product: Option<&str>) -> Option<Su
     if leads == Some(true) { behind().or_else(before) } else { before().or_else(behind) }
 }
 
-/// Network variables a line names.
-pub(super) fn network(line: &str, words: &Words) -> Option<Network> {
-    let speaks_of_network = words.has_any(&["network", "can", "canopen", "nmt"]);
-    let named = words.position("node").or_else(|| words.position("id").filter(|_| speaks_of_network));
-    let node_id = named.and_then(|at| {
-        let after = words.iter().skip(at + 1).take(4).find_map(number)?;
-        u8::try_from(after).ok().filter(|node_id| (1..=127).contains(node_id))
-    });
-    let network = Network {
-        node_id,
-        can_kbps: can_kbps(words).filter(|_| !speaks_of_serial_line(words)),
-        nmt_state: nmt_state(line),
-    };
-    (network != Network::default()).then_some(network)
-}
-
 /// Whether the unit says no to what was typed.
 pub(super) fn is_refusal(words: &Words) -> bool {
     if words.has_any(&["wrong", "invalid", "incorrect", "denied", "refused", "illegal", "rejected"]) {
@@ -229,53 +180,6 @@ pub(super) fn is_refusal(words: &Words) -> bool {
 
 /// Words behind "not", and on either side of "only", within which it is said what is not so.
 const REFUSAL_REACH: usize = 3;
-
-fn speaks_of_serial_line(words: &Words) -> bool {
-    words.has_any(&["rs", "rs232", "serial", "uart", "115200"])
-}
-
-fn can_kbps(words: &Words) -> Option<u16> {
-    let rates = [10u16, 20, 50, 100, 125, 250, 500, 800, 1000];
-    let list: Vec<&str> = words.iter().collect();
-    let speaks_of_rate = words.has_any(&["baud", "kbit", "kbps", "kbaud", "kb", "mbit", "mbps", "bitrate"])
-        || words.has_all(&["bit", "rate"])
-        || list.windows(2).any(|pair| pair == ["bit", "s"])
-        || list.iter().any(|word| word.ends_with("kbit") || word.ends_with("bps"));
-    if !speaks_of_rate {
-        return None;
-    }
-    list.iter().enumerate().find_map(|(at, word)| {
-        let digits = word.trim_end_matches(|c: char| c.is_alphabetic());
-        let unit =
-            if digits.len() < word.len() { &word[digits.len()..] } else { list.get(at + 1).copied().unwrap_or("") };
-        let value = number(digits)?;
-        let kbps = match unit.chars().next() {
-            Some('m') => value.checked_mul(1000)?,
-            Some('b') if value >= 10_000 => value / 1000,
-            _ if value >= 10_000 => value / 1000,
-            _ => value,
-        };
-        u16::try_from(kbps).ok().filter(|kbps| rates.contains(kbps))
-    })
-}
-
-fn nmt_state(line: &str) -> Option<NmtState> {
-    let squeezed: String = line.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
-    // Object 5555h is called so; it says nothing of the present state.
-    if squeezed.contains("startin") {
-        return None;
-    }
-    let named = squeezed.contains("state") || squeezed.contains("nmt") || squeezed.contains("mode");
-    if squeezed.contains("preop") {
-        Some(NmtState::PreOperational)
-    } else if named && squeezed.contains("operational") {
-        Some(NmtState::Operational)
-    } else if named && squeezed.contains("stopped") {
-        Some(NmtState::Stopped)
-    } else {
-        None
-    }
-}
 
 #[cfg(test)]
 mod tests {
@@ -357,35 +261,6 @@ mod tests {
             "The previous object is not shown",
         ] {
             assert!(!is_refusal(&Words::of(line)), "{line:?}");
-        }
-    }
-
-    #[test]
-    fn network_variables_are_read_in_many_spellings() {
-        let table = [
-            ("Node-ID: 127 (0x7F)", Some(127), None, None),
-            ("NODE ID = 7Fh, 125 kbit/s", Some(127), Some(125), None),
-            ("CAN baudrate 250 kbps", None, Some(250), None),
-            ("Bit rate: 1 Mbit/s", None, Some(1000), None),
-            ("CAN bit rate 500000 bit/s", None, Some(500), None),
-            ("Baudrate: 125k", None, Some(125), None),
-            ("State: Pre-Operational", None, None, Some(NmtState::PreOperational)),
-            ("NMT state OPERATIONAL", None, None, Some(NmtState::Operational)),
-            ("network: id=7Fh  125000 bit/s", Some(127), Some(125), None),
-            ("Node 5 is PRE OPERATIONAL at 20 kbit/s", Some(5), Some(20), Some(NmtState::PreOperational)),
-        ];
-        for (line, node_id, can_kbps, nmt_state) in table {
-            let expected = Network { node_id, can_kbps, nmt_state };
-            assert_eq!(network(line, &Words::of(line)), Some(expected), "{line:?}");
-        }
-        for line in [
-            "RS-232: 115200 baud",
-            "Node-ID: 300",
-            "Uptime 127 s",
-            "operational amplifier",
-            "  00h Start in Operational Mode = 0",
-        ] {
-            assert_eq!(network(line, &Words::of(line)), None, "{line:?}");
         }
     }
 }

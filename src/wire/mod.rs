@@ -9,6 +9,7 @@ pub mod diagnostics;
 pub mod dictionary;
 mod framer;
 mod menu;
+mod network;
 mod prompt;
 pub mod stream;
 pub mod visible;
@@ -17,7 +18,8 @@ mod words;
 pub use crate::record::{XOFF, XON};
 pub use boot::{LoaderError, LoaderText, complains};
 pub use framer::{Framer, Item, LONGEST_LINE, Text};
-pub use menu::{Confidence, MenuKey, Network, NmtState, SoftwareName};
+pub use menu::{Confidence, MenuKey, SoftwareName};
+pub use network::{Network, NmtState};
 pub use prompt::{Prompt, SourceKeys};
 
 use stream::{Layout, Row, Source};
@@ -77,7 +79,7 @@ impl Vocabulary<'_> {
         if let Some(name) = menu::software(&words, &self.products) {
             return Message::Software(name);
         }
-        let network = menu::network(line, &words);
+        let network = network::network(&words);
         // "Only in pre-operational state" names a state, and says no.
         let names_numbers = network.as_ref().is_some_and(|found| found.node_id.is_some() || found.can_kbps.is_some());
         if menu::is_refusal(&words) && !names_numbers {

@@ -342,7 +342,7 @@ fn repainted_diagnostics_are_pages_and_are_stopped() {
         .collect();
     assert_eq!(pages.len(), 3);
     let quantities: Vec<_> = pages[0].iter().flat_map(|line| diagnostics::quantities(&line.text)).collect();
-    assert_eq!((quantities[0].value, quantities[0].unit.as_deref()), (23.9, Some("V")));
+    assert_eq!((quantities[0].value, quantities[0].unit.as_deref()), (Some(23.9), Some("V")));
 }
 
 #[test]

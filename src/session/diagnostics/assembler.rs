@@ -75,8 +75,40 @@ impl Assembler {
             let answers = heading.enumerate().filter(|(_, line)| diagnostics::is_switch(&line.text));
             let answer = answers.last().map_or(0, |(at, _)| at + 1);
             lines.drain(..answer);
+            if let Some(first) = lines.first_mut().filter(|_| answer == 0) {
+                without_echo(first);
+            }
         }
         let has_numbers = lines.iter().any(|line| !diagnostics::quantities(&line.text).is_empty());
         has_numbers.then_some(Page { at: self.at, lines })
+    }
+}
+
+/// Takes the echo of the key off the first line of a page: the key was sent as `s`, and no label is written like `sSUP`.
+fn without_echo(line: &mut Text) {
+    let is_echo = |rest: &str| rest.starts_with(|first: char| first.is_uppercase() || !first.is_ascii());
+    if line.text.strip_prefix('s').is_some_and(is_echo) {
+        line.text.remove(0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Span;
+
+    #[test]
+    fn the_echo_of_the_key_is_no_part_of_a_label() {
+        for (line, expected) in [
+            ("sSUP 24.061", "SUP 24.061"),
+            ("s│ Supply │ 24.061 V │", "│ Supply │ 24.061 V │"),
+            ("supply 24.061", "supply 24.061"),
+            ("SUP 24.061", "SUP 24.061"),
+            ("s", "s"),
+        ] {
+            let mut text = Text { span: Span::default(), text: line.to_owned() };
+            without_echo(&mut text);
+            assert_eq!(text.text, expected);
+        }
     }
 }

@@ -2,10 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::notation;
 use crate::canopen::ObjectAddress;
 use crate::device::Product;
+use crate::device::dictionary::{Entry, Object};
 use crate::record::Span;
 use crate::session::event::{DictionaryReading, ReadEntry, WalkEnd};
+use crate::wire::dictionary::{Expected, Reading, Shown, ViewLine};
 use crate::wire::{Message, Text, dictionary};
 
 /// Entries that are kept at most; and lines, as long as nobody knows whose objects they are.
@@ -44,6 +47,8 @@ pub(in crate::session) struct Collector {
     heading: Option<u16>,
     /// The last entry that was read: its sub-index tells how the next one is written.
     last: Option<ObjectAddress>,
+    /// Entries whose value rests on decimal digits that may be hexadecimal ones.
+    plain: BTreeSet<ObjectAddress>,
 }
 
 impl Collector {
@@ -93,6 +98,13 @@ impl Collector {
     fn read(&mut self, text: &Text) -> Read {
         let product = self.product;
         let knows = |index| product.is_none_or(|product| product.dictionary.object(index).is_some());
+        for lines in dictionary::several(&text.text, knows) {
+            if let Some(entries) = self.read_all(&lines, text) {
+                self.heading = lines.first().and_then(|line| line.index).or(self.heading);
+                entries.into_iter().for_each(|(entry, reading)| self.keep(entry, reading.as_ref()));
+                return Read::Understood;
+            }
+        }
         let Some(line) = dictionary::line(&text.text, knows) else { return Read::Nothing };
         if line.index.is_some() {
             self.heading = line.index;
@@ -100,38 +112,81 @@ impl Collector {
         let Some(index) = self.heading else { return Read::Nothing };
         let object = product.and_then(|product| product.dictionary.object(index));
         let single = object.is_none_or(|object| object.entries.len() == 1);
-        let before = self.last.filter(|last| last.index == index).map(|last| last.sub);
-        let at = ObjectAddress::new(index, line.sub.map_or(0, |sub| sub.behind(before)));
+        let at = self.address(index, &line, self.last);
         let entry = object.and_then(|object| object.entry(at.sub));
-        let shown = match (object, entry) {
-            (Some(object), Some(entry)) if line.sub.is_some() || single => {
-                // A unit like `100 µs` holds a number, which is not the value.
-                let unit = entry.unit.as_deref().unwrap_or_default();
-                let plain = unit.replace('°', "").replace('µ', "u").replace('Ω', "Ohm");
-                dictionary::value(&line.rest, entry.data_type, &[&object.name, &entry.name, unit, &plain])
+        let reading = match (object, entry) {
+            (Some(object), Some(entry)) if line.sub.is_some() || single => value(&line.rest, object, entry),
+            (Some(object), Some(_)) => {
+                self.read_list(object, &line, text);
+                // A heading: no entry, but understood.
+                return Read::Understood;
             }
-            // A heading: no entry, but understood.
-            (Some(_), Some(_)) => return Read::Understood,
             (Some(_), None) | (None, _) => None,
         };
-        match (shown, entry) {
-            (Some(shown), _) => {
-                let value = match shown {
-                    dictionary::Shown::Value(value) => Some(value),
-                    dictionary::Shown::Nothing => None,
-                };
-                self.keep(ReadEntry { at, value, text: line.rest, span: text.span, known: true });
+        match (reading, entry) {
+            (Some(reading), _) => {
+                self.keep(read_entry(at, line.rest, text, Some(&reading)), Some(&reading));
                 Read::Understood
             }
             // An object that the manual does not have is kept as it is printed.
             (None, None) if line.sub.is_some() => {
-                self.keep(ReadEntry { at, value: None, text: line.rest, span: text.span, known: false });
+                self.keep(read_entry(at, line.rest, text, None), None);
                 Read::Understood
             }
             // The heading of a variable whose value stands below.
             (None, Some(_)) if line.sub.is_none() => Read::Understood,
             (None, Some(_)) => Read::Nothing,
             (None, None) => Read::PerhapsHeading,
+        }
+    }
+
+    fn address(&self, index: u16, line: &ViewLine, last: Option<ObjectAddress>) -> ObjectAddress {
+        let before = last.filter(|last| last.index == index).map(|last| last.sub);
+        ObjectAddress::new(index, line.sub.map_or(0, |sub| sub.behind(before)))
+    }
+
+    /// Entries in columns, if all of them are such: what looks like one may be something else.
+    fn read_all(&self, lines: &[ViewLine], text: &Text) -> Option<Vec<(ReadEntry, Option<Reading>)>> {
+        let mut last = self.last;
+        let mut entries = Vec::new();
+        for line in lines {
+            let index = line.index.or(self.heading)?;
+            let at = self.address(index, line, last);
+            last = Some(at);
+            let reading = match self.product {
+                // They say more once it is known whose they are.
+                None => None,
+                Some(product) => {
+                    let object = product.dictionary.object(index)?;
+                    Some(value(&line.rest, object, object.entry(at.sub)?)?)
+                }
+            };
+            entries.push((read_entry(at, line.rest.clone(), text, reading.as_ref()), reading));
+        }
+        Some(entries)
+    }
+
+    /// The values of an object one behind the other, as in `6126h: 2 16.000 17.000`: all of them, and the first one says
+    /// how many follow.
+    fn read_list(&mut self, object: &Object, line: &ViewLine, text: &Text) {
+        let words: Vec<&str> = line.rest.split_whitespace().collect();
+        if words.len() != object.entries.len() {
+            return;
+        }
+        let read = |(entry, word): (&Entry, &&str)| {
+            let expected = Expected { data_type: entry.data_type, names: &[], unit: entry.unit.as_deref() };
+            let reading = dictionary::value(word, &expected)?;
+            Some((
+                read_entry(ObjectAddress::new(object.index, entry.sub), (*word).to_owned(), text, Some(&reading)),
+                reading,
+            ))
+        };
+        let entries: Option<Vec<_>> = object.entries.iter().zip(&words).map(read).collect();
+        let Some(entries) = entries else { return };
+        let count = entries.first().and_then(|(first, _)| first.value).and_then(|value| value.as_integer());
+        let highest = entries.last().map(|(last, _)| i64::from(last.at.sub));
+        if count.is_some() && count == highest {
+            entries.into_iter().for_each(|(entry, reading)| self.keep(entry, Some(&reading)));
         }
     }
 
@@ -154,8 +209,8 @@ impl Collector {
         let is_it = |product: &&Product| {
             let object = product.dictionary.object(PRODUCT_CODE.index);
             object.zip(object.and_then(|object| object.entry(PRODUCT_CODE.sub))).is_some_and(|(object, entry)| {
-                let value = dictionary::value(&shown.text, entry.data_type, &[&object.name, &entry.name]);
-                matches!(value, Some(dictionary::Shown::Value(value)) if value.as_integer() == Some(product.can.product_code.into()))
+                let shown = value(&shown.text, object, entry).map(|reading| reading.shown);
+                matches!(shown, Some(Shown::Value(value)) if value.as_integer() == Some(product.can.product_code.into()))
             })
         };
         Product::all().iter().find(is_it).map(|product| (product, shown.span))
@@ -175,6 +230,7 @@ impl Collector {
         for (at, entry) in &self.entries {
             if entry.known || !again.entries.contains_key(at) {
                 again.entries.insert(*at, entry.clone());
+                again.plain.extend(self.plain.get(at));
             }
         }
         *self = again;
@@ -205,6 +261,12 @@ impl Collector {
     /// Gives what was read, in the order of the addresses, of a walk that came so far.
     pub(in crate::session) fn take(&mut self, end: WalkEnd) -> DictionaryReading {
         self.read_again();
+        if let Some(product) = self.product {
+            notation::settle(&mut self.entries, &self.plain, product);
+        }
+        self.plain.clear();
+        let doubtful = self.entries.values().filter(|entry| entry.doubtful).count();
+        self.unrecognised_lines += doubtful as u64;
         let end = match (end, self.hidden()) {
             (WalkEnd::Whole, Some(first)) => WalkEnd::NotUnderstood { first: first.clone() },
             (end, _) => end,
@@ -216,11 +278,42 @@ impl Collector {
         }
     }
 
-    fn keep(&mut self, entry: ReadEntry) {
+    fn keep(&mut self, entry: ReadEntry, reading: Option<&Reading>) {
         self.last = Some(entry.at);
+        if reading.is_some_and(|reading| reading.plain) {
+            self.plain.insert(entry.at);
+        } else {
+            self.plain.remove(&entry.at);
+        }
         if self.entries.len() < MOST_ENTRIES || self.entries.contains_key(&entry.at) {
             self.entries.insert(entry.at, entry);
         }
+    }
+}
+
+/// What a line shows of an entry of the manual.
+fn value(rest: &str, object: &Object, entry: &Entry) -> Option<Reading> {
+    // A unit like `100 µs` holds a number, which is not the value.
+    let unit = entry.unit.as_deref().unwrap_or_default();
+    let plain = unit.replace('°', "").replace('µ', "u").replace('Ω', "Ohm");
+    let names = [object.name.as_str(), entry.name.as_str(), unit, plain.as_str()];
+    dictionary::value(rest, &Expected { data_type: entry.data_type, names: &names, unit: entry.unit.as_deref() })
+}
+
+/// An entry as it was printed, and what has been made of it: nothing of one that is not known.
+fn read_entry(at: ObjectAddress, rest: String, text: &Text, reading: Option<&Reading>) -> ReadEntry {
+    let value = match reading.map(|reading| reading.shown) {
+        Some(Shown::Value(value)) => Some(value),
+        Some(Shown::Nothing | Shown::Hexadecimal) | None => None,
+    };
+    ReadEntry {
+        at,
+        value,
+        text: rest,
+        span: text.span,
+        numeral: reading.map(|reading| reading.numeral.clone()),
+        doubtful: reading.is_some_and(|reading| reading.shown == Shown::Hexadecimal),
+        known: reading.is_some(),
     }
 }
 
@@ -295,6 +388,54 @@ mod tests {
     }
 
     #[test]
+    fn entries_in_columns_are_read_where_every_one_of_them_is_an_entry() {
+        let two = "6126:01=Real32(16.0) 6126:02=Real32(17.0)";
+        for (lines, expected, unrecognised) in [
+            (&["| 6126h | 01h | TC1 | 16.000 |", "| 6126h | 02h | TC2 | 17.000 |"][..], two, 0),
+            (&["6126  01  TC1  REAL32  16.000", "6126\t2\t17.000"], two, 0),
+            (&["6126 01 16.000", "6126 02 17.000"], two, 0),
+            (&["TC1 (6126h, 01h): 16.000", "TC2 (6126h, 02h): 17.000"], two, 0),
+            (&["6126h/1  TC1  16.000  min 0 max 65535", "6126h/2  TC2  17.000  min 0 max 65535"], two, 0),
+            (&["6126h Thermocouple Scaling Factor: 01=16.000 02=17.000"], two, 0),
+            (&["6126h Something", "  01h TC1   16.000   02h TC2   17.000"], two, 0),
+            (
+                &["6126h: 4 16.0 17.0 18.0 19.0"],
+                "6126:00=Unsigned8(4) 6126:01=Real32(16.0) 6126:02=Real32(17.0) 6126:03=Real32(18.0) 6126:04=Real32(19.0)",
+                0,
+            ),
+            (&["6126h: 3 16.0 17.0 18.0 19.0", "6126h: 4 16.0 17.0 18.0"], "", 0),
+            (&["1017h  00h  Producer Heartbeat Time  500"], "1017:00=Unsigned16(500)", 0),
+            // Neither of them has such an entry, or a value of its type.
+            (&["1999 01 15.5", "2027  01  31", "1000 2 5", "6126  01  open"], "", 2),
+            (&["6126h  4  entries"], "", 0),
+            (&["6126h Type: 1=J 2=K"], "", 0),
+            (&["6126h:01 TC1 24,061"], "", 1),
+        ] {
+            let mut collector = of("AXTC4CO");
+            take(&mut collector, lines);
+            assert_eq!(taken(collector), (expected.into(), unrecognised), "{lines:?}");
+        }
+    }
+
+    #[test]
+    fn where_numbers_are_hexadecimal_without_a_mark_plain_digits_are_no_decimal_ones() {
+        let cob_id = "1400h:01 COB-ID C000027F";
+        let mut collector = of("AXTC4CO");
+        take(&mut collector, &["1017h Producer Heartbeat Time = 500", "1400h:02 255", "1400h:05 5", "6126h:01 16.000"]);
+        let certain = "1017:00=Unsigned16(500) 1400:02=Unsigned8(255) 1400:05=Unsigned16(5) 6126:01=Real32(16.0)";
+        assert_eq!(taken(collector.clone()), (certain.into(), 0), "nothing says otherwise");
+        take(&mut collector, &[cob_id]);
+        let doubtful = "1017:00?= 500 1400:01?COB-ID C000027F 1400:02?255 1400:05=Unsigned16(5) 6126:01=Real32(16.0)";
+        let (read, unrecognised) = taken(collector.clone());
+        assert_eq!((read.replace("Producer Heartbeat Time ", "").as_str(), unrecognised), (doubtful, 3));
+        take(&mut collector, &["1018h:01 Vendor ID 00000055", "1018h:02 Product Code 00010114"]);
+        let (read, _) = taken(collector);
+        assert!(read.contains("1400:01=Unsigned32(3221226111)"), "{read}");
+        assert!(read.contains("1018:01=Unsigned32(85) 1018:02=Unsigned32(65812)"), "{read}");
+        assert!(read.contains("1400:02?255"), "what may be either stays so: {read}");
+    }
+
+    #[test]
     fn lines_say_more_once_it_is_known_whose_they_are() {
         let lines = ["6126h Scaling Factor", "  01h TC1 = 16.000", "something 5", ">S - Diagnostics 7"];
         let mut collector = Collector::default();
@@ -343,11 +484,13 @@ mod tests {
             value: None,
             text: number.to_string(),
             span: Span::default(),
+            numeral: None,
+            doubtful: false,
             known: false,
         };
-        (0..=MOST_ENTRIES).for_each(|number| collector.keep(entry(number)));
+        (0..=MOST_ENTRIES).for_each(|number| collector.keep(entry(number), None));
         assert_eq!(collector.count(), MOST_ENTRIES);
-        collector.keep(ReadEntry { text: "again".into(), ..entry(7) });
+        collector.keep(ReadEntry { text: "again".into(), ..entry(7) }, None);
         assert_eq!(collector.entries[&entry(7).at].text, "again");
         assert_eq!(collector.count(), MOST_ENTRIES);
     }

@@ -5,6 +5,7 @@
 //! every way out of this job leaves it, and looks whether the menu is there.
 
 mod collector;
+mod notation;
 
 pub(super) use collector::Collector;
 

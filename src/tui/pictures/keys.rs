@@ -99,7 +99,15 @@ fn a_dictionary_of_no_known_product_is_compared_with_nothing_until_it_is_known()
     stage.press(KeyCode::Enter).opened("/dev/ttyUSB0").keys("5");
     let at = ObjectAddress::new(0x6110, 2);
     let value = Some(Value::Unsigned16(2));
-    let entry = ReadEntry { at, value, text: "type = 2".into(), span: Span::default(), known: true };
+    let entry = ReadEntry {
+        at,
+        value,
+        text: "type = 2".into(),
+        span: Span::default(),
+        numeral: None,
+        doubtful: false,
+        known: true,
+    };
     let reading = DictionaryReading { entries: vec![entry], end: WalkEnd::Whole, unrecognised_lines: 0 };
     stage.finished(Outcome::DictionaryRead(Box::new(reading)));
     assert!(stage.shows("1 of 1, compared with nothing") && !stage.shows("not as"), "{}", stage.picture());

@@ -146,7 +146,15 @@ impl Stage {
                 _ => entry.default.map(|default| default.on_node(127)),
             };
             let text = format!("{} = {}", object.name, value.map_or_else(|| "?".to_owned(), |value| value.to_string()));
-            ReadEntry { at, value, text, span: Span::default(), known: true }
+            ReadEntry {
+                at,
+                value,
+                text,
+                span: Span::default(),
+                numeral: value.map(|value| value.to_string()),
+                doubtful: false,
+                known: true,
+            }
         };
         let entries = axtc4co().dictionary.entries().filter(|(at, _, _)| *at != ObjectAddress::new(0x5010, 0));
         let reading =

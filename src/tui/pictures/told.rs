@@ -327,7 +327,15 @@ fn one_is_one_and_not_ones() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("v").press(KeyCode::Enter);
     let at = ObjectAddress::new(0x1001, 0);
-    let entry = ReadEntry { at, value: None, text: "?".into(), span: Span::default(), known: true };
+    let entry = ReadEntry {
+        at,
+        value: None,
+        text: "?".into(),
+        span: Span::default(),
+        numeral: None,
+        doubtful: false,
+        known: true,
+    };
     let ends =
         [(WalkEnd::Whole, "The dictionary is read: 1 entry, "), (WalkEnd::Stopped, "was shown: 1 entry was read.")];
     for (end, told) in ends {

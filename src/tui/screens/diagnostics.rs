@@ -289,7 +289,7 @@ mod tests {
 
     /// The names under which the numbers of these lines are shown, with the value they have now.
     fn names(lines: &[&str]) -> Vec<String> {
-        let found: Vec<Tracked> = lines.iter().flat_map(|line| quantities(line)).map(Tracked::from).collect();
+        let found: Vec<Tracked> = lines.iter().flat_map(|line| quantities(line)).filter_map(Tracked::first).collect();
         named(&found).into_iter().map(|tracked| tracked.label).collect()
     }
 
@@ -311,14 +311,8 @@ mod tests {
         assert_eq!(names(&["Short Circuits 3", "Last Error Code 7"]), ["Short Circuits", "Last Error Code"]);
         let mut found: Vec<Tracked> = Vec::new();
         for (line, value) in [("RTD1 20.0 C raw 4000 uV", None), ("RTD1 Short C raw 4001 uV", Some(()))] {
-            found.extend(quantities(line).into_iter().map(|quantity| Tracked {
-                value: value.map(|()| quantity.value),
-                label: quantity.label,
-                unit: quantity.unit,
-                decimals: quantity.decimals,
-                min: quantity.value,
-                max: quantity.value,
-            }));
+            let tracked = quantities(line).into_iter().filter_map(Tracked::first);
+            found.extend(tracked.map(|tracked| Tracked { value: value.and(tracked.value), ..tracked }));
         }
         let shown: Vec<_> = named(&found).into_iter().map(|it| (it.label, it.value, it.min, it.max)).collect();
         assert_eq!(

@@ -38,7 +38,7 @@ pictures! {
         let mut stage = Stage::connected(size);
         stage.keys("v").press(KeyCode::Enter);
         let at = ObjectAddress::new(0x1001, 0);
-        let entry = ReadEntry { at, value: Some(Value::Unsigned8(0)), text: "Error Register = 0".into(), span: Span::default(), known: true };
+        let entry = ReadEntry { at, value: Some(Value::Unsigned8(0)), text: "Error Register = 0".into(), span: Span::default(), numeral: None, doubtful: false, known: true };
         let reading = DictionaryReading { entries: vec![entry], end: WalkEnd::Stopped, unrecognised_lines: 0 };
         stage.finished(Outcome::DictionaryRead(Box::new(reading)));
         stage
