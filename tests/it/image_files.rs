@@ -152,7 +152,7 @@ fn an_intel_hex_file_is_loaded_like_any_other() {
     assert_eq!(run(&world, &["convert", &image(NEW), "--out", "x.hex"]).code, Some(0));
     let planned = world.run(&["load", "x.hex", "--dry-run"], b"");
     assert_eq!(planned.code, Some(0), "{}", planned.err);
-    assert!(planned.err.contains("image  x.hex: AXTC4CO V1.2.0"), "{}", planned.err);
+    assert!(planned.out.contains("image  x.hex: AXTC4CO V1.2.0"), "{}", planned.out);
     let checked = run(&world, &["check", "x.hex", "--product", "axtc4co"]);
     assert_eq!(
         (checked.code, checked.out.as_str()),

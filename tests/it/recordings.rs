@@ -86,6 +86,27 @@ fn comparable(text: &str) -> String {
 }
 
 #[test]
+fn the_time_of_a_streams_rows_begins_with_the_first_and_a_recording_without_rows_has_none() {
+    let world = World::new();
+    let made = world.run(
+        &["stream", "--port", "emu:axrtd8co", "--period", "200", "--count", "5", "--record", "rows.cast"],
+        b"",
+    );
+    assert_eq!(made.code, Some(0), "{}", made.err);
+    let rows = |more: &[&str]| world.run(&[&["stream", "--port", "replay:rows.cast"], more].concat(), b"");
+    for (seconds, count) in [("0.5", 3), ("10", 5)] {
+        let ran = rows(&["--duration", seconds]);
+        assert_eq!((ran.code, ran.out.lines().count()), (Some(0), 1 + count), "{seconds}: {}", ran.out);
+    }
+    let more = rows(&["--count", "9"]);
+    assert_eq!((more.code, more.out.lines().count()), (Some(0), 6), "{}", more.out);
+    assert!(more.err.contains("the recording has no more: 5 rows of 9"), "{}", more.err);
+    let other = rows(&["--source", "pv"]);
+    assert_eq!((other.code, other.out.as_str()), (Some(4), ""), "{}", other.err);
+    assert!(other.err.contains("no row of the stream with process values"), "{}", other.err);
+}
+
+#[test]
 fn what_writes_to_a_unit_refuses_a_recording() {
     let world = World::new();
     let made = world.run(&["identify", "--port", "emu:axtc4co", "--record", "it.cast"], b"");

@@ -253,7 +253,7 @@ fn a_dry_run_shows_the_plan_and_sends_no_key_but_the_question() {
     let bench = Bench::new();
     let ran = bench.run(&["load", "new.S", "--dry-run"]);
     assert_eq!(ran.code, Some(0), "{}", ran.err);
-    assert!(ran.err.contains("plan ") && ran.err.contains("AXTC4CO V1.2.0"), "{}", ran.err);
+    assert!(ran.out.contains("plan ") && ran.out.contains("AXTC4CO V1.2.0"), "{}", ran.out);
     let recordings = bench.world.files("state/axcon/recordings");
     let text = fs::read_to_string(recordings.first().expect("a recording")).expect("text");
     let sent: Vec<&str> = text.lines().filter(|line| line.contains(r#","i","#)).collect();
@@ -337,7 +337,7 @@ fn a_plan_of_long_records_counts_those() {
     let bench = Bench::new();
     let plan = |more: &[&str]| {
         let ran = bench.run(&[&["load", "new.S", "--dry-run"], more].concat());
-        let (_, plan) = ran.err.split_once("send ").expect("a plan");
+        let (_, plan) = ran.out.split_once("send ").expect("a plan");
         let (characters, rest) = plan.split_once(" characters").expect("their number");
         (characters.parse::<u32>().expect("a number"), rest.to_owned())
     };
@@ -407,7 +407,7 @@ fn several_units_are_uploaded_to_at_once_and_one_that_fails_disturbs_none() {
     let dry = ["load", "new.S", "--dry-run", "--port", "u1", "--port", "missing", "--port", "u2"];
     let ran = world.run(&dry, b"");
     assert_eq!(ran.code, Some(3), "{}", ran.err);
-    assert!(ran.err.contains("unit   u1: ") && ran.err.contains("unit   u2: "), "{}", ran.err);
+    assert!(ran.out.contains("unit   u1: ") && ran.out.contains("unit   u2: "), "{}", ran.out);
     assert!(ran.err.contains("cannot open missing") && ran.err.ends_with("2 of 3 units can take it\n"), "{}", ran.err);
     let ran = world.run(&[&dry[..], &["--json"]].concat(), b"");
     let objects = objects(&ran.out);

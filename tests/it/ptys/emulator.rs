@@ -204,6 +204,8 @@ fn a_pulled_cable_hangs_up_and_comes_back_as_another_port_under_the_same_link() 
     emulator.wait_out("its cable is out");
     while !matches!(received.recv_timeout(PATIENCE).expect("a hang-up"), Input::Gone { .. }) {}
     assert!(!first.exists(), "the port is gone");
+    // Its number may be another port's soon, and what opens the link must not open that.
+    wait_until("the link goes", || fs::symlink_metadata(world.path("unit")).is_err());
     emulator.input(b"plug\n");
     wait_until("the link follows", || fs::read_link(world.path("unit")).is_ok_and(|target| target != first));
     let ran = world.run(&["identify", "--json", "--port", "unit"], b"");
