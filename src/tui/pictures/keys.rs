@@ -155,7 +155,7 @@ fn a_recording_is_steered_by_its_keys() {
     }
     // There + and - say how fast Space will play it, which is in sight.
     plays(&mut stage, 100, Pace::AtOnce);
-    assert!(stage.shows("Space plays it, as fast as it was; + - change that."), "{}", stage.picture());
+    assert!(stage.shows("Space plays it, as fast as it was (+ -)."), "{}", stage.picture());
     assert!(stage.shows("Space play ") && !stage.shows("Space pause"), "{}", stage.picture());
     stage.keys("+");
     assert_eq!(stage.asked(), [Effect::Play(Playback::Pace(Pace::Times(2)))]);
