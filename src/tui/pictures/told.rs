@@ -393,3 +393,16 @@ fn the_text_beside_the_bytes_is_whole_with_times_at_80_columns() {
     let last = picture.lines().rev().find(|line| line.contains("12:00:03")).expect("bytes");
     assert!(last.split("  ").last().is_some_and(|text| text.len() >= 8), "{picture}");
 }
+
+#[test]
+fn a_path_used_before_that_depends_on_a_folder_says_so() {
+    for (port, depends) in [("bench/tty", true), ("/tmp/tty", false), ("tcp://hall:4001", false)] {
+        let mut stage = Stage::with_ports(SMALL);
+        stage.recordings(vec![recording("2026-01-31 11:00:00", port, 1, None)]);
+        (0..5).for_each(|_| {
+            stage.press(KeyCode::Down);
+        });
+        assert!(stage.shows("Was connected before"), "{port}: {}", stage.picture());
+        assert_eq!(stage.shows("A path from the folder of that time"), depends, "{port}: {}", stage.picture());
+    }
+}
