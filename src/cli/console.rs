@@ -9,7 +9,7 @@ use super::error::{CliError, Kind};
 use super::{Global, image as image_cli, link};
 use crate::device::LoaderKind;
 use crate::host::Input;
-use crate::host::clock::Clock;
+use crate::host::clock::{self, Clock};
 use crate::host::journal::{Journal, Note};
 use crate::host::link::{Connection, LinkSpec, Options};
 use crate::host::ports;
@@ -36,7 +36,10 @@ pub fn run(global: &Global) -> Result<(), CliError> {
         recording: link::recording(global)?,
         noted: |link| {
             let note = journal(link).and_then(|(journal, key)| journal.note(&key));
-            note.map(|Note { product, image, ran, .. }| Noted { product, image, ran })
+            note.map(|Note { product, image, ran, unix_seconds }| {
+                let begun = clock::local_text(unix_seconds.saturating_mul(1000));
+                Noted { product, image, ran, begun }
+            })
         },
         palette: palette(|name| std::env::var_os(name))?,
         resolve,
@@ -97,7 +100,7 @@ fn check(path: PathBuf, loader: Option<LoaderKind>, allow: &[DefectId]) -> Resul
 fn note(link: &str, upload: Option<Noted>) {
     let Some((journal, key)) = journal(link) else { return };
     let _ = match upload {
-        Some(Noted { product, image, ran }) => {
+        Some(Noted { product, image, ran, .. }) => {
             let unix_seconds = Clock::start().wall(Instant::ZERO).as_second();
             journal.begin(&key, Note { product, image, unix_seconds, ran })
         }

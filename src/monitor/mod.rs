@@ -2,11 +2,13 @@
 //! and the text of the line. The console shows it, a report prints it.
 
 mod diagnostics;
+mod plugged;
 mod scrollback;
 mod stream;
 mod trend;
 
 pub use diagnostics::{Diagnostics, Tracked};
+pub use plugged::Plugged;
 pub use scrollback::{KEPT_LINES, Origin, Scrollback, TextLine};
 pub use stream::{Channel, Fault, Faults, Mark, Sample, Stream};
 

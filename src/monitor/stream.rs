@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::plugged::Plugged;
 use super::trend::Trend;
 use crate::device::Product;
 use crate::time::{Duration, Instant};
@@ -69,6 +70,8 @@ pub struct Channel {
     pub name: String,
     /// The newest reading.
     pub reading: Reading,
+    /// Some numbers of it may stand for a fault.
+    has_plugged: bool,
     /// Smallest value.
     pub min: Option<f64>,
     /// Largest value.
@@ -125,7 +128,7 @@ impl Stream {
             *self = Stream { source: Some(row.source), marks, set: self.set, ..Stream::default() };
             // Nobody will say any more that it is over.
             faults.end_all(at, |fault| !names.contains(&fault.channel));
-            self.channels = names.into_iter().map(Channel::new).collect();
+            self.channels = names.iter().cloned().map(Channel::new).collect();
         }
         let interrupted = std::mem::take(&mut self.interrupted);
         let mut gap_since = None;
@@ -140,9 +143,14 @@ impl Stream {
         self.newest = Some(at);
         self.rows += 1;
         self.late = false;
+        let has_plugged = Plugged::are_in(row.source, product, &names);
         for (channel, &reading) in self.channels.iter_mut().zip(&row.readings) {
+            channel.has_plugged = has_plugged;
             channel.read(at, reading, gap_since);
-            faults.note(&channel.name, Some(reading).filter(|reading| reading.is_fault()), at);
+            // It is not known to be a fault, nor that one is over.
+            if channel.plugged().is_none() {
+                faults.note(&channel.name, Some(reading).filter(|reading| reading.is_fault()), at);
+            }
         }
     }
 
@@ -233,7 +241,7 @@ impl Stream {
     /// Starts minimum, maximum and mean of every channel anew.
     pub fn restart_extremes(&mut self) {
         for channel in &mut self.channels {
-            let value = channel.reading.value();
+            let value = channel.reading.value().filter(|_| channel.plugged().is_none());
             (channel.min, channel.max) = (value, value);
             channel.sum = value.map_or((0.0, 0), |value| (value, 1));
         }
@@ -256,6 +264,7 @@ impl Channel {
         Channel {
             name,
             reading: Reading::Disabled,
+            has_plugged: false,
             min: None,
             max: None,
             sum: (0.0, 0),
@@ -268,7 +277,8 @@ impl Channel {
     fn read(&mut self, at: Instant, reading: Reading, gap_since: Option<Instant>) {
         let value = reading.value();
         self.reading = reading;
-        if let Some(value) = value {
+        // A number that may stand for a fault says nothing of what was measured.
+        if let Some(value) = value.filter(|_| self.plugged().is_none()) {
             self.min = Some(self.min.map_or(value, |min| min.min(value)));
             self.max = Some(self.max.map_or(value, |max| max.max(value)));
             self.sum = (self.sum.0 + value, self.sum.1 + 1);
@@ -281,6 +291,26 @@ impl Channel {
         if self.history.len() > KEPT_SAMPLES {
             self.history.pop_front();
         }
+    }
+
+    /// The state of the newest reading, in words for a person.
+    pub fn words(&self) -> &'static str {
+        self.words_of(self.reading)
+    }
+
+    /// The same of an earlier one.
+    pub fn words_of(&self, reading: Reading) -> &'static str {
+        self.plugged_of(reading).map_or(reading.words(), Plugged::words)
+    }
+
+    /// What the newest reading may stand for besides a value.
+    pub fn plugged(&self) -> Option<Plugged> {
+        self.plugged_of(self.reading)
+    }
+
+    /// The same of an earlier one.
+    pub fn plugged_of(&self, reading: Reading) -> Option<Plugged> {
+        Plugged::of(reading).filter(|_| self.has_plugged)
     }
 
     /// Mean of the values since minimum and maximum began.
@@ -437,6 +467,38 @@ mod tests {
         let at = Instant::from_millis;
         assert_eq!(seen, [(Reading::Short, at(3000), Some(at(4000))), (Reading::Open, at(1000), Some(at(3000)))]);
         assert_eq!((monitor.stream.channels[0].min, monitor.stream.channels[0].max), (Some(20.0), Some(21.0)));
+    }
+
+    #[test]
+    fn a_process_value_that_may_stand_for_a_fault_is_neither_a_fault_nor_a_good_reading() {
+        let product = Product::named("AXRTD8CO");
+        let mut monitor = Monitor::default();
+        let pv = |monitor: &mut Monitor, second: u64, source, first, product| {
+            let mut readings = vec![Reading::Value(10.0); 8];
+            readings[0] = first;
+            let (at, row) = (Instant::from_millis(1000 * second), Row { source, readings });
+            monitor.fold(&Event::Row { at, span: Span::default(), row }, product);
+        };
+        let value = Reading::Value;
+        for (second, reading) in [value(4000.0), Reading::Open, value(-384.0)].into_iter().enumerate() {
+            pv(&mut monitor, second as u64, Source::ProcessValue, reading, product);
+        }
+        let channel = &monitor.stream.channels[0];
+        assert_eq!((channel.words(), channel.reading), ("converter?", value(-384.0)));
+        assert_eq!((channel.min, channel.max, channel.mean()), (Some(4000.0), Some(4000.0), Some(4000.0)));
+        assert_eq!((monitor.faults.lasting().count(), monitor.faults.seen), (1, 1), "the open circuit is not over");
+        monitor.stream.restart_extremes();
+        assert_eq!(monitor.stream.channels[0].min, None);
+        for (code, word) in [(-512.0, "open?"), (-448.0, "short?"), (-1.0, "off?"), (-2.0, "ok")] {
+            pv(&mut monitor, 9, Source::ProcessValue, value(code), None);
+            assert_eq!(monitor.stream.channels[0].words(), word, "by the names of its channels");
+        }
+        assert_eq!(monitor.faults.lasting().count(), 0, "a value is one");
+        // Degrees are what they are, and the other product has no such numbers among its eight channels.
+        pv(&mut monitor, 10, Source::FieldValue, value(-1.0), product);
+        assert_eq!(monitor.stream.channels[0].words(), "ok");
+        pv(&mut monitor, 11, Source::ProcessValue, value(-512.0), Product::named("AXTC4CO"));
+        assert_eq!(monitor.stream.channels[0].words(), "ok");
     }
 
     #[test]

@@ -114,7 +114,7 @@ impl Contents<'_> {
         page.paragraph(&format!("{} rows, the last at {}: {what}.", stream.rows, self.time(newest)));
         let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
         let rows = stream.channels.iter().map(|channel| {
-            let words = channel.reading.words();
+            let words = channel.words();
             let state = if channel.reading.is_fault() { Cell::bad(words) } else { Cell::plain(words) };
             let [value, min, max, mean] = [channel.reading.value(), channel.min, channel.max, channel.mean()]
                 .map(|value| Cell::number(show(value)));

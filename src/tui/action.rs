@@ -47,6 +47,8 @@ pub enum Action {
         /// What stands on the unit's label, where the unit cannot say it.
         product: Option<String>,
     },
+    /// The unit is not the one that the note of an upload is about.
+    OtherUnit,
     /// The report of the last upload has been read.
     DismissReport,
     /// Start minimum and maximum anew.

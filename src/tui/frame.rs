@@ -80,6 +80,8 @@ pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
         },
     };
     let state = match facts.state {
+        // Without power it would look the same.
+        UnitState::Loader if view.load.is_silent => Some("silent, in loader?"),
         UnitState::Loader => Some("in loader"),
         _ if view.viewing => Some("halted by V"),
         _ if view.question.is_some() => Some("asks, see 3"),
@@ -212,6 +214,12 @@ pub fn lost(view: &View, front: ScreenId, theme: Theme, columns: usize) -> Vec<L
     let text = format!("Link lost: {}", visible::text(&failure.text));
     let mut rows = vec![Line::styled(format::left(&format!(" {text}"), columns), theme.alarm())];
     let then = match front {
+        ScreenId::Terminal if emulated(view).is_some() => {
+            " Below is history. The emulated unit is gone with it; Ctrl-] C begins anew."
+        }
+        _ if emulated(view).is_some() => {
+            " Below is history. The emulated unit is gone with it; C begins with a new one."
+        }
         ScreenId::Terminal => " Below is history. Plug it in again; Ctrl-] C connects, Ctrl-] 1 lists links.",
         _ => " Below is history. Plug the cable in again; C connects, 1 chooses another link.",
     };
@@ -294,7 +302,10 @@ fn prefix_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'
     if after_prefix {
         line.push_span(Span::styled("next key is for axcon: ", theme.warning()));
     } else {
+        // Without Ctrl-] in front of it every key but this one is the unit's, Q too.
         line.push_span(Span::raw("keys to the unit; "));
+        line.spans
+            .extend(EVERYWHERE.iter().filter(|binding| binding.cmd == Cmd::Help).flat_map(|help| hint(theme, help)));
         line.push_span(Span::styled("Ctrl-]", theme.key()));
         line.push_span(Span::raw(" then "));
     }
@@ -303,7 +314,8 @@ fn prefix_keys(theme: Theme, bindings: &[Binding], after_prefix: bool) -> Line<'
     }
     line.push_span(Span::styled("1-9", theme.key()));
     line.push_span(Span::raw(" screen  "));
-    line.spans.extend(hints(theme, &[EVERYWHERE]));
+    let rest = EVERYWHERE.iter().filter(|binding| after_prefix || binding.cmd != Cmd::Help);
+    line.spans.extend(rest.filter(|binding| !binding.short.is_empty()).flat_map(|binding| hint(theme, binding)));
     line
 }
 

@@ -226,6 +226,8 @@ pub struct Noted {
     pub image: String,
     /// The software the unit ran before, where it said so.
     pub ran: Option<Version>,
+    /// When it was begun, in local time: date and time, or the time of day alone if it was on the link as it is open now.
+    pub begun: String,
 }
 
 /// The recordings that are there.

@@ -44,6 +44,8 @@ pub enum Cmd {
     Accept,
     /// Back one step.
     Back,
+    /// The folder above.
+    Above,
     /// Look again.
     Refresh,
     /// Type a name.
@@ -82,6 +84,8 @@ pub enum Cmd {
     Allow,
     /// Another kind of loader.
     Loader,
+    /// Another unit than the noted one.
+    OtherUnit,
     /// Send a file as it is.
     SendFile,
     /// Hold the line low for a moment.

@@ -41,6 +41,22 @@ impl Returning {
         Returning { before, waiting: VecDeque::new() }
     }
 
+    /// Whether it was in its loader.
+    pub fn was_in_loader(&self) -> bool {
+        self.before.state == UnitState::Loader
+    }
+
+    /// Whether its version is known to be that of whoever is there now.
+    pub fn has_version_of(&self, now: &Facts) -> bool {
+        let versions = self.before.version.as_ref().zip(now.version.as_ref());
+        versions.is_some_and(|(before, now)| before.value == now.value)
+    }
+
+    /// Whether whoever is there now has not said its version, of which that of before is known.
+    pub fn lacks_version(&self, now: &Facts) -> bool {
+        self.before.version.is_some() && now.version.is_none()
+    }
+
     /// Keeps a row or a page of whoever is there now.
     pub fn wait(&mut self, event: Event) {
         if self.waiting.len() == MOST_WAITING {

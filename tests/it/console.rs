@@ -320,6 +320,7 @@ fn the_dictionary_is_read_searched_compared_and_written_down() {
     assert!(desk.picture().contains("before.json is written"), "{}", desk.picture());
     desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("before.json").press(KeyCode::Enter);
     assert!(desk.picture().contains("it is there already"), "an older file is left alone: {}", desk.picture());
+    desk.press(KeyCode::Esc);
 
     // Somebody switches a channel off, and the next reading says so.
     let now = desk.now;
@@ -341,6 +342,7 @@ fn the_dictionary_is_read_searched_compared_and_written_down() {
     assert!(desk.picture().contains("with 'operating mode'"), "{}", desk.picture());
     desk.press(KeyCode::Esc).keys("ex.pdf").press(KeyCode::Enter);
     assert!(desk.picture().contains("the name has to end in"), "{}", desk.picture());
+    desk.press(KeyCode::Esc);
     for (name, holds) in [("a.csv", "6112,2,"), ("a.dcf", "[6112sub2]"), ("a.txt", "* 6112:02")] {
         desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys(name).press(KeyCode::Enter);
         let text = String::from_utf8_lossy(&desk.files[Path::new(name)]).into_owned();
@@ -503,6 +505,9 @@ fn task_recover_an_upload_whose_cable_was_pulled() {
     let told = desk.picture();
     assert!(told.contains("AXTC4CO?") && told.contains("these are its last values"), "{told}");
     desk.keys("4").press(KeyCode::Enter).press(KeyCode::Enter);
+    let asked = desk.drawn();
+    assert!(asked.contains("Is it the unit this was begun for?"), "{asked}");
+    desk.keys("y");
     let begun = desk.drawn();
     assert!(begun.contains("── Loading"), "neither label nor password need be asked for: {begun}");
     desk.wait_for("after 1.2.0");
@@ -517,7 +522,7 @@ fn task_recover_an_upload_whose_console_was_killed() {
     desk.started_again();
     desk.keys("lp/images/AXTC4CO_V1.2.0.elf.S").press(KeyCode::Enter);
     assert_snapshot!("task_recover_after_a_kill", desk.drawn());
-    desk.press(KeyCode::Enter);
+    desk.press(KeyCode::Enter).keys("y");
     desk.wait_for("after 1.2.0");
     assert_eq!(desk.noted, None);
 }

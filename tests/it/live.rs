@@ -276,6 +276,8 @@ fn a_wire_broken_on_the_bench_is_an_open_circuit_in_the_stream() {
     let bench = screen.wait("open circuit");
     assert!(bench.contains("broken") && bench.contains("open 3                        done"), "{bench}");
     screen.keys("/warm it up\r");
+    screen.wait("Column 1: 'warm' is not known");
+    screen.keys("\x03");
     screen.wait("refused: column 1");
     // A click on a tab.
     let column = bench.lines().nth(1).and_then(|tabs| tabs.find("6 Stream")).expect("a tab") + 2;

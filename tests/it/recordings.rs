@@ -88,10 +88,8 @@ fn comparable(text: &str) -> String {
 #[test]
 fn the_time_of_a_streams_rows_begins_with_the_first_and_a_recording_without_rows_has_none() {
     let world = World::new();
-    let made = world.run(
-        &["stream", "--port", "emu:axrtd8co", "--period", "200", "--count", "5", "--record", "rows.cast"],
-        b"",
-    );
+    let made = world
+        .run(&["stream", "--port", "emu:axrtd8co", "--period", "200", "--count", "5", "--record", "rows.cast"], b"");
     assert_eq!(made.code, Some(0), "{}", made.err);
     let rows = |more: &[&str]| world.run(&[&["stream", "--port", "replay:rows.cast"], more].concat(), b"");
     for (seconds, count) in [("0.5", 3), ("10", 5)] {

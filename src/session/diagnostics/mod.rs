@@ -19,6 +19,9 @@ const WATCH: Duration = Duration::from_millis(1300);
 /// How long the first page may take: a unit has no values for up to 5 s behind its power-up (AXRTD8CO manual,
 /// section 1.1).
 pub(super) const FIRST_PAGE: Duration = Duration::from_millis(6500);
+/// When it is looked, behind the key, how much has come: a unit that has said something by each of them and by the end goes
+/// on talking.
+const LOOKS: [Duration; 2] = [Duration::from_millis(1500), Duration::from_millis(4000)];
 /// How long the next page may take.
 const NEXT_PAGE: Duration = Duration::from_millis(2500);
 /// Time without a page behind the key that stops them.
@@ -42,6 +45,10 @@ pub(super) struct Diagnostics {
     heard: Option<Span>,
     /// Something has come since the key was pressed last.
     answered: bool,
+    /// When the key was pressed, whether rows of a stream came already, and the bytes that had been received at each look.
+    asked_at: Instant,
+    streamed: bool,
+    looks: Vec<u64>,
     /// Pages that nobody here has asked for come, and all that is wanted is that they stop.
     only_stops: bool,
 }
@@ -52,6 +59,8 @@ enum Stage {
     Watching,
     /// The key is out.
     Asked,
+    /// What the key has switched on is no page that can be read, and has been switched off again.
+    NotUnderstood,
     /// Pages come.
     Reading,
     /// The key is out that stops them, pressed so often.
@@ -70,6 +79,9 @@ impl Diagnostics {
             deadline: None,
             heard: None,
             answered: false,
+            asked_at: Instant::ZERO,
+            streamed: false,
+            looks: Vec::new(),
             only_stops: false,
         }
     }
@@ -96,7 +108,7 @@ impl Diagnostics {
                 self.stop(desk, presses + 1, cancelled);
                 None
             }
-            Stage::AskingForMenu { .. } => None,
+            Stage::AskingForMenu { .. } | Stage::NotUnderstood => None,
             Stage::Watching | Stage::Asked | Stage::Reading => {
                 self.stage = Stage::Reading;
                 self.deadline = Some(desk.now + NEXT_PAGE);
@@ -114,7 +126,15 @@ impl Diagnostics {
         desk.send(b"s");
         self.page.pressed();
         self.stage = Stage::Asked;
-        self.deadline = Some(desk.now + FIRST_PAGE);
+        (self.asked_at, self.streamed) = (desk.now, desk.facts.stream.is_some());
+        self.looks.clear();
+        self.deadline = Some(desk.now + LOOKS[0]);
+    }
+
+    /// Whether the unit has been talking ever since the key was pressed, as it did not before.
+    fn goes_on(&self, desk: &Desk<'_>) -> bool {
+        let all: Vec<u64> = self.looks.iter().copied().chain([desk.received]).collect();
+        !self.streamed && all.windows(2).all(|pair| pair[0] < pair[1])
     }
 
     fn stop(&mut self, desk: &mut Desk<'_>, presses: u32, cancelled: bool) {
@@ -131,6 +151,18 @@ impl Diagnostics {
                 self.switch_on(desk);
                 None
             }
+            Stage::Asked if self.looks.len() < LOOKS.len() => {
+                self.looks.push(desk.received);
+                self.deadline = Some(self.asked_at + LOOKS.get(self.looks.len()).copied().unwrap_or(FIRST_PAGE));
+                None
+            }
+            Stage::Asked if self.goes_on(desk) => {
+                desk.send(b"s");
+                self.stage = Stage::NotUnderstood;
+                self.deadline = Some(desk.now + STOPPED);
+                None
+            }
+            Stage::NotUnderstood => Some(Outcome::NoAnswer { job, awaited: Awaited::Page, heard: self.heard }),
             Stage::Asked => {
                 if desk.pending.is_some() {
                     desk.leave_dialogue();
@@ -214,7 +246,7 @@ impl Work for Diagnostics {
                     self.stop(desk, 1, true);
                     None
                 }
-                Stage::Stopping { .. } | Stage::AskingForMenu { .. } => None,
+                Stage::Stopping { .. } | Stage::AskingForMenu { .. } | Stage::NotUnderstood => None,
             },
             Signal::LinkLost => Some(Outcome::Cancelled(Job::Diagnostics)),
         }

@@ -41,6 +41,8 @@ pub(in crate::session) struct Collector {
     /// The same, each once: what a unit repeats hides no entry. And which of them came first.
     unread: BTreeSet<String>,
     first_unread: Option<String>,
+    /// Lines that were taken for the heading of an object, and have a number.
+    headings: BTreeMap<u16, String>,
     /// All lines, as long as the product is not known: with it they say more. And whether they mean something else.
     lines: Vec<(Text, bool)>,
     /// The object whose entries follow.
@@ -95,6 +97,17 @@ impl Collector {
         self.first_unread.as_ref().filter(|_| hides)
     }
 
+    /// Headings behind which no entry came were none: the entries stood in them.
+    fn count_headings(&mut self) {
+        for (index, heading) in std::mem::take(&mut self.headings) {
+            let entries = ObjectAddress::new(index, 0)..=ObjectAddress::new(index, u8::MAX);
+            if self.entries.range(entries).next().is_none() {
+                self.unrecognised_lines += 1;
+                self.unread(&heading);
+            }
+        }
+    }
+
     fn read(&mut self, text: &Text) -> Read {
         let product = self.product;
         let knows = |index| product.is_none_or(|product| product.dictionary.object(index).is_some());
@@ -118,7 +131,10 @@ impl Collector {
             (Some(object), Some(entry)) if line.sub.is_some() || single => value(&line.rest, object, entry),
             (Some(object), Some(_)) => {
                 self.read_list(object, &line, text);
-                // A heading: no entry, but understood.
+                // A heading: no entry, but understood. With a number in it, it may be more.
+                if may_be_an_entry(&line.rest) {
+                    self.headings.entry(index).or_insert_with(|| text.text.trim().to_owned());
+                }
                 return Read::Understood;
             }
             (Some(_), None) | (None, _) => None,
@@ -261,6 +277,7 @@ impl Collector {
     /// Gives what was read, in the order of the addresses, of a walk that came so far.
     pub(in crate::session) fn take(&mut self, end: WalkEnd) -> DictionaryReading {
         self.read_again();
+        self.count_headings();
         if let Some(product) = self.product {
             notation::settle(&mut self.entries, &self.plain, product);
         }
@@ -384,7 +401,7 @@ mod tests {
         // The heading of an array names a number of its own; that is no value.
         let mut collector = of("AXTC4CO");
         take(&mut collector, &["6126h Scaling Factor 4"]);
-        assert_eq!(taken(collector), (String::new(), 0));
+        assert_eq!(taken(collector), (String::new(), 1));
     }
 
     #[test]
@@ -403,12 +420,12 @@ mod tests {
                 "6126:00=Unsigned8(4) 6126:01=Real32(16.0) 6126:02=Real32(17.0) 6126:03=Real32(18.0) 6126:04=Real32(19.0)",
                 0,
             ),
-            (&["6126h: 3 16.0 17.0 18.0 19.0", "6126h: 4 16.0 17.0 18.0"], "", 0),
+            (&["6126h: 3 16.0 17.0 18.0 19.0", "6126h: 4 16.0 17.0 18.0"], "", 1),
             (&["1017h  00h  Producer Heartbeat Time  500"], "1017:00=Unsigned16(500)", 0),
             // Neither of them has such an entry, or a value of its type.
             (&["1999 01 15.5", "2027  01  31", "1000 2 5", "6126  01  open"], "", 2),
-            (&["6126h  4  entries"], "", 0),
-            (&["6126h Type: 1=J 2=K"], "", 0),
+            (&["6126h  4  entries"], "", 1),
+            (&["6126h Type: 1=J 2=K"], "", 1),
             (&["6126h:01 TC1 24,061"], "", 1),
         ] {
             let mut collector = of("AXTC4CO");
@@ -464,6 +481,17 @@ mod tests {
         let mut collector = of("AXTC4CO");
         (0..20).for_each(|number| take(&mut collector, &[&page(number)]));
         assert_eq!(collector.take(WalkEnd::Stopped).end, WalkEnd::Stopped, "it is not the end in any case");
+    }
+
+    #[test]
+    fn a_heading_with_numbers_and_nothing_behind_it_was_none() {
+        let mut collector = of("AXTC4CO");
+        take(&mut collector, &["6126h:01 TC1 = 16.000", "6110h Sensor Type: one 10 two 2", "1003h Errors"]);
+        let reading = collector.take(WalkEnd::Whole);
+        assert_eq!(reading.unrecognised_lines, 1);
+        let mut collector = of("AXTC4CO");
+        take(&mut collector, &["6126h Scaling Factor 4", "  01h TC1 = 16.000"]);
+        assert_eq!(collector.take(WalkEnd::Whole).unrecognised_lines, 0);
     }
 
     #[test]

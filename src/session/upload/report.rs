@@ -141,7 +141,8 @@ impl LoadReport {
                  unit off and on"
             }
             (_, UnitNow::Loader) if self.phase == Phase::Finish && self.records == self.records_total => {
-                "the unit waits in its loader: send a file that is made for it; 'axcon image info' says what this one is"
+                "send the file again, since its end may have been lost on the line; if it is taken and not started once more, it \
+                 is not made for this unit: 'axcon image info' says what it is"
             }
             (_, UnitNow::Loader) => {
                 "keep the unit powered and send the file again: it waits in its loader and has no complete software; a \
@@ -241,7 +242,7 @@ mod tests {
         };
         assert!(waits(0, Phase::Transfer, true).contains("as it was found"));
         assert!(waits(0, Phase::Transfer, false).contains("with the software it had"));
-        assert!(waits(3074, Phase::Finish, false).contains("send a file that is made for it"));
+        assert!(waits(3074, Phase::Finish, false).contains("not made for this unit"));
         for (records, phase, found) in
             [(1, Phase::Transfer, true), (3073, Phase::Finish, false), (3074, Phase::Transfer, false)]
         {

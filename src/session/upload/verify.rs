@@ -132,8 +132,8 @@ impl Upload {
                 None
             }
             _ if self.after.application => {
-                let what = "the unit runs, but does not say which software";
-                self.end(desk, Verdict::WrongApplication, UnitNow::Application, what)
+                let what = "the file was sent and the unit runs, but which software is not known: it has not said so";
+                self.end(desk, Verdict::Failed, UnitNow::Unknown, what)
             }
             _ => {
                 let what = "the file was sent, but the unit has not come back";

@@ -67,6 +67,34 @@ impl App {
         }
     }
 
+    /// The box in which a file's name was typed says why it is not written; without it the last line does.
+    fn not_written(&mut self, why: String) {
+        match &mut self.popup {
+            Some(Popup::Asking(question @ Question::File { .. })) => question.refused(why),
+            _ => self.view.tell(Tone::Bad, why),
+        }
+    }
+
+    /// A file is being written: the box in which its name was typed waits for that.
+    fn is_written(&mut self, path: &Path) {
+        if let Some(Popup::Asking(Question::File { written, .. })) = &mut self.popup {
+            *written = Some(path.to_path_buf());
+        }
+    }
+
+    /// What was typed on the bench has been done, or is refused and can be mended.
+    pub(super) fn order_answered(&mut self, line: &str, answer: &Result<Option<String>, String>) {
+        let Some(Popup::Asking(question)) = &mut self.popup else { return };
+        let (Question::Order { sent, .. } | Question::Temperature { sent, .. }) = question else { return };
+        if sent.as_deref() != Some(line) {
+            return;
+        }
+        match answer {
+            Ok(_) => self.popup = None,
+            Err(why) => question.refused(format!("{}.", visible::sentence(why).trim_end_matches('.'))),
+        }
+    }
+
     /// Whether a file can be sent now; if not, the user is told why.
     pub(super) fn may_send_file(&mut self) -> bool {
         if !self.can_send() {
@@ -143,7 +171,7 @@ impl App {
         let (stream, start) = (&self.view.monitor.stream, self.view.link.start_millis);
         let channels: Vec<String> = stream.channels.iter().map(|channel| channel.name.clone()).collect();
         if channels.is_empty() {
-            return self.view.tell(Tone::Bad, "There are no rows yet: T switches the stream on.");
+            return self.not_written("There are no rows yet: T switches the stream on.".to_owned());
         }
         let mut text = Row::csv_heading(&channels);
         let mut rows = 0;
@@ -164,6 +192,7 @@ impl App {
             rows += 1;
         }
         marks_before(Instant::NEVER, &mut text);
+        self.is_written(&path);
         effects.push(Effect::CreateFile { path: path.clone(), bytes: text.into_bytes() });
         self.view.export = Some(Export { path, rows, channels });
     }
@@ -199,10 +228,10 @@ impl App {
 
     pub(super) fn export_dictionary(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
         if self.view.export.as_ref().is_some_and(|export| export.path == path) {
-            return self.view.tell(Tone::Bad, "Not written: the rows of the stream go to that file.");
+            return self.not_written("Not written: the rows of the stream go to that file.".to_owned());
         }
         let Some(read) = &self.view.dictionary else {
-            return self.view.tell(Tone::Bad, "Nothing has been read yet: V reads the object dictionary.");
+            return self.not_written("Nothing has been read yet: V reads the object dictionary.".to_owned());
         };
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
         let text = match (ending.as_str(), self.view.product()) {
@@ -215,17 +244,25 @@ impl App {
                 dump::configuration(&read.reading, product, &self.view.facts, unix_millis)
             }
             ("dcf", None) => {
-                return self.view.tell(Tone::Bad, "A DCF needs to know the product; .json keeps everything.");
+                return self.not_written("A DCF needs to know the product; .json keeps everything.".to_owned());
             }
-            _ => return self.view.tell(Tone::Bad, "Not written: the name has to end in .json, .csv, .dcf or .txt."),
+            _ => return self.not_written("Not written: the name has to end in .json, .csv, .dcf or .txt.".to_owned()),
         };
+        self.is_written(&path);
         effects.push(Effect::CreateFile { path, bytes: text.into_bytes() });
     }
 
     pub(super) fn file_written(&mut self, path: &Path, result: Result<(), String>) {
         self.dirty = true;
-        let shown = path.display();
+        // Whoever looks for it needs to know in which folder.
+        let shown = self.options.directory.join(path);
+        let shown = shown.display();
         let is_export = self.view.export.as_ref().is_some_and(|export| export.path == path);
+        let is_awaited =
+            matches!(&self.popup, Some(Popup::Asking(Question::File { written: Some(of), .. })) if of == path);
+        if result.is_ok() && is_awaited {
+            self.popup = None;
+        }
         match result {
             Ok(()) if is_export => {}
             Ok(()) => self.view.tell(Tone::Good, format!("{shown} is written.")),
@@ -233,7 +270,11 @@ impl App {
                 if is_export {
                     self.view.export = None;
                 }
-                self.view.tell(Tone::Bad, format!("{shown} is not written: {why}."));
+                let text = format!("{shown} is not written: {why}.");
+                match is_awaited {
+                    true => self.not_written(text),
+                    false => self.view.tell(Tone::Bad, text),
+                }
             }
         }
     }

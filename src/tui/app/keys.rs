@@ -12,13 +12,16 @@ use crate::tui::frame;
 use crate::tui::input::Effect;
 use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd, Press};
 use crate::tui::popup::{self, Answer, Popup, Question, Target};
-use crate::tui::screens::ScreenId;
 use crate::tui::screens::diagnostics::Diagnostics;
 use crate::tui::screens::help::Help;
 use crate::tui::screens::terminal::Meaning;
+use crate::tui::screens::{ScreenId, bench};
 use crate::tui::theme::Theme;
 use crate::tui::view::{LinkState, Tone};
 use crate::tui::widgets::lines;
+
+/// Why a unit in its loader is sent no key of the menu.
+const IN_LOADER: &str = "the unit is in its loader, which takes every key for an error: L sends software";
 
 impl App {
     pub(super) fn terminal_event(&mut self, event: TerminalEvent, effects: &mut Vec<Effect>) {
@@ -136,6 +139,7 @@ impl App {
     }
 
     fn key(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
+        self.view.read_notice();
         if self.is_too_small() {
             return self.key_unseen(key, effects);
         }
@@ -271,6 +275,10 @@ impl App {
                 self.view.tell(Tone::Quiet, format!("Colours: {}.", self.theme.palette().words()));
             }
             Cmd::Reconnect => match self.view.link.state {
+                // It lived on this link only: another one begins as the factory made it.
+                LinkState::Lost(_) if bench::emulated(&self.view).is_some() => {
+                    self.ask(Question::Disconnect { then: self.view.link.name.clone() });
+                }
                 LinkState::Lost(_) => self.perform(Action::Reconnect, effects),
                 LinkState::Closed | LinkState::Opening | LinkState::Open { .. } => {
                     self.view.tell(Tone::Quiet, "No link is lost: 1 lists links.");
@@ -284,6 +292,7 @@ impl App {
             | Cmd::Last
             | Cmd::Accept
             | Cmd::Back
+            | Cmd::Above
             | Cmd::Refresh
             | Cmd::Type
             | Cmd::Disconnect
@@ -303,6 +312,7 @@ impl App {
             | Cmd::Pack
             | Cmd::Allow
             | Cmd::Loader
+            | Cmd::OtherUnit
             | Cmd::Break
             | Cmd::SendFile
             | Cmd::Faster
@@ -364,13 +374,13 @@ impl App {
         }
         let job = self.view.job.filter(|_| !self.view.awaits_first_row());
         let why_not = match (menu, job, self.view.facts.state) {
+            // Also while it is asked again: a form that is refused at its end is of no use.
+            (menu, Some(Job::Identify), UnitState::Loader) if menu != MenuCmd::Menu => Some(IN_LOADER),
             (MenuCmd::Diagnostics, Some(Job::Diagnostics), _) | (_, Some(Job::Identify), _) => None,
             (_, Some(_), _) => self.view.busy(),
             (MenuCmd::Menu, ..) => None,
             (_, None, _) if self.view.viewing => Some("the view is open and has keys of its own: M closes it"),
-            (_, None, UnitState::Loader) => {
-                Some("the unit is in its loader, which takes every key for an error: L sends software")
-            }
+            (_, None, UnitState::Loader) => Some(IN_LOADER),
             (_, None, _) => None,
         };
         if let Some(why_not) = why_not {

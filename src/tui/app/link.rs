@@ -4,7 +4,7 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::App;
 use crate::monitor::Scrollback;
-use crate::session::{Command, Event, Session, UnitState};
+use crate::session::{Command, Event, Session, UnitNow, UnitState};
 use crate::time::{Duration, Instant};
 use crate::tui::input::{Effect, Failure, LinkInfo};
 use crate::tui::keymap::Press;
@@ -232,6 +232,8 @@ impl App {
             self.scrollback.note(now, "link lost".into());
             self.export_note(now, "link lost", effects);
             self.view.link.state = LinkState::Lost(failure);
+            // It was about the link as it was; what ends with it is told behind this.
+            self.view.forget_notice();
             if let Some(session) = &mut self.session {
                 session.link_lost(now);
             }
@@ -261,15 +263,37 @@ impl App {
 
     /// The unit behind a link that came back has said something of itself, or has had its chance: whether what was shown
     /// before is its own is decided now.
-    pub(super) fn decide_who_returned(&mut self, effects: &mut Vec<Effect>) {
+    pub(super) fn decide_who_returned(&mut self, has_said_all: bool, effects: &mut Vec<Effect>) {
+        let lacks_version = self.view.returning.as_ref().is_some_and(|before| before.lacks_version(&self.view.facts));
+        if lacks_version && !has_said_all {
+            // A banner names the product a line before the version, which may be another one.
+            return;
+        }
         let Some(who) = self.view.returning.as_ref().and_then(|returning| returning.who(&self.view.facts)) else {
             return;
         };
-        let waiting = self.view.returning.take().map(Returning::release).unwrap_or_default();
+        if !self.view.can_send() {
+            // Lost again: whoever has answered is not there any more.
+            return;
+        }
+        let Some(returning) = self.view.returning.take() else { return };
+        let was_left_half_loaded = self.was_left_half_loaded(&returning);
+        let has_version_of_before = returning.has_version_of(&self.view.facts);
+        let waiting = returning.release();
         match who {
+            Who::Same | Who::Unknown if was_left_half_loaded && self.view.facts.state == UnitState::Application => {
+                let unit = self.unit_in_words();
+                let text = format!(
+                    "The {unit} on the cable runs its software, which the unit that was left half loaded cannot: it is \
+                     another, or somebody has loaded it since."
+                );
+                self.begin_unit(text, effects);
+            }
             Who::Same => {
                 let unit = self.view.product().map_or("unit", |product| product.name.as_str());
-                self.view.tell(Tone::Good, format!("The link is back, and the {unit} answers as before."));
+                // That what it runs is what it ran is said only where both are known.
+                let as_before = if has_version_of_before { " as before" } else { "" };
+                self.view.tell(Tone::Good, format!("The link is back, and the {unit} answers{as_before}."));
             }
             Who::Other { now, before } => {
                 let text = format!("Another unit is on the cable now: {now}; before it was {before}.");
@@ -298,6 +322,22 @@ impl App {
                 self.export_row(*at, row, effects);
             }
         }
+    }
+
+    /// Whether the unit of before was left with part of a file: it has nothing to run.
+    fn was_left_half_loaded(&self, before: &Returning) -> bool {
+        let load = &self.view.load;
+        let in_report = load.report.as_ref().filter(|_| !load.is_of_before).is_some_and(|report| {
+            report.unit == UnitNow::Loader && report.records > 0 && report.records < report.records_total
+        });
+        in_report || before.was_in_loader() && self.view.link.noted.is_some()
+    }
+
+    /// `AXTC4CO 1.1.0`, as far as it has said so.
+    fn unit_in_words(&self) -> String {
+        let facts = &self.view.facts;
+        let product = facts.product.as_ref().map_or("unit".to_owned(), |known| visible::text(&known.value));
+        facts.version.as_ref().map_or(product.clone(), |known| format!("{product} {}", known.value))
     }
 
     /// Two units of one product and version differ in their serial numbers only, which the object dictionary alone has.

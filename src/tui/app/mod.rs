@@ -134,20 +134,24 @@ impl App {
     /// Takes one input; the effects are to be performed in their order.
     pub fn handle(&mut self, now: Instant, input: Input) -> Vec<Effect> {
         self.now = self.now.max(now);
+        self.view.now = self.now;
         let mut effects = Vec::new();
         match input {
             Input::Terminal(event) => self.terminal_event(event, &mut effects),
             Input::Bytes(bytes) => {
+                self.view.heard(now);
                 if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
                     session.handle_bytes(now, &bytes);
                 }
             }
             Input::Arrived(backlog) => {
+                self.view.heard(now);
                 if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
                     session.handle_backlog(now, &backlog);
                 }
             }
             Input::ArrivedSoFar(backlog) => {
+                self.view.heard(now);
                 if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
                     session.begin_backlog(now, &backlog);
                 }
@@ -192,6 +196,7 @@ impl App {
             }
             Input::PlayedAnew(info) => self.played_anew(now, info, &mut effects),
             Input::Ordered { line, answer } => {
+                self.order_answered(&line, &answer);
                 self.bench.answered(&line, answer);
                 self.dirty = true;
             }
@@ -220,9 +225,10 @@ impl App {
         let tick = (self.view.job == Some(Job::Load)).then(|| self.now + UPLOAD_TICK);
         let late = self.view.poll_timeout().filter(|_| is_open);
         let leaving = self.leaving.as_ref().map(|(_, until)| *until);
+        let notice = self.view.next_notice_at();
         // No other screen says how old anything is.
         let ages = self.view.ages_at().filter(|_| self.front == ScreenId::Overview);
-        [session, tick, late, ages, leaving].into_iter().flatten().min()
+        [session, tick, late, ages, leaving, notice].into_iter().flatten().min()
     }
 
     /// Whether the picture has changed since it was last drawn.
@@ -273,6 +279,9 @@ impl App {
         if let Some(session) = &mut self.session {
             session.handle_timeout(now);
         }
+        if self.view.job == Some(Job::Load) {
+            self.view.look_for_silence(now);
+        }
         self.dirty |= self.view.timeout(now) || self.view.job == Some(Job::Load);
         self.dirty |= self.view.aged(now) && self.front == ScreenId::Overview;
     }
@@ -299,9 +308,9 @@ impl App {
                 Event::Row { .. } if self.view.returning.is_some() => {}
                 Event::Row { at, row, .. } => self.export_row(*at, row, effects),
                 // The answer to the question who is there; before it, only a name is one.
-                Event::Finished(_) => self.decide_who_returned(effects),
+                Event::Finished(_) => self.decide_who_returned(true, effects),
                 Event::FactsChanged if self.view.facts.product.is_some() && self.view.job.is_none() => {
-                    self.decide_who_returned(effects);
+                    self.decide_who_returned(false, effects);
                 }
                 _ => {}
             }

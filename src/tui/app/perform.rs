@@ -11,6 +11,7 @@ use crate::tui::picker::expanded;
 use crate::tui::popup::{Popup, Question, Wanted};
 use crate::tui::screens::{ScreenId, bench};
 use crate::tui::view::Tone;
+use crate::tui::widgets::format;
 
 /// Begins the name of a recording as a link.
 const REPLAY: &str = "replay:";
@@ -22,7 +23,7 @@ impl App {
             Action::Go(screen) => {
                 if self.front != screen {
                     // It was about what was done there, and stands before what is being done.
-                    self.view.notice = None;
+                    self.view.forget_notice();
                 }
                 self.front = screen;
                 match screen {
@@ -101,13 +102,28 @@ impl App {
                     && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
                 {
                     // Noted before the first byte leaves: what the session sends is drained behind this.
-                    let noted = Noted { product, image: file, ran };
+                    let begun = format!("at {}", format::time_of_day(self.start_of_day, self.now));
+                    let noted = Noted { product, image: file, ran, begun };
                     self.view.link.noted = Some(noted.clone());
                     effects.push(Effect::UploadBegins { link, noted });
                 }
             }
+            Action::OtherUnit => {
+                // Not removed where it is kept: it may still be true of the unit it was made for, until another upload on
+                // this link takes its place.
+                let Some(noted) = self.view.link.noted.take() else { return };
+                if let Some(action) = self.load.ask_label(&self.view) {
+                    self.perform(action, effects);
+                }
+                let about = format!("{}, {}", noted.product, noted.begun);
+                self.view.tell(Tone::Quiet, format!("Our note ({about}) is set aside: another unit."));
+            }
             Action::DismissReport => self.view.load.report = None,
-            Action::RestartExtremes => self.view.restart_extremes(),
+            Action::RestartExtremes => {
+                self.view.restart_extremes();
+                let time = format::time_of_day(self.start_of_day, self.now);
+                self.view.tell(Tone::Quiet, format!("Minimum, maximum and mean begin anew at {time}."));
+            }
             Action::Mark(at) => self.mark(at, effects),
             Action::Find(words) => match self.front {
                 ScreenId::Terminal => {
@@ -173,7 +189,7 @@ impl App {
             Ok(()) => {
                 if let Some(job) = job {
                     self.view.job = Some(job);
-                    self.view.notice = None;
+                    self.view.forget_notice();
                 }
                 self.view.wanted_period = period.or(self.view.wanted_period.filter(|_| job.is_none()));
                 if may_set {
@@ -219,7 +235,7 @@ impl App {
 
     pub(super) fn ask(&mut self, question: Question) {
         // It was about something else.
-        self.view.notice = None;
+        self.view.forget_notice();
         self.popup = Some(Popup::Asking(question));
     }
 }

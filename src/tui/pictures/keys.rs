@@ -163,12 +163,12 @@ fn a_recording_is_steered_by_its_keys() {
     }
     // There + and - say how fast Space will play it, which is in sight.
     plays(&mut stage, 100, Pace::AtOnce);
-    assert!(stage.shows("Space plays it, as fast as it was; + - change that."), "{}", stage.picture());
+    assert!(stage.shows("Space plays it, as fast as it was (+ -)."), "{}", stage.picture());
     assert!(stage.shows("Space play ") && !stage.shows("Space pause"), "{}", stage.picture());
     stage.keys("+");
     assert_eq!(stage.asked(), [Effect::Play(Playback::Pace(Pace::Times(2)))]);
     plays(&mut stage, 100, Pace::Times(60));
-    assert!(stage.shows("Space plays it, 60 times as fast;"), "{}", stage.picture());
+    assert!(stage.shows("Space plays it, 60 times as fast (+ -)."), "{}", stage.picture());
     stage.keys("+");
     assert_eq!(stage.asked(), [], "at once would show what is there already");
     stage.keys(" ");

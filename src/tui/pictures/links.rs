@@ -4,6 +4,7 @@ use ratatui::crossterm::event::{KeyCode, KeyModifiers};
 
 use super::stage::*;
 use crate::endpoint::Transmit;
+use crate::session::{Job, Outcome};
 use crate::time::Duration;
 use crate::tui::{App, Effect, Failure, Input, LinkInfo, Options, Pace, Palette, Playing, PortEntry};
 
@@ -114,7 +115,7 @@ fn rows_go_on_to_their_file_when_the_same_link_is_back_and_end_with_another() {
         stage.asked().iter().any(|effect| matches!(effect, Effect::AppendFile { .. }))
     };
     let mut stage = Stage::streaming(SMALL);
-    stage.keys("6e").press(KeyCode::Enter).asked();
+    stage.keys("6e").press(KeyCode::Enter).written().asked();
     assert!(appended(&mut stage));
     stage.lost().keys("c").opened("/dev/ttyUSB0");
     assert!(appended(&mut stage), "the same link");
@@ -290,6 +291,63 @@ fn c_on_a_lost_link_that_is_not_there_yet_gives_nothing_up() {
     assert!(stage.shows("the AXTC4CO answers as before") && stage.shows("TC1 "), "{}", stage.picture());
     stage.keys("c");
     assert!(stage.shows("No link is lost"), "{}", stage.picture());
+}
+
+#[test]
+fn nothing_said_of_the_link_stays_below_a_link_that_is_lost() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.lost().input(Input::LinkBack("/dev/ttyUSB0".into())).bytes(MENU).wait(5000);
+    assert!(stage.shows("The link is back"), "{}", stage.picture());
+    stage.lost();
+    assert!(!stage.shows("The link is back") && stage.shows("Link lost"), "{}", stage.picture());
+    // What answered before it was lost again is not there any more.
+    let mut stage = Stage::streaming(SMALL);
+    stage.lost().input(Input::LinkBack("/dev/ttyUSB0".into())).lost().wait(5000);
+    assert!(!stage.shows("answers"), "{}", stage.picture());
+    // Of one version only it is not known to be the one of before.
+    let mut stage = Stage::connected(SMALL);
+    stage.lost().input(Input::LinkBack("/dev/ttyUSB0".into()));
+    stage.bytes(String::from_utf8_lossy(MENU).replace(" V1.1.0", "").as_bytes()).wait(5000);
+    assert!(stage.shows("and the AXTC4CO answers.") && !stage.shows("as before"), "{}", stage.picture());
+}
+
+#[test]
+fn the_faults_of_eight_channels_stay_in_sight_when_the_link_is_lost() {
+    let mut stage = Stage::eight_channels(SMALL);
+    stage.lost().keys("2");
+    let picture = stage.picture();
+    assert!(picture.contains("1 when last seen") && picture.contains("RTD3    open circuit"), "{picture}");
+    assert!(!picture.contains("1 now"), "{picture}");
+}
+
+#[test]
+fn an_emulated_unit_that_is_gone_with_its_link_is_called_gone_and_another_asked_about() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("emu:axtc4co").lost().asked();
+    assert!(stage.shows("The emulated unit is gone with it; C begins with a new one."), "{}", stage.picture());
+    stage.keys("c").press(KeyCode::Enter);
+    assert!(stage.shows("with all that was set") && stage.asked().is_empty(), "{}", stage.picture());
+    assert!(stage.shows("as the factory made it"), "{}", stage.picture());
+    stage.keys("y");
+    assert_eq!(stage.asked(), [Effect::OpenLink("emu:axtc4co".into())]);
+}
+
+#[test]
+fn a_refusal_stays_for_some_seconds_before_other_news() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("s").keys("t");
+    assert!(stage.shows("Not sent: the unit prints its diagnostics"), "{}", stage.picture());
+    stage.finished(Outcome::Done(Job::StreamOff));
+    stage.wait(3900);
+    assert!(stage.shows("Not sent: ") && !stage.shows("The stream is off"), "{}", stage.picture());
+    stage.wait(200);
+    assert!(stage.shows("The stream is off") && !stage.shows("Not sent"), "{}", stage.picture());
+    // Whoever goes on has read it.
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("s").keys("t");
+    stage.finished(Outcome::Done(Job::StreamOff));
+    stage.press(KeyCode::Down);
+    assert!(stage.shows("The stream is off"), "{}", stage.picture());
 }
 
 #[test]

@@ -294,6 +294,15 @@ impl Stage {
         std::mem::take(&mut self.effects)
     }
 
+    /// The file that the console wants written is written.
+    pub(super) fn written(&mut self) -> &mut Self {
+        let path = self.effects.iter().rev().find_map(|effect| match effect {
+            Effect::CreateFile { path, .. } => Some(path.clone()),
+            _ => None,
+        });
+        self.input(Input::FileWritten { path: path.expect("a file"), result: Ok(()) })
+    }
+
     pub(super) fn draw(&self) -> TestBackend {
         let mut terminal = Terminal::new(TestBackend::new(self.size.0, self.size.1)).expect("a test backend");
         terminal.draw(|frame| self.app.draw(frame)).expect("drawing in memory");
@@ -357,7 +366,12 @@ pub(super) fn link_info(link: &str) -> LinkInfo {
 }
 
 pub(super) fn noted(product: &str) -> Option<Noted> {
-    Some(Noted { product: product.into(), image: "/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), ran: None })
+    Some(Noted {
+        product: product.into(),
+        image: "/home/service/images/AXTC4CO_V1.2.0.elf.S".into(),
+        ran: None,
+        begun: "2026-01-30 16:20:00".into(),
+    })
 }
 
 pub(super) fn axtc4co() -> &'static Product {

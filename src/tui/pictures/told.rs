@@ -9,7 +9,8 @@ use crate::dump::Dump;
 use crate::image::DefectId;
 use crate::record::Span;
 use crate::session::{
-    Awaited, DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry, UnitState, WalkEnd,
+    Awaited, DictionaryReading, Event, Facts, Job, Known, LoadReport, Origin, Outcome, ReadEntry, UnitNow, UnitState,
+    Verdict, WalkEnd,
 };
 use crate::tui::popup::ORDERS;
 use crate::tui::{Effect, Input, LinkInfo};
@@ -184,7 +185,7 @@ fn a_file_without_a_name_is_sound_named_once_and_goes_if_the_user_answers_for_it
         "{}",
         stage.picture()
     );
-    stage.keys("ono-identity").press(KeyCode::Enter);
+    stage.keys("o ");
     let allowed = nameless_image(&[DefectId::NoIdentity]);
     stage.input(Input::ImageChecked(Box::new(allowed)));
     assert!(stage.shows("passed in spite of no-identity") && stage.shows("Enter start"), "{}", stage.picture());
@@ -236,7 +237,7 @@ fn e_says_what_it_does_while_rows_go_to_a_file() {
     let mut stage = Stage::streaming(SMALL);
     stage.keys("6");
     assert!(stage.shows("E export") && !stage.shows("E end export"), "{}", stage.picture());
-    stage.keys("e").press(KeyCode::Enter);
+    stage.keys("e").press(KeyCode::Enter).written();
     assert!(stage.shows("E end export"), "{}", stage.picture());
     stage.keys("e");
     assert!(stage.shows("E export") && !stage.shows("E end export"), "{}", stage.picture());
@@ -342,5 +343,76 @@ fn one_is_one_and_not_ones() {
         let reading = DictionaryReading { entries: vec![entry.clone()], end, unrecognised_lines: 0 };
         stage.finished(Outcome::DictionaryRead(Box::new(reading)));
         assert!(stage.shows(told), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn minimum_and_maximum_do_not_begin_anew_without_a_word() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.keys("2r");
+    assert!(stage.shows("Minimum, maximum and mean begin anew at 12:01:33."), "{}", stage.picture());
+}
+
+#[test]
+fn t_is_refused_at_once_in_a_loader_also_while_it_is_asked_who_it_is() {
+    let mut stage = Stage::in_loader(SMALL, None);
+    stage.keys("m").keys("t");
+    assert!(stage.shows("Not sent: the unit is in its loader") && !stage.shows("Every, in ms"), "{}", stage.picture());
+}
+
+#[test]
+fn what_has_happened_in_an_upload_ends_with_a_full_stop() {
+    for what in ["the unit did not accept the password", "It went wrong."] {
+        let mut stage = Stage::connected(SMALL).with_image(good_image());
+        let report = LoadReport { what: what.into(), ..report(Verdict::UnitRefused, UnitNow::Application) };
+        stage.fold(Event::Finished(Outcome::Loaded(Box::new(report))));
+        let picture = stage.picture();
+        assert!(picture.lines().any(|line| line.contains("Happened") && line.ends_with('.')), "{picture}");
+        assert!(!picture.contains(".."), "{picture}");
+    }
+}
+
+#[test]
+fn no_reading_on_all_channels_is_not_laid_to_the_sensors_alone() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0").wait(1000);
+    stage.bytes(b"Error ;Error ;Error ;Error ;Error ;Error ;Null  ;Null  \r\n");
+    assert!(stage.shows("on all channels: converter or wiring"), "{}", stage.picture());
+    stage.wait(1000).bytes(b"Error ;Error ;Error ;Error ;Error ;  20.0;Null  ;Null  \r\n");
+    assert!(stage.shows("check sensor, wire and connector") && !stage.shows("converter"), "{}", stage.picture());
+}
+
+#[test]
+fn a_process_value_that_may_stand_for_a_fault_says_so() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("/dev/ttyUSB0").wait(1000);
+    stage.bytes(b"  -384;  4768;  4768;  4768;  4768;  4768;  4768;  4768\r\n");
+    for screen in ["2", "6"] {
+        stage.keys(screen);
+        assert!(stage.shows("converter?"), "{}", stage.picture());
+        assert!(stage.shows("RTD1: -384 marks a failed converter, or is a value; 6150h"), "{}", stage.picture());
+    }
+}
+
+#[test]
+fn the_text_beside_the_bytes_is_whole_with_times_at_80_columns() {
+    let mut stage = Stage::connected(SMALL);
+    stage.bytes(b"0123456789abcdef0123456789abcdef").keys("3").prefix().keys("h").prefix().keys("w");
+    let picture = stage.picture();
+    assert!(picture.contains("12:00:03") && picture.contains("789abcdef"), "{picture}");
+    let last = picture.lines().rev().find(|line| line.contains("12:00:03")).expect("bytes");
+    assert!(last.split("  ").last().is_some_and(|text| text.len() >= 8), "{picture}");
+}
+
+#[test]
+fn a_path_used_before_that_depends_on_a_folder_says_so() {
+    for (port, depends) in [("bench/tty", true), ("/tmp/tty", false), ("tcp://hall:4001", false)] {
+        let mut stage = Stage::with_ports(SMALL);
+        stage.recordings(vec![recording("2026-01-31 11:00:00", port, 1, None)]);
+        (0..5).for_each(|_| {
+            stage.press(KeyCode::Down);
+        });
+        assert!(stage.shows("Was connected before"), "{port}: {}", stage.picture());
+        assert_eq!(stage.shows("A path from the folder of that time"), depends, "{port}: {}", stage.picture());
     }
 }

@@ -145,3 +145,49 @@ fn a_complaint_goes_when_what_it_is_about_does() {
     stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL);
     assert!(!stage.shows("Only the word Yes"), "{}", stage.picture());
 }
+
+#[test]
+fn a_name_that_is_refused_is_mended_where_it_was_typed() {
+    let mut stage = Stage::with_dictionary(SMALL);
+    stage.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("tc.xml").press(KeyCode::Enter).asked();
+    assert!(stage.shows("› tc.xml") && stage.shows("has to end in .json, .csv, .dcf or .txt"), "{}", stage.picture());
+    stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("tc.csv").press(KeyCode::Enter).press(KeyCode::Enter);
+    stage.keys("x");
+    let written = stage.asked();
+    assert_eq!(written.len(), 1, "once: {written:?}");
+    stage.input(Input::FileWritten {
+        path: "tc.csv".into(),
+        result: Err("a file of that name is there already".into()),
+    });
+    assert!(stage.shows("› tc.csv") && stage.shows("is there already"), "{}", stage.picture());
+    stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("tc2.csv").press(KeyCode::Enter);
+    stage.input(Input::FileWritten { path: "tc2.csv".into(), result: Ok(()) });
+    assert!(!stage.shows("› tc2.csv") && stage.shows("tc2.csv is written."), "{}", stage.picture());
+}
+
+#[test]
+fn an_order_that_is_refused_is_mended_where_it_was_typed() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("emu:axtc4co").keys("9/set 1 temprature 20").press(KeyCode::Enter);
+    let refuse = |stage: &mut Stage, line: &str| {
+        let (line, answer) = (line.to_owned(), Err("there is no such knob".to_owned()));
+        stage.input(Input::Ordered { line, answer });
+    };
+    refuse(&mut stage, "set 1 temprature 20");
+    assert!(stage.shows("› set 1 temprature 20") && stage.shows("There is no such knob."), "{}", stage.picture());
+    stage.press(KeyCode::Esc).press(KeyCode::Enter).keys("9999").press(KeyCode::Enter);
+    refuse(&mut stage, "set 1 temperature 9999");
+    assert!(stage.shows("› 9999") && stage.shows("There is no such knob."), "{}", stage.picture());
+    stage.press(KeyCode::Backspace).press(KeyCode::Enter);
+    stage.input(Input::Ordered { line: "set 1 temperature 999".into(), answer: Ok(None) });
+    assert!(!stage.shows("› 999") && stage.shows("999.0 °C"), "{}", stage.picture());
+}
+
+#[test]
+fn the_last_line_of_the_terminal_shows_what_is_the_units_and_what_is_not() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("3");
+    let last = stage.picture().lines().last().unwrap_or_default().to_owned();
+    let (before, behind) = last.split_once("Ctrl-]").expect("the prefix");
+    assert!(before.contains("F1 help") && behind.contains("Q quit") && !behind.contains("F1"), "{last}");
+}

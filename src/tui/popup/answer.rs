@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::{LONGEST_PERIOD_MS, Popup, Purpose, Question, SHORTEST_PERIOD_MS, Wanted};
+use crate::device::Product;
 use crate::session::Command;
 use crate::time::Duration;
 use crate::tui::action::Action;
@@ -76,6 +77,7 @@ impl Question {
         match key.code {
             KeyCode::Esc => self.leave(),
             KeyCode::Char('c') if with_ctrl => self.leave(),
+            _ if self.is_on_its_way() => Answer::Stay,
             KeyCode::Char('u') if with_ctrl => {
                 self.edit(TextField::clear, PasswordField::clear);
                 self.changed()
@@ -85,6 +87,7 @@ impl Question {
             KeyCode::Enter => self.accept(),
             // Nothing is left of what was typed: as in the list of the load screen.
             KeyCode::Backspace if self.is_untyped_choice() => self.move_in_list(Cmd::Back),
+            KeyCode::Up | KeyCode::Down if matches!(self, Question::Allow { .. }) => self.move_in_errors(key.code),
             KeyCode::Up => self.move_in_list(Cmd::Up),
             KeyCode::Down => self.move_in_list(Cmd::Down),
             KeyCode::PageUp => self.move_in_list(Cmd::PageUp),
@@ -107,6 +110,8 @@ impl Question {
         matches!(
             self,
             Question::CancelLoad
+                | Question::Allow { .. }
+                | Question::Begun { .. }
                 | Question::Paste { .. }
                 | Question::SendFile { .. }
                 | Question::Disconnect { .. }
@@ -123,6 +128,18 @@ impl Question {
         let Question::Choose { picker, .. } = self else { return Answer::Stay };
         let picked = picker.on(cmd, PAGE);
         self.picked(picked)
+    }
+
+    /// Moves among the errors that may be allowed.
+    fn move_in_errors(&mut self, code: KeyCode) -> Answer {
+        if let Question::Allow { errors, cursor, complaint } = self {
+            *complaint = None;
+            *cursor = match code {
+                KeyCode::Up => cursor.saturating_sub(1),
+                _ => (*cursor + 1).min(errors.len().saturating_sub(1)),
+            };
+        }
+        Answer::Stay
     }
 
     fn picked(&self, picked: Option<Picked>) -> Answer {
@@ -155,13 +172,14 @@ impl Question {
             Question::Link(field) if field.text().trim().is_empty() => Answer::Stay,
             Question::Link(field) => Answer::Act(Action::Open(field.text().trim().to_owned())),
             Question::File { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
-            Question::File { purpose, typed, directory, .. } => {
+            Question::File { purpose, typed, directory, complaint, .. } => {
                 let path = placed(directory, typed.text());
+                *complaint = None;
                 match purpose {
                     // A name typed wrong is mended here: the box goes when the file has been read.
                     Purpose::Image => Answer::Meanwhile(Action::CheckImage(path)),
-                    Purpose::ExportStream => Answer::Act(Action::ExportStream(path)),
-                    Purpose::ExportDictionary => Answer::Act(Action::ExportDictionary(path)),
+                    Purpose::ExportStream => Answer::Meanwhile(Action::ExportStream(path)),
+                    Purpose::ExportDictionary => Answer::Meanwhile(Action::ExportDictionary(path)),
                 }
             }
             Question::Choose { picker, typed, .. } if typed.text().trim().is_empty() => {
@@ -172,25 +190,30 @@ impl Question {
                 Answer::Act(wanted.action(placed(picker.directory(), typed.text())))
             }
             Question::Find(_) => Answer::Close,
-            Question::Temperature { input, typed, complaint } => match typed.text().trim().parse::<f64>() {
+            Question::Temperature { input, typed, complaint, sent } => match typed.text().trim().parse::<f64>() {
                 Ok(value) if value.is_finite() => {
-                    Answer::Act(Action::Order(format!("set {input} temperature {value}")))
+                    let line = format!("set {input} temperature {value}");
+                    *sent = Some(line.clone());
+                    Answer::Meanwhile(Action::Order(line))
                 }
                 _ => {
-                    *complaint = Some("A number of degrees, e.g. 451.5.");
+                    *complaint = Some("A number of degrees, e.g. 451.5.".to_owned());
                     Answer::Stay
                 }
             },
             Question::Order { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
-            Question::Order { typed, complaint } => match typed.text().trim() {
+            Question::Order { typed, complaint, sent } => match typed.text().trim() {
                 // The emulator's own help is made for a page, not for a line of answers.
                 text if text.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("help")) => {
-                    *complaint = Some("They stand above; docs/emulator.md has all, with every fault.");
+                    *complaint = Some("They stand above; docs/emulator.md has all, with every fault.".to_owned());
                     // What is typed next is the order that was looked for.
                     typed.clear();
                     Answer::Stay
                 }
-                text => Answer::Act(Action::Order(text.to_owned())),
+                text => {
+                    *sent = Some(text.to_owned());
+                    Answer::Meanwhile(Action::Order(text.to_owned()))
+                }
             },
             Question::Stream { source, millis, complaint, .. } => match millis.text().parse() {
                 Ok(number @ SHORTEST_PERIOD_MS..=LONGEST_PERIOD_MS) => {
@@ -210,27 +233,33 @@ impl Question {
                 *complaint = Some("Only the word Yes, written like this, starts it.");
                 Answer::Stay
             }
-            Question::Allow { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
-            Question::Allow { typed, errors, complaint } => {
-                let named = errors.iter().find(|error| error.name() == typed.text().trim());
-                *complaint = Some(match named {
-                    Some(error) if error.can_be_allowed() => return Answer::Act(Action::Allow(*error)),
-                    Some(_) => "It leaves part of the program unknown: there is nothing to send.",
-                    None => "No such error stands in the findings.",
-                });
-                Answer::Stay
+            Question::Allow { errors, cursor, complaint } => match errors.get(*cursor) {
+                Some(error) if error.can_be_allowed() => Answer::Act(Action::Allow(*error)),
+                _ => {
+                    *complaint = Some("It leaves part of the program unknown: there is nothing to send.");
+                    Answer::Stay
+                }
+            },
+            Question::Begun { noted, in_loader } => {
+                Answer::Act(Question::then_password(*in_loader, Some(noted.product.clone())))
             }
             Question::Label { typed, image, in_loader, complaint } => {
-                let label = typed.text().trim().to_owned();
-                if label.is_empty() {
-                    *complaint = Some("The part number is missing.");
-                    return Answer::Stay;
-                }
-                if image.as_ref().is_some_and(|image| !image.eq_ignore_ascii_case(&label)) {
-                    *complaint = Some("The file is for another product: it must not be sent to this unit.");
-                    return Answer::Stay;
-                }
-                Answer::Act(Question::then_password(*in_loader, Some(label)))
+                let label = typed.text().trim();
+                // Noted and compared as the product is written, however it is typed.
+                let known = Product::named(label).map(|product| product.name.as_str());
+                let of_image = image.as_deref().filter(|image| image.eq_ignore_ascii_case(label));
+                *complaint = Some(match known.or(of_image) {
+                    _ if label.is_empty() => "The part number is missing.".to_owned(),
+                    None => {
+                        let names: Vec<&str> = Product::all().iter().map(|product| product.name.as_str()).collect();
+                        format!("There is no such product. Those there are: {}.", names.join(", "))
+                    }
+                    Some(_) if image.is_some() && of_image.is_none() => {
+                        "The file is for another product: it must not be sent to this unit.".to_owned()
+                    }
+                    Some(name) => return Answer::Act(Question::then_password(*in_loader, Some(name.to_owned()))),
+                });
+                Answer::Stay
             }
             Question::Password { field, complaint, .. } if field.is_empty() => {
                 *complaint = Some("The password is missing: without it the unit does not go into its loader.");
@@ -260,6 +289,10 @@ impl Question {
                 }
                 _ => {}
             },
+            // Only the key that is named: what is typed here may be a password, for which nothing has asked.
+            Question::Allow { .. } if character == ' ' => return self.accept(),
+            Question::Allow { .. } => {}
+            Question::Begun { .. } if character.eq_ignore_ascii_case(&'n') => return Answer::Act(Action::OtherUnit),
             Question::View if character.eq_ignore_ascii_case(&'t') => return Answer::Act(Action::ViewDictionary),
             Question::SendFile { is_image: true, .. } if character.eq_ignore_ascii_case(&'l') => {
                 return Answer::Act(Action::Go(ScreenId::Load));
@@ -287,11 +320,15 @@ impl Question {
                 *complaint = None;
                 text(field);
             }
-            Question::Order { typed: field, complaint }
-            | Question::Temperature { typed: field, complaint, .. }
-            | Question::Defaults { typed: field, complaint }
-            | Question::Allow { typed: field, complaint, .. }
-            | Question::Label { typed: field, complaint, .. } => {
+            Question::Order { typed: field, complaint, .. } | Question::Temperature { typed: field, complaint, .. } => {
+                *complaint = None;
+                text(field);
+            }
+            Question::Defaults { typed: field, complaint } => {
+                *complaint = None;
+                text(field);
+            }
+            Question::Label { typed: field, complaint, .. } => {
                 *complaint = None;
                 text(field);
             }
@@ -304,6 +341,8 @@ impl Question {
                 password(field);
             }
             Question::View
+            | Question::Allow { .. }
+            | Question::Begun { .. }
             | Question::CancelLoad
             | Question::Paste { .. }
             | Question::SendFile { .. }
@@ -323,10 +362,11 @@ impl Question {
             | Question::Order { .. }
             | Question::Stream { .. }
             | Question::Defaults { .. }
-            | Question::Allow { .. }
             | Question::Label { .. }
             | Question::Password { .. } => true,
             Question::View
+            | Question::Allow { .. }
+            | Question::Begun { .. }
             | Question::CancelLoad
             | Question::Paste { .. }
             | Question::SendFile { .. }

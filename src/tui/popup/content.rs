@@ -1,11 +1,15 @@
 //! What each question says, and which keys answer it.
 
+use std::path::Path;
+
 use ratatui::crossterm::event::KeyCode;
 use ratatui::text::{Line, Span};
 
 use super::warnings::{consequence, in_the_middle, loses_rows, too_fast};
 use super::{ORDERS, Purpose, Question, Wanted};
+use crate::image::DefectId;
 use crate::time::{BITS_PER_CHARACTER, Duration};
+use crate::tui::input::Noted;
 use crate::tui::keymap::Press;
 use crate::tui::picker::Picker;
 use crate::tui::screens::bench::emulated;
@@ -27,6 +31,7 @@ pub(super) type Hint = (Press, &'static str);
 
 pub(super) const ENTER: Press = Press::Plain(KeyCode::Enter);
 const ESC: Press = Press::Plain(KeyCode::Esc);
+const DOWN: Press = Press::Plain(KeyCode::Down);
 const BACKSPACE: Press = Press::Plain(KeyCode::Backspace);
 const CLEAR: Press = Press::Ctrl('u');
 
@@ -70,7 +75,7 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
             },
             vec![(ENTER, "connect"), (ESC, "back")],
         ),
-        Question::File { purpose, typed: field, directory, complaint } => {
+        Question::File { purpose, typed: field, directory, complaint, .. } => {
             let (title, text, key) = match purpose {
                 Purpose::Image => ("Image file", "A path, absolute or from this folder:", "check it"),
                 Purpose::ExportStream => (
@@ -95,15 +100,15 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
         Question::Find(field) => {
             ("Find", vec![typed(theme, "", field.text(), columns)], vec![(ENTER, "keep"), (ESC, "end the search")])
         }
-        Question::Temperature { input, typed: field, complaint } => (
+        Question::Temperature { input, typed: field, complaint, .. } => (
             "Temperature of the sensor",
             {
                 let label = format!("Input {input}, in °C");
-                with_field(theme, paragraphs(&[&label], columns), field.text(), *complaint, columns)
+                with_field(theme, paragraphs(&[&label], columns), field.text(), complaint.as_deref(), columns)
             },
             vec![(ENTER, "set"), (ESC, "back")],
         ),
-        Question::Order { typed: field, complaint } => (
+        Question::Order { typed: field, complaint, .. } => (
             "Order to the emulated unit",
             {
                 let example = |(orders, does): &(&[&str], &str)| {
@@ -112,7 +117,10 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                         Span::styled(format::keep_start(does, columns.saturating_sub(EXAMPLE_COLUMNS)), theme.quiet()),
                     ])
                 };
-                with_field(theme, ORDERS.iter().map(example).collect(), field.text(), *complaint, columns)
+                // What is wrong has to be read to its end: on a small screen it takes the place of examples.
+                let wrong = complaint.as_deref().map_or(0, |text| format::wrap(text, columns).len());
+                let examples = ORDERS.iter().take(ORDERS.len() - wrong.saturating_sub(1).min(ORDERS.len()));
+                with_field(theme, examples.map(example).collect(), field.text(), complaint.as_deref(), columns)
             },
             vec![(ENTER, "do it"), (ESC, "back")],
         ),
@@ -171,17 +179,46 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
             },
             vec![(ENTER, "restore"), (ESC, "back")],
         ),
-        Question::Allow { typed: field, errors, complaint } => (
-            "Send in spite of an error?",
+        Question::Allow { errors, cursor, complaint } => (
+            "Send in spite of this?",
             {
-                let names: Vec<&str> = errors.iter().map(|error| error.name()).collect();
-                let named = format!("Type the name of one: {}.", names.join(", "));
-                let consequence = "What is sent is not what was built, or not for this unit. It may not run, and the unit \
-                                   then waits in its loader, without scanning and CAN, for a file that is sound.";
-                let rows = paragraphs(&[consequence, named.as_str()], columns);
-                with_field(theme, rows, field.text(), *complaint, columns)
+                let row = |(number, error): (usize, &DefectId)| match number == *cursor {
+                    true => Line::styled(format!("› {}", error.name()), theme.strong()),
+                    false => Line::raw(format!("  {}", error.name())),
+                };
+                let mut rows: Vec<Line> = errors.iter().enumerate().map(row).collect();
+                rows.push(Line::default());
+                rows.extend(paragraphs(&[errors.get(*cursor).map_or("", |error| in_spite_of(*error))], columns));
+                rows.extend(complain(theme, *complaint, columns));
+                rows
             },
-            vec![(ENTER, "allow it and check again"), (ESC, "back")],
+            match errors.len() {
+                1 => vec![(letter(' '), "allow it and check again"), (ESC, "back")],
+                _ => vec![(DOWN, "choose"), (letter(' '), "allow it and check again"), (ESC, "back")],
+            },
+        ),
+        Question::Begun { noted, in_loader } => (
+            "Is it the unit this was begun for?",
+            {
+                let Noted { product, image, begun, .. } = noted;
+                let image =
+                    Path::new(image).file_name().map_or(image.clone(), |name| name.to_string_lossy().into_owned());
+                let note = format!(
+                    "By our note {} was begun on this link for an {}, {}.",
+                    visible::text(&image),
+                    visible::text(product),
+                    visible::text(begun)
+                );
+                let unit = "The unit that is there now cannot say what it is, and another on the same cable looks the same. \
+                            A file for another product would make it useless until the right one is sent. Its label says \
+                            the product.";
+                paragraphs(&[note.as_str(), unit], columns)
+            },
+            vec![
+                (letter('y'), if *in_loader { "it is: start" } else { "it is: go on" }),
+                (letter('n'), "another unit"),
+                (ESC, "back"),
+            ],
         ),
         Question::Label { typed: field, image, complaint, .. } => (
             "Which product is the unit?",
@@ -191,7 +228,7 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                             product would make the unit useless until the right one is sent.";
                 let named = format!("The file is for: {image}. Type the part number on the unit's label.");
                 let rows = paragraphs(&[text, named.as_str()], columns);
-                with_field(theme, rows, field.text(), *complaint, columns)
+                with_field(theme, rows, field.text(), complaint.as_deref(), columns)
             },
             vec![(ENTER, "go on"), (ESC, "back")],
         ),
@@ -279,12 +316,18 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                 }
                 let is_same = *then == view.link.name;
                 texts.extend(then.as_deref().map(visible::text).map(|link| match is_same {
+                    true if emulated(view).is_some() => "Then a new one begins, as the factory made it.".to_owned(),
                     true => format!("Then {link} is opened again."),
                     false => format!("{link} is opened first: if that fails, the link stays."),
                 }));
                 paragraphs(&texts, columns)
             },
-            vec![(letter('y'), "close the link"), (letter('n'), "stay connected")],
+            match &view.link.state {
+                LinkState::Lost(_) if emulated(view).is_some() && *then == view.link.name => {
+                    vec![(letter('y'), "new unit"), (letter('n'), "stay here")]
+                }
+                _ => vec![(letter('y'), "close the link"), (letter('n'), "stay connected")],
+            },
         ),
         Question::Quit => (
             "Leave axcon?",
@@ -293,6 +336,24 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
         ),
     };
     (title.to_owned(), rows, hints)
+}
+
+/// What it means to send a file in spite of this.
+fn in_spite_of(error: DefectId) -> &'static str {
+    match error {
+        DefectId::Downgrade => {
+            "The file is sound, but older than the software the unit runs or ran. The unit runs the older one then; what \
+             newer software has set may mean something else to it."
+        }
+        DefectId::NoIdentity => {
+            "The file does not say what it is: nobody can see beforehand whether it is for this unit, nor afterwards whether \
+             the unit runs it. If it does not run, the unit waits in its loader, without scanning and CAN."
+        }
+        _ => {
+            "What is sent is not what was built, or not for this unit. It may not run, and the unit then waits in its \
+             loader, without scanning and CAN, for a file that is sound."
+        }
+    }
 }
 
 /// Texts with a blank line between them.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use super::action::Action;
 use super::image_facts::ImageFacts;
-use super::input::Failure;
+use super::input::{Failure, Noted};
 use super::keymap::Press;
 use super::picker::{Offers, Picker};
 use super::view::View;
@@ -60,8 +60,10 @@ pub enum Question {
         typed: TextField,
         /// The folder; empty for the one the program was started in.
         directory: PathBuf,
-        /// Why the file named cannot be read.
+        /// Why the file named cannot be read, or written.
         complaint: Option<String>,
+        /// It is being written under this name: the box goes when it is.
+        written: Option<PathBuf>,
     },
     /// A file that is there: chosen from its folder, or its path typed.
     Choose {
@@ -90,14 +92,18 @@ pub enum Question {
         /// What has been typed.
         typed: TextField,
         /// What is wrong with it.
-        complaint: Option<&'static str>,
+        complaint: Option<String>,
+        /// The order that was made of it, until the unit has answered.
+        sent: Option<String>,
     },
     /// An order to an emulated unit.
     Order {
         /// What has been typed.
         typed: TextField,
         /// What is wrong with it.
-        complaint: Option<&'static str>,
+        complaint: Option<String>,
+        /// What of it has been sent, until the unit has answered.
+        sent: Option<String>,
     },
     /// What the stream shall send.
     Stream {
@@ -119,14 +125,21 @@ pub enum Question {
         /// What is wrong with it.
         complaint: Option<&'static str>,
     },
-    /// In spite of which error shall the image be sent?
+    /// In spite of which error shall the image be sent? No text: a password typed from habit stood here in clear.
     Allow {
-        /// What has been typed.
-        typed: TextField,
         /// Which errors there are.
         errors: Vec<DefectId>,
+        /// The chosen one.
+        cursor: usize,
         /// What is wrong with it.
         complaint: Option<&'static str>,
+    },
+    /// Is the unit the one that the note of an upload is about? Any that waits in its loader on the same cable looks like it.
+    Begun {
+        /// The note.
+        noted: Noted,
+        /// It waits in its loader already, which asks for no password.
+        in_loader: bool,
     },
     /// What the unit's label says.
     Label {
@@ -137,7 +150,7 @@ pub enum Question {
         /// It waits in its loader already, which asks for no password.
         in_loader: bool,
         /// What is wrong with it.
-        complaint: Option<&'static str>,
+        complaint: Option<String>,
     },
     /// The unit's password.
     Password {
@@ -196,7 +209,7 @@ pub const ORDERS: &[(&[&str], &str)] = &[
     (&["nmt start", "nmt stop"], "as the network's master"),
     (&["write 6112:1 0", "read 6100:1"], "the object dictionary"),
     (&["power off", "power cycle 2"], "the supply"),
-    (&["unplug", "plug"], "the cable"),
+    (&["unplug"], "the unit is gone with it"),
     (&["freeze", "thaw", "status"], "the converter; how it stands"),
 ];
 
@@ -223,7 +236,13 @@ impl Question {
     /// Asks for an image.
     pub fn image(directory: &Path) -> Question {
         let directory = directory.to_path_buf();
-        Question::File { purpose: Purpose::Image, typed: TextField::default(), directory, complaint: None }
+        Question::File {
+            purpose: Purpose::Image,
+            typed: TextField::default(),
+            directory,
+            complaint: None,
+            written: None,
+        }
     }
 
     /// Asks for another file, and suggests a name for a new one.
@@ -236,7 +255,7 @@ impl Question {
                 TextField::new(suggested(view, "dictionary", at, "json"))
             }
         };
-        Question::File { purpose, typed, directory: PathBuf::new(), complaint: None }
+        Question::File { purpose, typed, directory: PathBuf::new(), complaint: None, written: None }
     }
 
     /// Asks for a file that is there, beginning in a folder that has to be read.
@@ -257,12 +276,12 @@ impl Question {
 
     /// Asks for the temperature of an emulated unit's sensor.
     pub fn temperature(input: usize) -> Question {
-        Question::Temperature { input, typed: TextField::default(), complaint: None }
+        Question::Temperature { input, typed: TextField::default(), complaint: None, sent: None }
     }
 
     /// Asks for an order to an emulated unit.
     pub fn order() -> Question {
-        Question::Order { typed: TextField::default(), complaint: None }
+        Question::Order { typed: TextField::default(), complaint: None, sent: None }
     }
 
     /// Asks what the stream shall send; what it has sent last is suggested.
@@ -280,17 +299,25 @@ impl Question {
 
     /// Asks in spite of which of these errors an image shall be sent.
     pub fn allow(errors: Vec<DefectId>) -> Question {
-        Question::Allow { typed: TextField::default(), errors, complaint: None }
+        Question::Allow { errors, cursor: 0, complaint: None }
     }
 
     /// Asks for what an upload still needs, or starts it where that is nothing.
     pub fn start_load(view: &View, facts: &ImageFacts) -> Action {
         let in_loader = view.facts.state == UnitState::Loader;
-        if view.needs_label() {
-            let image = facts.product.clone();
-            return Action::Ask(Question::Label { typed: TextField::default(), image, in_loader, complaint: None });
+        if let Some(noted) = view.noted() {
+            return Action::Ask(Question::Begun { noted: noted.clone(), in_loader });
         }
-        Question::then_password(in_loader, None)
+        match view.needs_label() {
+            true => Action::Ask(Question::label(view, facts)),
+            false => Question::then_password(in_loader, None),
+        }
+    }
+
+    /// Asks what the unit's label says.
+    pub fn label(view: &View, facts: &ImageFacts) -> Question {
+        let (image, in_loader) = (facts.product.clone(), view.facts.state == UnitState::Loader);
+        Question::Label { typed: TextField::default(), image, in_loader, complaint: None }
     }
 
     /// The password is asked for, but not for a loader, which wants none.
@@ -301,6 +328,26 @@ impl Question {
         }
     }
 
+    /// Whether what was typed is on its way, and what is typed meanwhile would be lost or done twice.
+    fn is_on_its_way(&self) -> bool {
+        match self {
+            Question::File { written, .. } => written.is_some(),
+            Question::Temperature { sent, .. } | Question::Order { sent, .. } => sent.is_some(),
+            _ => false,
+        }
+    }
+
+    /// What was typed is refused: it is mended where it was typed.
+    pub fn refused(&mut self, why: String) {
+        match self {
+            Question::File { written, complaint, .. } => (*written, *complaint) = (None, Some(why)),
+            Question::Temperature { sent, complaint, .. } | Question::Order { sent, complaint, .. } => {
+                (*sent, *complaint) = (None, Some(why));
+            }
+            _ => {}
+        }
+    }
+
     /// Whether the answer is for the unit that it was asked about.
     pub fn is_about_unit(&self) -> bool {
         match self {
@@ -308,6 +355,7 @@ impl Question {
             | Question::Stream { .. }
             | Question::View
             | Question::Defaults { .. }
+            | Question::Begun { .. }
             | Question::Label { .. }
             | Question::Password { .. }
             | Question::CancelLoad

@@ -498,7 +498,9 @@ impl Console {
     fn order(&mut self, line: String) -> bool {
         let (answer, sender) = (self.answer.clone(), self.sender.clone());
         let Some(link) = &self.link else {
-            return self.handle(Input::Ordered { line, answer: Err("no link is open".to_owned()) });
+            // It hung on its link.
+            let gone = "the unit is gone with its link, C begins with a new one".to_owned();
+            return self.handle(Input::Ordered { line, answer: Err(gone) });
         };
         let text = line.clone();
         link.order(&text, move |answered| {

@@ -12,6 +12,7 @@ use ratatui::text::{Line, Span};
 
 use super::Scene;
 use crate::device::Product;
+use crate::monitor::Channel;
 use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
@@ -259,7 +260,7 @@ impl Bench {
                 format!("{value:.*}", super::overview::decimals(scene.view, source))
             },
         );
-        let words = channel.map_or("", |channel| channel.reading.words());
+        let words = channel.map_or("", Channel::words);
         let says_style = if scene.view.why_old().is_some() { theme.quiet() } else { Style::new() };
         let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, place + 1);
         Line::from(vec![
@@ -272,7 +273,7 @@ impl Bench {
 }
 
 /// The stream's channel of an input: a unit may send its cold junction in front.
-fn channel_of<'a>(view: &'a View, product: &Product, place: usize) -> Option<&'a crate::monitor::Channel> {
+fn channel_of<'a>(view: &'a View, product: &Product, place: usize) -> Option<&'a Channel> {
     let channels = &view.monitor.stream.channels;
     let in_front = channels.len().checked_sub(usize::from(product.measurement.channels))?;
     channels.get(in_front + place)

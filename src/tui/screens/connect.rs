@@ -306,6 +306,10 @@ impl Connect {
                     true => "Connected now, or last.".into(),
                     false => "Was connected before, as the recordings say.".into(),
                 }));
+                // Nobody has written down which folder that was.
+                if name.contains('/') && !name.starts_with('/') && !name.contains("://") {
+                    shown.push(text("A path from the folder of that time: from another it leads elsewhere.".into()));
+                }
             }
             Entry::Recordings => {
                 shown

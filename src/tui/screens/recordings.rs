@@ -362,7 +362,7 @@ fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
             ),
             None if ended => Line::styled(
                 format!(
-                    "  Space plays it, {}; + - change that. Arrows move {}, Home to its start.",
+                    "  Space plays it, {} (+ -). Arrows: {}, Home: its start.",
                     words(pace_from_end(playing)),
                     format::period(step(playing))
                 ),

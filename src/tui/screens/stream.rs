@@ -7,6 +7,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::Scene;
+use super::overview::plugged_line;
 use crate::monitor::{Channel, Stream as Values};
 use crate::time::{Duration, Instant};
 use crate::tui::action::Action;
@@ -309,7 +310,11 @@ impl Stream {
         let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         let span = format!("{low:.decimals$} to {high:.decimals$} {}", curve.quantity.unit);
         let state = if self.held.is_some() { "held, End follows again" } else { "follows" };
-        let window = format!("{}, {state}", WINDOWS[self.window].0);
+        // A chart that is far from full yet has less than its name says.
+        let (from, to) = curve.window;
+        let so_far = WINDOWS[self.window].1.filter(|length| to.since(from) < *length * 3 / 4);
+        let so_far = so_far.map(|_| format!(", {} so far", format::minutes(to.since(from)))).unwrap_or_default();
+        let window = format!("{}{so_far}, {state}", WINDOWS[self.window].0);
         let is_chosen = self.is_chosen(values, number);
         let (columns, rows) = charts.first().map_or((0, 0), |(_, area)| room(*area));
         let parts = [
@@ -339,7 +344,8 @@ impl Stream {
         for (number, channel) in values.channels.iter().enumerate() {
             rows.push(self.row(scene, channel, number, columns));
         }
-        rows.push(note(scene, usize::from(columns)));
+        let chosen = values.channels.get(self.channel.min(values.channels.len().saturating_sub(1)));
+        rows.push(note(scene, chosen, usize::from(columns)));
         rows
     }
 
@@ -354,7 +360,7 @@ impl Stream {
         };
         let is_chosen = self.is_chosen(stream, number);
         let is_old = scene.view.why_old().is_some() || self.held.is_some();
-        let (state, style) = state(theme, reading);
+        let (state, style) = state(theme, channel, reading);
         let unit = if source == Source::FieldValue { " °C" } else { "   " };
         // Where there is no value its state says why; a unit behind nothing would look like a value.
         let value = match reading.and_then(Reading::value) {
@@ -397,17 +403,20 @@ pub fn without_value(channel: &Channel) -> String {
 }
 
 /// A reading's state as a person reads it.
-fn state(theme: Theme, reading: Option<Reading>) -> (&'static str, Style) {
-    reading.map_or(("not kept", theme.quiet()), |reading| (reading.words(), theme.state(reading)))
+fn state(theme: Theme, channel: &Channel, reading: Option<Reading>) -> (&'static str, Style) {
+    let Some(reading) = reading else { return ("not kept", theme.quiet()) };
+    let style = if channel.plugged_of(reading).is_some() { theme.warning() } else { theme.state(reading) };
+    (channel.words_of(reading), style)
 }
 
 /// What has to be said below the table: where rows go, or that none come.
-fn note(scene: Scene, columns: usize) -> Line<'static> {
+fn note(scene: Scene, chosen: Option<&Channel>, columns: usize) -> Line<'static> {
     let (theme, view) = (scene.theme, scene.view);
     // Where rows go says nothing of whether any come: that stands first, shorter where both have to.
     let warning = match view.why_old() {
         Some(old) if view.export.is_some() => format!("  {} ", old.reason()),
         Some(old) => format!("  {}", old.text()),
+        None if view.export.is_none() => chosen.and_then(plugged_line).unwrap_or_default(),
         None => String::new(),
     };
     let mut line = Line::from(Span::styled(warning.clone(), theme.warning()));

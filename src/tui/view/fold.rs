@@ -6,7 +6,9 @@ use crate::canopen::{ObjectAddress, Value};
 use crate::dump::Dump;
 use crate::monitor::Mark;
 use crate::record::LINK_LOST;
-use crate::session::{DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitState, Verdict, WalkEnd};
+use crate::session::{
+    DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitNow, UnitState, Verdict, WalkEnd,
+};
 use crate::time::Instant;
 use crate::tui::widgets::format;
 use crate::wire::visible;
@@ -83,7 +85,7 @@ impl View {
         };
         let has_started = banner(facts).is_some() && banner(facts) != banner(&self.facts);
         if self.notice.as_ref().is_some_and(|notice| notice.is_refuted(facts)) {
-            self.notice = None;
+            self.forget_notice();
         }
         let was_loader = self.facts.state == UnitState::Loader && facts.state != UnitState::Loader;
         if has_started || was_loader {
@@ -187,6 +189,13 @@ impl View {
                 self.load.progress = None;
                 self.load.held_since = None;
                 self.load.product_unknown = report.verdict == Verdict::Refused && report.product.is_none();
+                // The evidence ends where the unit has ended to talk.
+                self.load.is_silent = report.verdict == Verdict::Failed
+                    && report.unit == UnitNow::Loader
+                    && report.records > 0
+                    && self.can_send()
+                    && self.is_silent_since(now);
+                self.load.is_of_before = false;
                 self.load.report = Some((**report).clone());
             }
         }

@@ -7,9 +7,10 @@ const MARK: &str = "mark ";
 
 /// How a recording says that a moment was marked: `mark 1`, or of a moment of before `mark 1, 12.5 s before`.
 pub fn marked(number: u64, before: Duration) -> String {
-    match before.is_zero() {
-        true => format!("{MARK}{number}"),
-        false => format!("{MARK}{number}, {} s before", before.as_secs_f64()),
+    // The rows have no finer times.
+    match before.as_millis() {
+        0 => format!("{MARK}{number}"),
+        millis => format!("{MARK}{number}, {} s before", millis as f64 / 1000.0),
     }
 }
 
@@ -32,6 +33,7 @@ mod tests {
             let before = Duration::from_millis(millis);
             assert_eq!(read_mark(&marked(7, before)), Some((7, before)));
         }
+        assert_eq!(marked(2, Duration::from_nanos(541_544_519)), "mark 2, 0.541 s before");
         for other in ["mark", "mark x", "mark 1, 5 s", "mark 1, -5 s before", "marked 1", "break sent"] {
             assert_eq!(read_mark(other), None, "{other}");
         }

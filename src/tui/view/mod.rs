@@ -15,10 +15,18 @@ use super::widgets::format;
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::monitor::Monitor;
-use crate::session::{DictionaryReading, Facts, Job, LoadReport, Progress, UnitState};
+use crate::session::{DictionaryReading, Facts, Job, LoadReport, Phase, Progress, UnitState};
 use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::MenuKey;
+
+/// How a refusal begins, and how long no other news takes its place.
+const REFUSED: &str = "Not ";
+const REFUSAL_STAYS: Duration = Duration::from_secs(4);
+
+/// How long a loader that is being sent a file says nothing at most: it stops its sender for each page, several times a
+/// second, and has two seconds for starting over.
+const SILENT: Duration = Duration::from_millis(2500);
 
 /// Everything a screen may read.
 #[derive(Debug, Default)]
@@ -63,8 +71,14 @@ pub struct View {
     pub nmt_heard: Option<Instant>,
     /// When that has become old enough for another word.
     ages_at: Option<Instant>,
+    /// When the unit's last byte came.
+    heard_at: Option<Instant>,
     /// The latest word to the user.
     pub notice: Option<Notice>,
+    /// News that has to wait for it.
+    next_notice: Option<Notice>,
+    /// The time.
+    pub now: Instant,
 }
 
 /// The link and how it stands.
@@ -116,6 +130,10 @@ pub struct Load {
     pub report: Option<LoadReport>,
     /// The last one was refused because nobody knew the product.
     pub product_unknown: bool,
+    /// The report is of the unit that was on the cable before.
+    pub is_of_before: bool,
+    /// The unit has fallen silent in it: it is in its loader, or without power.
+    pub is_silent: bool,
 }
 
 /// A file that is being sent as it is.
@@ -160,6 +178,8 @@ pub struct Notice {
     pub tone: Tone,
     /// What it says.
     pub text: String,
+    /// Until when no news takes its place: it answers a key, and whoever pressed that has to have read it.
+    until: Option<Instant>,
 }
 
 /// How much a word matters.
@@ -174,6 +194,23 @@ pub enum Tone {
 }
 
 impl View {
+    /// Bytes of the unit have come.
+    pub fn heard(&mut self, now: Instant) {
+        self.heard_at = Some(now);
+        self.load.is_silent = false;
+    }
+
+    /// Whether nothing has come from the unit for longer than a loader that takes a file is silent.
+    fn is_silent_since(&self, now: Instant) -> bool {
+        self.heard_at.is_none_or(|heard| now.since(heard) >= SILENT)
+    }
+
+    /// The time is `now` while an upload runs: a loader that erases or holds us says nothing meanwhile, and says so first.
+    pub fn look_for_silence(&mut self, now: Instant) {
+        let sends = self.load.progress.is_some_and(|at| at.phase == Phase::Transfer && at.records > 1);
+        self.load.is_silent = sends && self.load.held_since.is_none() && self.is_silent_since(now);
+    }
+
     /// When [`View::timeout`] is wanted.
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.monitor.stream.late_at().filter(|_| self.facts.stream.is_some())
@@ -181,9 +218,13 @@ impl View {
 
     /// The time is `now`. Says whether anything has changed.
     pub fn timeout(&mut self, now: Instant) -> bool {
+        let is_read = self.next_notice_at().is_some_and(|due| due <= now);
+        if is_read {
+            self.read_notice();
+        }
         let late = self.poll_timeout().is_some_and(|due| due <= now);
         self.monitor.stream.late |= late;
-        late
+        late || is_read
     }
 
     /// Whether something that is known for a while is to be called older.
@@ -207,7 +248,7 @@ impl View {
 
     /// A new link: what was known of the unit before says nothing about the one at its end.
     pub fn begin_link(&mut self, link: Link) {
-        *self = View { link, ..View::default() };
+        *self = View { link, now: self.now, ..View::default() };
     }
 
     /// The lost link is there again; whether the unit is the one from before is not known yet.
@@ -227,6 +268,7 @@ impl View {
         (self.wanted_period, self.last_period) = (None, None);
         (self.viewing, self.stream_is_off) = (false, false);
         self.load.product_unknown = false;
+        self.load.is_of_before = self.load.report.is_some();
     }
 
     /// Whether keys and commands can reach a unit.
@@ -307,7 +349,36 @@ impl View {
 
     /// Says something to the user.
     pub fn tell(&mut self, tone: Tone, text: impl Into<String>) {
-        self.notice = Some(Notice { tone, text: text.into() });
+        let text = text.into();
+        let is_refusal = text.starts_with(REFUSED);
+        let until = is_refusal.then(|| self.now + REFUSAL_STAYS);
+        let notice = Some(Notice { tone, text, until });
+        let is_kept = |before: &Notice| before.until.is_some_and(|until| until > self.now);
+        match self.notice.as_ref().is_some_and(is_kept) && !is_refusal {
+            true => self.next_notice = notice,
+            false => (self.notice, self.next_notice) = (notice, None),
+        }
+    }
+
+    /// The user goes on: nothing of the last word has to stay.
+    pub fn read_notice(&mut self) {
+        if let Some(notice) = &mut self.notice {
+            notice.until = None;
+        }
+        if let Some(next) = self.next_notice.take() {
+            self.notice = Some(next);
+        }
+    }
+
+    /// The last word was about something else.
+    pub fn forget_notice(&mut self) {
+        (self.notice, self.next_notice) = (None, None);
+    }
+
+    /// When news that waits takes the place of a refusal.
+    pub fn next_notice_at(&self) -> Option<Instant> {
+        let until = self.notice.as_ref().map_or(Some(self.now), |notice| notice.until);
+        until.filter(|_| self.next_notice.is_some())
     }
 
     /// What was read of the unit's object dictionary, as long as it can be what the unit has.

@@ -1,11 +1,13 @@
 //! When the values on the screen are not those of now.
 
-use super::View;
+use super::{LinkState, View};
 use crate::session::{Job, UnitState};
 
 /// Why the values that are shown are those of before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Old {
+    /// Nothing comes from it any more.
+    LinkLost,
     /// The unit runs its loader, and measures nothing.
     InLoader,
     /// It has not answered.
@@ -28,6 +30,7 @@ impl Old {
     /// The reason alone, for a line that has more to say.
     pub fn reason(self) -> &'static str {
         match self {
+            Old::LinkLost => "The link is lost.",
             Old::InLoader => "The unit is in its loader.",
             Old::Silent => "The unit has not answered.",
             Old::DictionaryIsRead => "The dictionary is being read.",
@@ -42,6 +45,7 @@ impl Old {
     /// The reason, what it means for the values, and what to do about it.
     pub fn text(self) -> &'static str {
         match self {
+            Old::LinkLost => "The link is lost: these are its last values.",
             Old::InLoader => "The unit is in its loader: these are its last values. L loads software.",
             Old::Silent => "The unit has not answered: these are its last values. Check power, M asks.",
             Old::DictionaryIsRead => "These values are old: the unit measures nothing while its dictionary is read.",
@@ -60,6 +64,7 @@ impl View {
         let stream = &self.monitor.stream;
         stream.newest?;
         match self.facts.state {
+            _ if matches!(self.link.state, LinkState::Lost(_)) => Some(Old::LinkLost),
             UnitState::Loader => Some(Old::InLoader),
             UnitState::Silent => Some(Old::Silent),
             _ if self.job == Some(Job::ReadDictionary) => Some(Old::DictionaryIsRead),

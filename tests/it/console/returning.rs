@@ -84,3 +84,26 @@ fn nobody_behind_a_cable_plugged_in_again_leaves_history_until_somebody_answers(
     desk.unit.unit_mut().power_on(now);
     desk.wait_for("answers as before");
 }
+
+#[test]
+fn a_unit_that_runs_in_the_place_of_one_left_half_loaded_is_another() {
+    let mut desk = Desk::new();
+    desk.about_to_load().keys("AXIO-2010").press(KeyCode::Enter);
+    desk.wait_for("20 %");
+    desk.pull();
+    // The same product and version: only that it runs tells them apart.
+    let flash = factory_flash("1.1.0");
+    let setup =
+        Setup { product: axtc4co(), loader: LoaderKind::G1, seed: 9, dialect: 0, flash, parameters: Vec::new() };
+    let mut unit = Unit::new(setup);
+    unit.power_on(desk.now);
+    desk.unit = Plugged::new(unit, Line::new(character_time(BAUD), Duration::from_millis(1)));
+    desk.plug_in();
+    desk.run(Duration::from_secs(10));
+    let told = desk.picture();
+    assert!(told.contains("on the cable runs its software, which the unit that was left half loaded"), "{told}");
+    assert!(!told.contains("as before") && !told.contains("Unit now"), "{told}");
+    assert!(told.contains("Unit then") && told.contains("not of the unit that is there now"), "{told}");
+    desk.press(KeyCode::Enter);
+    assert!(desk.picture().contains("Our note"), "the first one is not forgotten: {}", desk.picture());
+}

@@ -8,7 +8,7 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
     desk.keys("6t200").press(KeyCode::Enter);
     desk.wait_for("every 200 ms");
     desk.run(Duration::from_secs(30)).press(KeyCode::Down);
-    assert!(desk.picture().contains("Curve of TC1") && desk.picture().contains("1 minute, follows"));
+    assert!(desk.picture().contains("Curve of TC1") && desk.picture().contains("1 minute, 0:"));
     desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("rows.csv").press(KeyCode::Enter);
     desk.run(Duration::from_secs(10)).keys("k");
     assert_eq!(desk.marks, ["mark 1"]);

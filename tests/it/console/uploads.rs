@@ -11,7 +11,7 @@ fn an_older_version_is_refused_before_the_password_is_asked_for_and_goes_if_the_
     assert!(plan.contains("the image is V1.0.0, older than the V1.1.0 that the unit runs. O sends it"), "{plan}");
     desk.press(KeyCode::Enter);
     assert!(desk.picture().contains("Not started: the image is V1.0.0"), "{}", desk.picture());
-    desk.keys("odowngrade").press(KeyCode::Enter);
+    desk.keys("o ");
     let plan = desk.picture();
     assert!(plan.contains("passed in spite of downgrade") && plan.contains("Enter start"), "{plan}");
     desk.press(KeyCode::Enter).keys("AXIO-2010").press(KeyCode::Enter);
@@ -56,11 +56,23 @@ fn a_cancelled_upload_can_be_sent_again_after_the_label_has_been_read() {
     let verdict = desk.wait_for("── Verdict");
     assert!(verdict.contains("Cancelled") && verdict.contains("send the file again"), "{verdict}");
     desk.run(Duration::from_secs(5)).press(KeyCode::Enter).press(KeyCode::Enter);
-    if desk.picture().contains("Which product is the unit?") {
-        desk.keys("AXTC4CO").press(KeyCode::Enter);
+    if desk.picture().contains("begun for?") {
+        desk.keys("y");
     }
     desk.wait_for("── Verdict");
     assert!(desk.picture().contains("after 1.2.0"), "{}", desk.picture());
     desk.keys("q");
     assert!(desk.over);
+}
+
+#[test]
+fn a_unit_that_loses_its_power_in_an_upload_is_not_said_to_wait() {
+    let mut desk = Desk::new();
+    desk.about_to_load().keys("AXIO-2010").press(KeyCode::Enter);
+    desk.wait_for("20 %");
+    let now = desk.now;
+    desk.unit.unit_mut().power_off(now);
+    let verdict = desk.wait_for("── Verdict");
+    assert!(verdict.contains("silent: in its loader, or without power"), "{verdict}");
+    assert!(verdict.contains("│ silent, in loader? │") && verdict.contains("See that it has power"), "{verdict}");
 }

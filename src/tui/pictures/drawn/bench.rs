@@ -30,7 +30,7 @@ pictures! {
         let mut stage = Stage::with_ports(size);
         stage.press(KeyCode::Enter).opened("emu:axtc4co");
         stage.bytes(BANNER).bytes(MENU).wait(3000).keys("9");
-        stage.press(KeyCode::Right).press(KeyCode::Down).keys("oh/fault nonsense").press(KeyCode::Enter);
+        stage.press(KeyCode::Right).press(KeyCode::Down).keys("oh/fault nonsense").press(KeyCode::Enter).press(KeyCode::Esc);
         for (line, answer) in [
             ("set 1 temperature 30.0", Ok(None)),
             ("open 2", Ok(None)),

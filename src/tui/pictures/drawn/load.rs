@@ -2,7 +2,7 @@
 
 use ratatui::crossterm::event::KeyCode;
 
-use crate::session::{Event, LoadReport, Outcome, Phase, UnitNow, Verdict};
+use crate::session::{Event, Facts, LoadReport, Outcome, Phase, UnitNow, UnitState, Verdict};
 use crate::time::Duration;
 use crate::tui::pictures::stage::*;
 use crate::tui::{ImageFacts, Input};
@@ -64,6 +64,7 @@ pictures! {
     };
     load_failed: |size| {
         let mut stage = Stage::connected(size).with_image(good_image());
+        stage.bytes(b"Restarting.").wait(1000);
         stage.fold(Event::Finished(Outcome::Loaded(Box::new(report(Verdict::Failed, UnitNow::Loader)))));
         stage
     };
@@ -77,6 +78,28 @@ pictures! {
     };
     load_in_loader_noted_for_another_product: |size| {
         Stage::in_loader(size, noted("AXRTD8CO")).with_image(good_image())
+    };
+    load_of_a_unit_that_has_fallen_silent: |size| {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        let in_loader = Facts { state: UnitState::Loader, ..Facts::default() };
+        stage.fold_with(Event::FactsChanged, &in_loader).wait(5000);
+        let report = Outcome::Loaded(Box::new(LoadReport {
+            what: "the loader has fallen silent: its power may be off, or the cable out".into(),
+            heard: String::new(),
+            ..report(Verdict::Failed, UnitNow::Loader)
+        }));
+        stage.fold_with(Event::Finished(report), &in_loader);
+        stage
+    };
+    load_begun_question: |size| {
+        let mut stage = Stage::in_loader(size, noted("AXTC4CO")).with_image(good_image());
+        stage.press(KeyCode::Enter);
+        stage
+    };
+    load_override_question: |size| {
+        let mut stage = Stage::connected(size).with_image(nameless_image(&[]));
+        stage.keys("o");
+        stage
     };
     label_question: |size| {
         let mut stage = Stage::in_loader(size, None).with_image(good_image());

@@ -29,7 +29,7 @@ pictures! {
     };
     stream_late_while_exporting: |size| {
         let mut stage = Stage::streaming(size);
-        stage.keys("6e").press(KeyCode::Enter).wait(10_000);
+        stage.keys("6e").press(KeyCode::Enter).written().wait(10_000);
         stage
     };
     stream_off: |size| {
@@ -75,7 +75,7 @@ pictures! {
     };
     stream_exporting: |size| {
         let mut stage = Stage::streaming(size);
-        stage.keys("6e").press(KeyCode::Enter).bytes(b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n");
+        stage.keys("6e").press(KeyCode::Enter).written().bytes(b"  23.500; 181.250;  96.000; 410.000;Disabled\r\n");
         stage
     };
     stream_link_lost: |size| {

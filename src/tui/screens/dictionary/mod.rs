@@ -353,8 +353,13 @@ impl Dictionary {
             parts.into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join(", ")
         };
         let room = usize::from(columns).saturating_sub(format::width(HEADING) + lines::BESIDE_HEADING);
-        let longer = [text(&compared, &time), text(&compared, &None)];
-        longer.into_iter().find(|text| format::width(text) <= room).unwrap_or_else(|| text(&least, &None))
+        let longer = [text(&compared, &time), text(&compared, &None), text(&least, &None)];
+        let fits = longer.into_iter().find(|text| format::width(text) <= room);
+        // What is looked for explains what is missing: it goes last, and its beginning stays.
+        fits.unwrap_or_else(|| match &words {
+            Some(words) => format::keep_start(words, room),
+            None => text(&least, &None),
+        })
     }
 }
 

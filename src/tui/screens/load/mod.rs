@@ -48,11 +48,12 @@ pub const BINDINGS: &[Binding] = &[
         short: "go on",
         long: "open the folder, check the file, start the upload, go back",
     },
+    Binding { keys: &[Press::Plain(KeyCode::Backspace)], cmd: Cmd::Above, short: "folder above", long: "folder above" },
     Binding {
-        keys: &[Press::Plain(KeyCode::Esc), Press::Plain(KeyCode::Backspace)],
+        keys: &[Press::Plain(KeyCode::Esc)],
         cmd: Cmd::Back,
-        short: "back",
-        long: "folder above, other file; while loading: cancel",
+        short: "",
+        long: "other file; while loading: cancel",
     },
     Binding { keys: &[Press::Plain(KeyCode::Char('p'))], cmd: Cmd::Type, short: "path", long: "type a path" },
     Binding {
@@ -71,7 +72,13 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('o'))],
         cmd: Cmd::Allow,
         short: "",
-        long: "send in spite of an error, by its name",
+        long: "send in spite of what stands against it",
+    },
+    Binding {
+        keys: &[Press::Plain(KeyCode::Char('n'))],
+        cmd: Cmd::OtherUnit,
+        short: "",
+        long: "the unit is not the one our note is about: ask which it is",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('r'))],
@@ -90,11 +97,12 @@ const UNPACK: Binding = footer(&[Press::Plain(KeyCode::Char('k'))], Cmd::Pack, "
 const LOADER: Binding = footer(&[Press::Plain(KeyCode::Char('g'))], Cmd::Loader, "loader");
 const START: Binding = footer(ENTER, Cmd::Accept, "start");
 const OVERRIDE: Binding = footer(&[Press::Plain(KeyCode::Char('o'))], Cmd::Allow, "override");
+const OTHER_UNIT: Binding = footer(&[Press::Plain(KeyCode::Char('n'))], Cmd::OtherUnit, "other unit");
 const OTHER: Binding = footer(ESC, Cmd::Back, "other file");
 
 /// What the footer shows at each stage; the keys themselves are those of [`BINDINGS`].
 const CHECKING_KEYS: &[Binding] = &[OTHER];
-const REPORT_KEYS: &[Binding] = &[OVERRIDE, START, PACK, LOADER, FINDINGS, OTHER, AGAIN];
+const REPORT_KEYS: &[Binding] = &[OVERRIDE, START, OTHER_UNIT, PACK, LOADER, FINDINGS, OTHER, AGAIN];
 const RUNNING_KEYS: &[Binding] = &[footer(ESC, Cmd::Back, "cancel")];
 const VERDICT_KEYS: &[Binding] = &[footer(ENTER, Cmd::Accept, "close the report")];
 
@@ -166,6 +174,12 @@ impl Load {
         if cmd == Cmd::Type {
             return Some(Action::Ask(Question::image(self.picker.directory())));
         }
+        // Esc leaves something, and there is nothing here to leave.
+        let cmd = match cmd {
+            Cmd::Back => return None,
+            Cmd::Above => Cmd::Back,
+            cmd => cmd,
+        };
         Some(match self.picker.on(cmd, page / 2)? {
             Picked::Folder(directory) => Action::ListFiles(directory),
             Picked::File(path) => self.check(path),
@@ -204,6 +218,13 @@ impl Load {
             self.stage = Stage::Picking;
         }
         is_awaited
+    }
+
+    /// Asks what the unit's label says, where that and nothing else is wanted now.
+    pub fn ask_label(&self, view: &View) -> Option<Action> {
+        let facts =
+            self.image().filter(|facts| view.needs_label() && objections(facts, view, self.loader).is_empty())?;
+        Some(Action::Ask(Question::label(view, facts)))
     }
 
     /// The image the report is about.
@@ -310,6 +331,7 @@ impl Load {
                         let errors = overridable(facts, view, self.loader);
                         return (!errors.is_empty()).then(|| Action::Ask(Question::allow(errors)));
                     }
+                    Cmd::OtherUnit => return view.noted().map(|_| Action::OtherUnit),
                     Cmd::Accept => {
                         return Some(match objections(facts, view, self.loader).first() {
                             Some(objection) => Action::Tell(format!("Not started: {objection}")),
@@ -341,6 +363,7 @@ impl Load {
         let has_place = |binding: &Binding| match binding.cmd {
             Cmd::Accept => can_start,
             Cmd::Pack => facts.ok,
+            Cmd::OtherUnit => view.noted().is_some(),
             Cmd::Allow => !overridable(facts, view, self.loader).is_empty(),
             // Where all of them are in sight there is nothing to move.
             Cmd::Down => shown < all,

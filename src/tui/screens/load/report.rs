@@ -55,7 +55,9 @@ pub(super) fn objections(facts: &ImageFacts, view: &View, loader: Option<LoaderK
         && !noted.product.eq_ignore_ascii_case(image)
     {
         let (image, unit) = (visible::text(image), visible::text(&noted.product));
-        against.push(format!("the file is for an {image}, our notes say {unit}. Esc chooses another."));
+        against.push(format!(
+            "the file is for an {image}, our note says {unit}. Esc chooses another, N if the unit is another."
+        ));
     }
     let misfits = misfits(facts, view, loader).into_iter();
     against.extend(misfits.map(|misfit| format!("{}. O sends it all the same.", misfit.message)));
@@ -210,6 +212,13 @@ fn plan(
             rows.extend(hanging(Span::raw(format!("  {number}. ")), &step, room));
         }
         rows.push(lines::labelled(theme, "Unit now", unit_version(view)));
+        // Whoever was left in the middle still waits somewhere, though the unit that is there now is not it.
+        if let Some(noted) = view.link.noted.as_ref().filter(|_| view.facts.state == UnitState::Application) {
+            let image = file_name(Path::new(&noted.image));
+            let product = visible::text(&noted.product);
+            let note = format!("{image} was begun here for an {product}, {}", visible::text(&noted.begun));
+            rows.push(lines::labelled(theme, "Our note", format::keep_start(&note, room.saturating_sub(12))));
+        }
         let change = Change::of(view, facts);
         rows.push(lines::labelled(theme, "Afterwards", format!("{} ({})", expected_version(facts), change.words())));
         rows.extend(
@@ -221,6 +230,7 @@ fn plan(
         rows.push(Line::from(vec![
             Span::styled("  Enter", theme.key()),
             Span::raw(match (view.needs_label(), view.facts.state) {
+                _ if view.noted().is_some() => " asks whether it is that unit. Keep the unit powered meanwhile.",
                 (true, UnitState::Loader) => " asks what the label says and starts. Keep the unit powered meanwhile.",
                 (false, UnitState::Loader) => " starts. Keep the unit powered meanwhile.",
                 _ => " asks for the password and starts. Keep the unit powered meanwhile.",
@@ -250,12 +260,18 @@ fn unit_version(view: &View) -> String {
     let version = view.facts.version.as_ref().map(|known| known.value.to_string());
     match (product, version) {
         (Some(product), Some(version)) => format!("{product} {version}"),
-        (Some(product), None) => format!("{product}, version not known"),
+        // What the plan compares with is what it names.
+        (Some(product), None) => match view.ran() {
+            Some(ran) => format!("{product}, ran {ran} before the upload that was begun"),
+            None => format!("{product}, version not known"),
+        },
         (None, _) => match view.noted() {
             Some(noted) => {
                 let image = file_name(Path::new(&noted.image));
-                format!("{}, which {image} was begun to be sent to", visible::text(&noted.product))
+                let ran = noted.ran.map(|ran| format!(" {ran}")).unwrap_or_default();
+                format!("{}{ran} by our note, before {image} was begun", visible::text(&noted.product))
             }
+            None if view.facts.state == UnitState::Loader => "not known; its label says which product it is".into(),
             None => "not known; the unit is asked first".into(),
         },
     }

@@ -10,6 +10,9 @@ use crate::tui::widgets::{format, lines};
 
 /// Rows beside what is told: heading, verdict, what Enter does, and blanks between them.
 const FRAME_ROWS: usize = 6;
+/// What to do about a unit that has fallen silent in the middle.
+const SEE_POWER: &str = "see that it has power and that the cable is in, and send the file again: it has no complete \
+                         software and comes back to its loader";
 /// The label of the unit's last words.
 const HEARD: &str = "Heard";
 
@@ -28,7 +31,9 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
         Verdict::WrongApplication => ("The unit does not run what was sent", theme.bad()),
         Verdict::Interrupted => ("Cancelled", theme.warning()),
     };
+    let load = &scene.view.load;
     let unit = match report.unit {
+        UnitNow::Loader if load.is_silent => "silent: in its loader, or without power",
         UnitNow::Application => "runs its application",
         UnitNow::Loader => "waits in its loader for a file",
         UnitNow::Unknown => "nobody can say",
@@ -39,7 +44,10 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
             theme,
             area.width,
             "Verdict",
-            report.product.as_deref().map(visible::text).unwrap_or_default().as_str(),
+            &match (report.product.as_deref().map(visible::text), load.is_of_before) {
+                (product, false) => product.unwrap_or_default(),
+                (product, true) => format!("{}, not of the unit that is there now", product.unwrap_or_default()),
+            },
         ),
         Line::default(),
         Line::from(vec![Span::raw("  "), Span::styled(word, style)]),
@@ -47,8 +55,8 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
     ];
     let mut told: Vec<(&str, Vec<String>)> = Vec::new();
     let mut paragraph = |label, text: &str| told.push((label, format::wrap(&visible::text(text), room)));
-    paragraph("Happened", &visible::sentence(&report.what));
-    paragraph("Unit now", unit);
+    paragraph("Happened", &format!("{}.", visible::sentence(&report.what).trim_end_matches('.')));
+    paragraph(if load.is_of_before { "Unit then" } else { "Unit now" }, unit);
     let is_untouched = matches!(report.verdict, Verdict::Refused | Verdict::UnitRefused | Verdict::NoAnswer);
     let versions = match (report.version_before, report.version_after) {
         (Some(before), None) if is_untouched && report.unit == UnitNow::Application => format!("{before}, as before"),
@@ -66,7 +74,11 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
     if let Some(remark) = &report.remark {
         paragraph("Note", remark);
     }
-    paragraph("What next", &format!("{}.", visible::sentence(report.advice())));
+    let advice = match load.is_silent {
+        true => SEE_POWER,
+        false => report.advice(),
+    };
+    paragraph("What next", &format!("{}.", visible::sentence(advice)));
     shorten(&mut told, usize::from(area.height).saturating_sub(FRAME_ROWS));
     for (label, broken) in told {
         for (number, line) in broken.into_iter().enumerate() {

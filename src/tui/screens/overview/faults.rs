@@ -9,6 +9,7 @@ use crate::time::Instant;
 use crate::tui::screens::Scene;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
+use crate::wire::stream::Reading;
 
 /// Columns of a fault's channel, and of what it is.
 const CHANNEL_COLUMNS: usize = 8;
@@ -93,6 +94,18 @@ fn listed(scene: Scene) -> Vec<Line<'static>> {
     read.dump.errors().map(row).collect()
 }
 
+/// What to look at. Where no channel that is on has a reading, what they share is as likely as their sensors.
+fn to_check(scene: Scene, kind: Reading) -> &'static str {
+    let channels = &scene.view.monitor.stream.channels;
+    let mut on =
+        channels.iter().map(|channel| channel.reading).filter(|reading| *reading != Reading::Disabled).peekable();
+    let is_of_all = kind == Reading::Error && on.peek().is_some() && on.all(|reading| reading == Reading::Error);
+    match is_of_all && channels.len() > 1 {
+        true => "on all channels: converter or wiring",
+        false => "check sensor, wire and connector",
+    }
+}
+
 fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
     let theme = scene.theme;
     let time = |at: Instant| format::time_of_day(scene.start_of_day, at);
@@ -102,7 +115,7 @@ fn fault_row(scene: Scene, fault: &Fault) -> Line<'static> {
         None => Line::from(vec![
             name,
             Span::styled(format!("{kind:<KIND_COLUMNS$}"), theme.bad()),
-            Span::raw(format!("since {}: check sensor, wire and connector", time(fault.since))),
+            Span::raw(format!("since {}: {}", time(fault.since), to_check(scene, fault.kind))),
         ]),
         Some(until) => {
             let lasted = format::period(until.since(fault.since));

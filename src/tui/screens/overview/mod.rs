@@ -12,6 +12,7 @@ mod values;
 
 use faults::fault_rows;
 use unit::unit;
+pub use values::plugged_line;
 
 use super::{Scene, terminal};
 use crate::device::Product;
@@ -19,7 +20,7 @@ use crate::monitor::{Channel, Stream};
 use crate::session::UnitState;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::view::View;
+use crate::tui::view::{LinkState, View};
 use crate::tui::widgets::chart::{self, Curve, Quantity};
 use crate::tui::widgets::lines;
 use crate::wire::stream::Source;
@@ -47,6 +48,9 @@ const BESIDE_COLUMNS: u16 = 140;
 const CHART_ROWS: u16 = 32;
 /// Rows of the faults that the rest of the page leaves room for, with their heading, where there are any.
 const FAULT_ROWS: usize = 3;
+
+/// Rows of the unit that stay in any case: heading, product and version.
+const LEAST_UNIT_ROWS: usize = 3;
 
 /// The page.
 #[derive(Debug, Default)]
@@ -121,8 +125,14 @@ impl Overview {
         if too_many(&unit, &values) {
             unit.pop();
         }
-        if too_many(&unit, &values) && is_current(scene) {
+        // The line on top of every screen says it of a lost link already.
+        let is_lost = matches!(scene.view.link.state, LinkState::Lost(_));
+        if too_many(&unit, &values) && (is_lost || is_current(scene)) {
             values.pop();
+        }
+        // What was seen last outlives how the unit stood.
+        while is_lost && too_many(&unit, &values) && unit.len() > LEAST_UNIT_ROWS {
+            unit.pop();
         }
         let (_, rest) = lines::split(area, (unit.len() + values.len()) as u16);
         let has_chart = area.height >= CHART_ROWS && !scene.view.monitor.stream.channels.is_empty();

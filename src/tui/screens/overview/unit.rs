@@ -34,6 +34,7 @@ pub(super) fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         UnitState::Unknown => Span::styled("talks, in words not known", theme.warning()),
         UnitState::Application if scene.view.viewing => Span::styled("view open, halted", theme.warning()),
         UnitState::Application => Span::styled("application runs", theme.good()),
+        UnitState::Loader if scene.view.load.is_silent => Span::styled("silent: loader or no power", theme.warning()),
         UnitState::Loader => Span::styled("waits in its loader", theme.warning()),
     };
     let other_text = match facts.unrecognised_lines {

@@ -65,8 +65,11 @@ impl Overview {
         shown.push(match scene.view.why_old() {
             Some(why) => Line::styled(format!("  {}", why.text()), theme.warning()),
             None => {
-                let chosen = stream.channels.get(self.chosen(stream)).map(|channel| channel.name.as_str());
-                limits_line(scene, source, chosen.unwrap_or_default(), has_columns)
+                let chosen = stream.channels.get(self.chosen(stream));
+                match chosen.and_then(plugged_line) {
+                    Some(text) => Line::styled(text, theme.warning()),
+                    None => limits_line(scene, source, chosen.map_or("", |channel| channel.name.as_str()), has_columns),
+                }
             }
         });
         shown
@@ -96,7 +99,8 @@ fn value_row(
     let beyond = limits.zip(channel.reading.value()).and_then(|(limits, value)| limits.word(value));
     let (state, style) = match beyond {
         Some(word) => (word.to_owned(), theme.warning()),
-        None => (channel.reading.words().to_owned(), theme.state(channel.reading)),
+        None if channel.plugged().is_some() => (channel.words().to_owned(), theme.warning()),
+        None => (channel.words().to_owned(), theme.state(channel.reading)),
     };
     let limit_columns = match has_limits {
         true => {
@@ -130,6 +134,13 @@ fn value_row(
         Span::styled(since, theme.bad()),
         Span::styled(trend, theme.curve()),
     ])
+}
+
+/// What stands behind a number that is not known to be a value.
+pub fn plugged_line(channel: &Channel) -> Option<String> {
+    let (plugged, value) = (channel.plugged()?, channel.reading.value()?);
+    let meaning = plugged.meaning();
+    Some(format!("  {}: {value:.0} marks {meaning}, or is a value; 6150h of it says which.", channel.name))
 }
 
 /// The limits of one channel in a line, or how to see them.

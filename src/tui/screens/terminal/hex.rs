@@ -13,6 +13,8 @@ use crate::tui::widgets::format;
 
 /// Bytes in a row of the hex view.
 const HEX_BYTES: u64 = 16;
+/// Columns of a row with time and offset.
+const TIMED_COLUMNS: u16 = 88;
 
 /// Where the hex view has been stopped: later bytes are not shown, and so many rows above them neither.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +57,10 @@ pub(super) fn rows(scene: Scene, area: Rect, place: Option<HexPlace>, with_times
     let room = usize::from(area.height);
     let place = place.unwrap_or_else(|| HexPlace::newest(scene.record));
     let (rows, _) = last_rows(scene.record, &place, place.rows, room);
-    rows.iter().rev().map(|row| hex_line(scene.theme, row, with_times.then_some(scene.start_of_day))).collect()
+    // Where there is no room for both, the time takes the place of the offset: the text at the end says most.
+    let with_offset = !with_times || area.width >= TIMED_COLUMNS;
+    let times = with_times.then_some(scene.start_of_day);
+    rows.iter().rev().map(|row| hex_line(scene.theme, row, times, with_offset)).collect()
 }
 
 /// Rows of the newest bytes before a place, newest row first: the first `skip` of them are only counted, `most` are
@@ -100,7 +105,7 @@ fn last_rows(record: &Record, place: &HexPlace, skip: usize, most: usize) -> (Ve
     (rows, seen)
 }
 
-fn hex_line(theme: Theme, row: &HexRow, times: Option<Duration>) -> Line<'static> {
+fn hex_line(theme: Theme, row: &HexRow, times: Option<Duration>, with_offset: bool) -> Line<'static> {
     let skipped = (row.first - row.start) as usize;
     let mut numbers = String::new();
     let mut text = " ".repeat(skipped);
@@ -124,7 +129,7 @@ fn hex_line(theme: Theme, row: &HexRow, times: Option<Duration>) -> Line<'static
     Line::from(vec![
         Span::styled(time, theme.quiet()),
         Span::styled(mark, theme.quiet()),
-        Span::styled(format!("{:08x}  ", row.start), theme.quiet()),
+        Span::styled(if with_offset { format!("{:08x}  ", row.start) } else { String::new() }, theme.quiet()),
         Span::styled(format!("{numbers} {text}"), style),
     ])
 }
