@@ -517,7 +517,7 @@ fn a_unit_that_comes_back_with_rows_alone_is_asked_for_its_version() {
     assert_eq!(report.heard, "L - Load New Software", "rows are no words to quote");
     // It runs, but whatever it is asked it does not say what.
     let (report, time, log) = end_of_an_upload(&rows, &[]);
-    assert_eq!((report.verdict, report.unit), (Verdict::WrongApplication, UnitNow::Application), "{report:?}");
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Unknown), "{report:?}");
     assert_eq!((log.as_str(), time), ("\u{11}m ~m xm", 1_100 + 2_400));
 }
 

@@ -1,5 +1,6 @@
 //! The commands as a user and a script meet them: the real program on a real port, the emulated unit in another process.
 
+mod json_page;
 mod load;
 mod reading;
 
