@@ -3,6 +3,7 @@
 
 use axcon::canopen::DataType;
 use axcon::device::Product;
+use axcon::wire::dictionary::Expected;
 use axcon::wire::{Vocabulary, diagnostics, dictionary, visible};
 use libfuzzer_sys::fuzz_target;
 
@@ -15,9 +16,14 @@ fuzz_target!(|line: &str| {
     let _ = vocabulary.line(line);
     let _ = vocabulary.prompt(line);
     let _ = diagnostics::quantities(line);
-    if let Some(read) = dictionary::line(line, |index| index & 1 == 0) {
+    let knows = |index| index & 1 == 0;
+    let columns = dictionary::several(line, knows).into_iter().flatten();
+    for read in dictionary::line(line, knows).into_iter().chain(columns) {
         for data_type in [DataType::Boolean, DataType::Integer16, DataType::Unsigned32, DataType::Real32] {
-            let _ = dictionary::value(&read.rest, data_type, &["Field Value", "RTD1", "°C"]);
+            for unit in [None, Some("°C")] {
+                let expected = Expected { data_type, names: &["Field Value", "RTD1"], unit };
+                let _ = dictionary::value(&read.rest, &expected);
+            }
         }
     }
     assert!(!visible::line(line.as_bytes()).chars().any(char::is_control));

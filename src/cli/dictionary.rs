@@ -185,6 +185,16 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     Err(not_all(&reading, &dump, talk.is_recorded()))
 }
 
+/// Whether the unit shows its field values (6100h), and not one of them has a value: first values take 3 s behind the
+/// power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO).
+fn has_no_reading(dump: &Dump) -> bool {
+    let mut inputs = dump.entries.iter().filter(|entry| entry.index == FIELD_VALUE && entry.subindex > 0).peekable();
+    inputs.peek().is_some() && inputs.all(|entry| entry.value.is_none())
+}
+
+/// The object with the field values.
+const FIELD_VALUE: &str = "6100";
+
 /// That a reading is not all there is, and why.
 fn not_all(reading: &DictionaryReading, dump: &Dump, is_recorded: bool) -> CliError {
     let (missing, entries) = (dump.missing.len(), dump.entries.len());

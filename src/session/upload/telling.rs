@@ -98,7 +98,8 @@ impl Upload {
             found_in_loader: self.found_in_loader,
             password_sent: self.password_sent,
             product: self.product.clone(),
-            version_before: self.version_before,
+            // A loader does not say; a journal may know.
+            version_before: self.version_before.or(self.order.ran),
             version_after: self.after.version.map(|(_, version)| version),
             records,
             records_total,

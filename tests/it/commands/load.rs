@@ -226,8 +226,15 @@ fn an_interrupt_in_the_middle_says_what_the_unit_is_now() {
     assert_eq!(ran.code, Some(130), "{}", ran.err);
     let verdict = json(ran.out.lines().last().expect("a verdict"));
     assert_eq!((&verdict["verdict"], &verdict["unit"]), (&"interrupted".into(), &"loader".into()), "{verdict}");
-    let again = bench.load("new.S", &[]);
+    let again = bench.load("new.S", &["--json"]);
     assert_eq!(again.code, Some(0), "{}{}", again.out, again.err);
+    // The loader cannot say it, the note of the first one does.
+    let verdict = json(again.out.lines().last().expect("a verdict"));
+    assert_eq!(
+        (&verdict["version_before"], &verdict["version_after"]),
+        (&"1.1.0".into(), &"1.2.0".into()),
+        "{verdict}"
+    );
 }
 
 #[test]
