@@ -173,6 +173,8 @@ def files():
     write("address-bytes.S", [HEAD, *B, END])
     write("address-wrap.S", [HEAD, *D, srec("3", 0xFFFFFFFC, words(0, 8)), END])
     write("address-beyond-largest.S", [HEAD, *D, srec("3", 0x40000, words(0, 8)), END])
+    outside = [srec("3", at, words(0, 8)) for at in (0x40000, 0x40008, 0x50000)]
+    write("address-beyond-largest-twice.S", [HEAD, *D, *outside, END])
     write("address-crosses-the-end.S", [HEAD, *D, srec("3", 0x3FFFC, words(0, 8)), END])
     write("address-data-memory.S", [HEAD, *D, srec("3", 0x02000000, words(0, 8)), END])
     write("address-data-memory-0020.S", [HEAD, *D, srec("3", 0x00200000, words(0, 8)), END])

@@ -4,6 +4,7 @@
 use axcon::endpoint::Endpoint;
 use axcon::session::{
     Awaited, Command, Event, FileEnd, Job, LoadReport, Outcome, Phase, Refusal, Session, UnitNow, UnitState, Verdict,
+    WalkEnd,
 };
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
@@ -250,6 +251,40 @@ fn a_dialogue_that_is_cancelled_is_left_with_enter_and_one_that_is_over_is_not()
     for (command, script, behind, job, last) in table {
         assert_eq!(cancelled(command, script, behind), (Outcome::Cancelled(job), last.to_owned()), "{job:?} {behind}");
     }
+}
+
+#[test]
+fn a_unit_that_takes_the_enter_for_values_of_its_own_does_not_stream_on() {
+    let asks = [("t", 5, "6100 or 7130 [6100]: "), ("~", 5, "\r\nRepeat after [1000]: "), ("~", 5, ROW)];
+    let mut alone = Alone::with(&asks);
+    let (outcome, _) = alone.ask(on());
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::SourceQuestion, .. }), "{outcome:?}");
+    assert_eq!(alone.log(), "0:t 1500:~ 4000:~ 4005:t");
+    // One that asks for ever is left to itself.
+    let mut alone = Alone::with(&[("t", 5, "Which? "), ("~", 5, "Which? "), ("~", 5, "Which? "), ("~", 5, "Which? ")]);
+    let (outcome, time) = alone.ask(on());
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::SourceQuestion, .. }), "{outcome:?}");
+    assert_eq!((alone.log().as_str(), time), ("0:t 1500:~ 4000:~ 6500:~", 9_000));
+    // What streams already when its questions are not understood was found so.
+    let mut alone = Alone::with(&[("t", 5, "off\r\n"), ("t", 5, "6100 or 7130 [6100]: "), ("~", 5, ROW)]);
+    let (outcome, _) = alone.ask(on());
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::SourceQuestion, .. }), "{outcome:?}");
+    assert!(alone.log().ends_with(":~"), "{}", alone.log());
+}
+
+#[test]
+fn a_walk_goes_on_over_objects_that_nobody_can_read() {
+    let (first, last) = ("6126h:01 TC1 = 16.000\r\n", "6126h:02 TC2 = 17.000\r\n");
+    let unread = [("~", 5, "one 1\r\n"), ("~", 5, "two 2\r\n"), ("~", 5, "three 3\r\n"), ("~", 5, "four 4\r\n")];
+    let read = |script: &[(&'static str, u64, &'static str)]| match Alone::with(script).ask(Command::ReadDictionary).0 {
+        Outcome::DictionaryRead(reading) => (reading.entries.len(), reading.end),
+        other => panic!("{other:?}"),
+    };
+    let over = [&[("v", 5, first)][..], &unread, &[("~", 5, last)]].concat();
+    assert_eq!(read(&over), (2, WalkEnd::Stopped), "and ends where nothing is answered");
+    // What says the same again and again is the end.
+    let same = [&[("v", 5, first)][..], &[("~", 5, "page 1\r\n"); 8], &[("~", 5, last)]].concat();
+    assert_eq!(read(&same), (1, WalkEnd::NotUnderstood { first: "page 1".into() }));
 }
 
 #[test]
