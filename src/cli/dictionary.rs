@@ -167,6 +167,12 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
         },
     };
     let written = out.save(text.as_bytes(), output);
+    if has_no_reading(&dump) {
+        output.remark(
+            "axcon: no input has a reading: a unit that has just started has none for up to 5 s, and measures nothing while \
+             it shows its object dictionary; read it again",
+        );
+    }
     if dump.doubtful() > 0 {
         let values = counted(dump.doubtful() as u64, "value");
         output.remark(&format!(

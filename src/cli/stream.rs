@@ -415,9 +415,9 @@ pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
 fn likely_millis(period: Duration) -> u64 {
     const STEPS: [u64; 6] = [1000, 500, 100, 50, 10, 5];
     let measured = period.as_secs_f64() * 1000.0;
-    let round = STEPS.into_iter().map(|step| (measured / step as f64).round() as u64 * step);
+    let mut round = STEPS.into_iter().map(|step| (measured / step as f64).round() as u64 * step);
     let is_close = |millis: &u64| *millis > 0 && (*millis as f64 - measured).abs() <= (measured / 100.0).max(1.0);
-    round.filter(is_close).next().unwrap_or((measured.round() as u64).max(1))
+    round.find(is_close).unwrap_or((measured.round() as u64).max(1))
 }
 
 /// Puts the stream back to what it was.

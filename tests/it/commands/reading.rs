@@ -52,6 +52,15 @@ fn the_stream_is_written_as_csv_and_json_and_left_as_it_was() {
 }
 
 #[test]
+fn a_dump_of_a_unit_that_has_no_values_yet_says_so() {
+    let world = World::new();
+    // Its view is opened before its first values have come, and none come while it is.
+    let ran = world.run(&["dictionary", "dump", "--port", "emu:axtc4co", "--yes", "--out", "unit.json"], b"");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.err.contains("no input has a reading"), "{}", ran.err);
+}
+
+#[test]
 fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
     let world = World::new();
     let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1", "--line-rate", "off"]);
