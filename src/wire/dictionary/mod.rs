@@ -2,7 +2,7 @@
 //!
 //! The manuals fix hexadecimal indices and nothing else. So a line is read by its tokens: an index in one of its usual
 //! spellings, a sub-index beside it or at the head of a line below, and what is left, out of which somebody who knows the
-//! entry picks its value ([`value`]). A line that leaves a doubt stays text.
+//! entry picks its value ([`value()`]). A line that leaves a doubt stays text.
 
 mod columns;
 mod value;
