@@ -233,7 +233,7 @@ pub fn notice(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
         None => theme.warning(),
         Some(Tone::Quiet) => theme.strong(),
         Some(Tone::Good) => theme.good(),
-        Some(Tone::Bad) => theme.bad(),
+        Some(Tone::Bad | Tone::Refused) => theme.bad(),
     };
     let texts = notice_rows(view, columns);
     if texts.is_empty() {

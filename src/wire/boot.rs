@@ -132,20 +132,17 @@ fn error(line: &str, words: &Words) -> Option<LoaderError> {
 /// Whether somebody who takes records says in words of his own that something is wrong.
 pub fn complains(text: &str) -> bool {
     let words = Words::of(text);
-    // "No errors", "0 errors", "Errors: 0" is what a loader says that counts them; "verified", "verify ok" one that is
-    // content. "Error 0" is a number like any other.
+    // "No errors", "0 errors", "Errors: 0" is what a loader says that counts them. "Error 0" is a number like any other.
     let counts_none = |at: usize, word: &str| {
         let before = at.checked_sub(1).and_then(|at| words.get(at));
         let beside = before.into_iter().chain(words.get(at + 1));
         before == Some("no") || word == "errors" && beside.into_iter().any(|word| number(word) == Some(0))
     };
-    let is_content = words.has_any(&["ok", "pass", "success", "good", "done", "verified"]);
     words.iter().enumerate().any(|(at, word)| {
         let begins = |beginnings: &[&str]| beginnings.iter().any(|beginning| word.starts_with(beginning));
         match word {
             "bad" | "err" | "nak" => true,
             _ if begins(&["error", "fehler"]) => !counts_none(at, word),
-            _ if begins(&["verif"]) => !is_content,
             _ => begins(&[
                 "abort",
                 "abbruch",
@@ -217,7 +214,6 @@ mod tests {
             "*** Fehler 6",
             "...Error",
             "Verify error at line 6, please retry",
-            "Verifying page 3",
             "Bad record",
             "err 5",
             "NAK",
@@ -238,6 +234,7 @@ mod tests {
             "Badge 7",
             "07%",
             "Verify ok",
+            "Verifying page 3",
             "Page 3 verified",
             "0 errors",
             "Errors: 0",

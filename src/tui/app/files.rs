@@ -107,7 +107,7 @@ impl App {
             (None, Some(refusal)) => refusal.to_string(),
             (None, None) => return true,
         };
-        self.view.tell(Tone::Bad, format!("Not sent: {why}."));
+        self.view.tell(Tone::Refused, format!("Not sent: {why}."));
         false
     }
 
@@ -116,8 +116,8 @@ impl App {
         self.dirty = true;
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         match bytes {
-            Err(why) => self.view.tell(Tone::Bad, format!("Not sent: {}: {why}.", path.display())),
-            Ok(bytes) if bytes.is_empty() => self.view.tell(Tone::Bad, format!("Not sent: {name} is empty.")),
+            Err(why) => self.view.tell(Tone::Refused, format!("Not sent: {}: {why}.", path.display())),
+            Ok(bytes) if bytes.is_empty() => self.view.tell(Tone::Refused, format!("Not sent: {name} is empty.")),
             // Meanwhile something else may have begun.
             Ok(_) if self.popup.is_some() || !self.may_send_file() => {}
             Ok(bytes) => {
@@ -286,7 +286,7 @@ impl App {
             .map_err(|why| format!("{name}: {why}"))
             .and_then(|text| Dump::parse(&name, &text).map_err(|_| format!("{name} is no dump as JSON")));
         match dump {
-            Err(why) => self.view.tell(Tone::Bad, format!("Not compared: {why}.")),
+            Err(why) => self.view.tell(Tone::Refused, format!("Not compared: {why}.")),
             Ok(_) if self.view.dictionary.is_none() => {
                 self.view.tell(Tone::Bad, "Nothing to compare it with yet: V reads the unit's object dictionary.");
             }

@@ -245,7 +245,7 @@ impl App {
         let left_out = joined.chars().count() - bytes.len();
         match bytes.is_empty() {
             true => {
-                self.view.tell(Tone::Bad, "Not sent: the unit knows none of these characters; it takes ASCII only.")
+                self.view.tell(Tone::Refused, "Not sent: the unit knows none of these characters; it takes ASCII only.")
             }
             false => self.ask(Question::Paste { bytes, left_out }),
         }
@@ -267,7 +267,7 @@ impl App {
                     None if self.view.question.is_some() => "the unit waits for an answer: end it with Enter first",
                     None => "the unit's view is open: close it with X first",
                 };
-                self.view.tell(Tone::Bad, format!("Not stopped: {what}."));
+                self.view.tell(Tone::Refused, format!("Not stopped: {what}."));
             }
             Cmd::Suspend => effects.push(Effect::Suspend),
             Cmd::Palette => {
@@ -370,7 +370,7 @@ impl App {
         }
         // What cannot be done now is said before anything is asked.
         if let Some(key) = self.view.question {
-            return self.view.tell(Tone::Bad, format!("Not sent: {}.", Refusal::QuestionOpen(key)));
+            return self.view.tell(Tone::Refused, format!("Not sent: {}.", Refusal::QuestionOpen(key)));
         }
         let job = self.view.job.filter(|_| !self.view.awaits_first_row());
         let why_not = match (menu, job, self.view.facts.state) {
@@ -384,7 +384,7 @@ impl App {
             (_, None, _) => None,
         };
         if let Some(why_not) = why_not {
-            return self.view.tell(Tone::Bad, format!("Not sent: {why_not}."));
+            return self.view.tell(Tone::Refused, format!("Not sent: {why_not}."));
         }
         match menu {
             MenuCmd::Menu => {

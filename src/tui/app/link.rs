@@ -41,7 +41,7 @@ impl App {
         // There every other key is the unit's.
         let prefix = if self.passes_keys() { "Ctrl-] " } else { "" };
         let why = format!("Not sent: {what}. Press {prefix}{key} to {to}.");
-        self.view.tell(Tone::Bad, why);
+        self.view.tell(Tone::Refused, why);
         false
     }
 

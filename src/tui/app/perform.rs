@@ -206,11 +206,11 @@ impl App {
                 true
             }
             Err(Refusal::Busy(job)) => {
-                self.view.tell(Tone::Bad, format!("Not sent: axcon is still {}.", job.doing()));
+                self.view.tell(Tone::Refused, format!("Not sent: axcon is still {}.", job.doing()));
                 false
             }
             Err(refusal) => {
-                self.view.tell(Tone::Bad, format!("Not sent: {refusal}."));
+                self.view.tell(Tone::Refused, format!("Not sent: {refusal}."));
                 false
             }
         }

@@ -20,8 +20,7 @@ use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::MenuKey;
 
-/// How a refusal begins, and how long no other news takes its place.
-const REFUSED: &str = "Not ";
+/// How long no other news takes the place of a refusal.
 const REFUSAL_STAYS: Duration = Duration::from_secs(4);
 
 /// How long a loader that is being sent a file says nothing at most: it stops its sender for each page, several times a
@@ -191,6 +190,8 @@ pub enum Tone {
     Good,
     /// It has not.
     Bad,
+    /// What a key asks for is not done. Stays for a while, as an answer that has to be read.
+    Refused,
 }
 
 impl View {
@@ -350,7 +351,7 @@ impl View {
     /// Says something to the user.
     pub fn tell(&mut self, tone: Tone, text: impl Into<String>) {
         let text = text.into();
-        let is_refusal = text.starts_with(REFUSED);
+        let is_refusal = tone == Tone::Refused;
         let until = is_refusal.then(|| self.now + REFUSAL_STAYS);
         let notice = Some(Notice { tone, text, until });
         let is_kept = |before: &Notice| before.until.is_some_and(|until| until > self.now);
