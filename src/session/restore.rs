@@ -12,7 +12,7 @@ use super::event::{Awaited, Job, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
-use crate::wire::{Message, Prompt, Text, visible};
+use crate::wire::{Message, Prompt, Text, complains, visible};
 
 /// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
 const RESET: Duration = Duration::from_secs(10);
@@ -149,13 +149,10 @@ fn tells_of_failure(line: &str) -> bool {
         lower.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
     let clears = ["clear", "erase", "reset"].iter().any(|word| lower.contains(word));
     let done = ["done", "restored", "changed", "saved", "stored", "written", "successful", "ok", "possible", "reset"];
-    words.iter().enumerate().any(|(at, word)| match *word {
-        // "Do not switch off" is none.
-        "not" => words.get(at + 1).is_some_and(|next| done.contains(next)),
-        "cannot" | "unable" | "abort" | "aborting" => true,
-        "error" => !clears,
-        word => word.starts_with("fail"),
-    })
+    // "Do not switch off" is none.
+    let is_not_done = |pair: &[&str]| pair[0] == "not" && done.contains(&pair[1]);
+    let fails = |word: &&str| matches!(*word, "cannot" | "unable") || word.starts_with("fail");
+    words.windows(2).any(is_not_done) || words.iter().any(fails) || (!clears && complains(line))
 }
 
 impl Work for RestoreDefaults {

@@ -18,7 +18,7 @@ use crate::host::Input;
 use crate::host::port_link::{PortLink, PortLinkError};
 use crate::host::signal::Signals;
 use crate::host::state::{Contents, Opened, State};
-use crate::host::unit::{self, Answer, Cable, HostError, HostedUnit, Hosting, LineRate};
+use crate::host::unit::{self, Answer, HostError, HostedUnit, Hosting, LineRate, Plug};
 use crate::wire::visible;
 
 /// One unit, as the first lines of the output tell it.
@@ -192,10 +192,10 @@ fn start(
         state,
         seed,
         // The unit's thread must not wait for us: should this be dropped, `unplug` and `plug` bring it again.
-        cable: Some(Box::new(move |cable| {
-            let _ = plugs.try_send(match cable {
-                Cable::Out => News::Unplugged { place },
-                Cable::In(pty) => News::Replugged { place, pty: pty.to_owned() },
+        plug: Some(Box::new(move |plug| {
+            let _ = plugs.try_send(match plug {
+                Plug::Out => News::Unplugged { place },
+                Plug::In(pty) => News::Replugged { place, pty: pty.to_owned() },
             });
         })),
         failed: Some(Box::new(move |error| {

@@ -98,7 +98,7 @@ pub struct HostedUnit {
 
 /// What has become of the cable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cable<'a> {
+pub enum Plug<'a> {
     /// It has been pulled: what a client opened before is no port any more.
     Out,
     /// It is in again; this is what a client opens from then on.
@@ -106,7 +106,7 @@ pub enum Cable<'a> {
 }
 
 /// Hears of the cable.
-pub type CableNews = Box<dyn FnMut(Cable<'_>) + Send>;
+pub type PlugNews = Box<dyn FnMut(Plug<'_>) + Send>;
 
 /// How a unit is hosted.
 #[derive(Default)]
@@ -120,7 +120,7 @@ pub struct Hosting {
     /// Decides what garbage looks like.
     pub seed: u64,
     /// Called from the unit's thread when the cable is pulled, and when it is in again.
-    pub cable: Option<CableNews>,
+    pub plug: Option<PlugNews>,
     /// Called once, from the unit's thread, if hosting fails later on.
     pub failed: Option<Box<dyn FnOnce(HostError) + Send>>,
 }

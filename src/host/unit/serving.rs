@@ -16,7 +16,7 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use std::thread;
 
 use super::port::{ClientSettings, UnitPort, Visit, Woken};
-use super::{AHEAD, BAUD, Cable, CableNews, Counts, HostError, Hosted, Hosting, LineRate, Order, Power};
+use super::{AHEAD, BAUD, Counts, HostError, Hosted, Hosting, LineRate, Order, Plug, PlugNews, Power};
 use crate::emulator::Store;
 use crate::emulator::cable::{Line, Plugged};
 use crate::host::clock::Clock;
@@ -79,7 +79,7 @@ pub(super) struct Host<U, P> {
     line_rate: LineRate,
     power: Power,
     state: Option<State>,
-    cable_news: Option<CableNews>,
+    plug_news: Option<PlugNews>,
     cable_is_in: bool,
     garbage: Rng,
     /// Whether anybody has the port open.
@@ -108,7 +108,7 @@ impl<U: Hosted, P: UnitPort> Host<U, P> {
             line_rate: hosting.line_rate,
             power: hosting.power,
             state: hosting.state,
-            cable_news: hosting.cable,
+            plug_news: hosting.plug,
             cable_is_in: true,
             garbage: Rng::new(hosting.seed),
             attended: false,
@@ -228,13 +228,13 @@ impl<U: Hosted, P: UnitPort> Host<U, P> {
         }
         self.cable_is_in = is_in;
         if is_in {
-            if let Some(news) = &mut self.cable_news {
-                news(Cable::In(self.port.path()));
+            if let Some(news) = &mut self.plug_news {
+                news(Plug::In(self.port.path()));
             }
             return Ok(());
         }
-        if let Some(news) = &mut self.cable_news {
-            news(Cable::Out);
+        if let Some(news) = &mut self.plug_news {
+            news(Plug::Out);
         }
         self.port.pull().map_err(failed("open"))?;
         self.client = ClientSettings { baud: BAUD, obeys_xoff: false };

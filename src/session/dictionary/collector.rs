@@ -14,6 +14,9 @@ use crate::wire::{Message, Text, dictionary};
 /// Entries that are kept at most; and lines, as long as nobody knows whose objects they are.
 const MOST_ENTRIES: usize = 20_000;
 
+/// Different lines that nobody understands, as far as they are kept: the largest product has 326 entries.
+const MOST_UNREAD: usize = 2_000;
+
 /// So many different lines that nobody understands are no titles.
 const MANY_UNREAD: usize = 10;
 
@@ -74,7 +77,7 @@ impl Collector {
     }
 
     fn unread(&mut self, line: &str) {
-        if self.unread.len() < MOST_ENTRIES {
+        if self.unread.len() < MOST_UNREAD {
             let line = line.trim();
             self.first_unread.get_or_insert_with(|| line.to_owned());
             self.unread.insert(line.to_owned());
