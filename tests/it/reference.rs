@@ -1,4 +1,4 @@
-//! `docs/cli.md` is what the command line says of itself, and the examples in the documents are commands that work.
+//! `docs/cli.md` is what the command line says of itself, the README agrees with it, and the examples in the documents work.
 
 use std::fmt::Write;
 use std::fs;
@@ -7,9 +7,10 @@ use std::time::Duration;
 
 use clap::builder::StyledStr;
 use clap::{Arg, ArgAction, Command};
+use rustix::process::Signal;
 
 use crate::support::shell::{Ran, Running, World};
-use crate::tidy::{UPDATE, documents};
+use crate::tidy::{UPDATE, documents, read, section};
 
 #[test]
 fn the_reference_is_what_the_command_line_says_of_itself() {
@@ -17,15 +18,15 @@ fn the_reference_is_what_the_command_line_says_of_itself() {
     let mut command = axcon::cli::command();
     command.build();
     let mut reference = String::from(
-        "# Commands\n\nMade from the command line itself: `AXCON_UPDATE_DOCS=1 cargo test --test it the_reference` writes \
-         this anew.\nThe options of every command stand under `axcon`.\n",
+        "# Commands\n\nMade from the command line itself: `AXCON_UPDATE_DOCS=1 cargo test --test it the_reference` rewrites \
+         it.\nOptions that every command has are listed under `axcon`.\n",
     );
     describe(&command, &mut reference);
     if std::env::var_os(UPDATE).is_some() {
         fs::write(&path, &reference).expect("written");
     }
     let current = fs::read_to_string(&path).unwrap_or_default();
-    assert!(current == reference, "docs/cli.md is not what the command line says; {UPDATE}=1 writes it anew");
+    assert!(current == reference, "docs/cli.md is not what the command line says; {UPDATE}=1 rewrites it");
 }
 
 fn describe(command: &Command, out: &mut String) {
@@ -36,7 +37,7 @@ fn describe(command: &Command, out: &mut String) {
     write!(out, "\n## {name}\n\n{}\n", text(about).trim()).expect("a string");
     let usage = command.clone().render_usage().to_string();
     write!(out, "\n```text\n{}\n```\n", usage.trim_start_matches("Usage: ").trim()).expect("a string");
-    // Every command has these; what it calls so itself and takes a value is its own.
+    // Every command has these; an option of the same name that takes a value is its own.
     let is_of_all = |arg: &Arg| {
         matches!(arg.get_action(), ArgAction::Help | ArgAction::HelpShort | ArgAction::HelpLong | ArgAction::Version)
     };
@@ -85,7 +86,7 @@ fn row(arg: &Arg) -> String {
     if let Some(variable) = arg.get_env() {
         write!(means, " Environment: `{}`.", variable.to_string_lossy()).expect("a string");
     }
-    // A bar would end the cell, also one between the ticks of code.
+    // A bar would end the cell, even within the ticks of code.
     let cell = |text: &str| text.replace('|', "\\|");
     format!("| `{}` | {} |", cell(shown.trim()), cell(&means))
 }
@@ -123,35 +124,76 @@ fn the_version_says_what_was_built() {
 }
 
 #[test]
-fn the_everyday_commands_of_the_readme_work_as_printed() {
-    let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("a README");
-    let tasks =
-        readme.split("## Everyday tasks").nth(1).and_then(|text| text.split("\n## ").next()).expect("the tasks");
-    let cells = tasks.lines().filter_map(|line| line.split('|').nth(3));
+fn the_exit_codes_of_the_readme_are_those_of_the_help() {
+    let help = axcon::cli::command().get_after_long_help().expect("the exit codes").to_string();
+    let coded = |(code, means): (&str, &str)| {
+        let is_code = !code.is_empty() && code.bytes().all(|byte| byte.is_ascii_digit());
+        is_code.then(|| (code.to_owned(), means.trim().to_owned()))
+    };
+    let helped: Vec<_> =
+        help.lines().filter_map(|line| line.strip_prefix("  ")?.split_once(' ')).filter_map(coded).collect();
+    let readme = readme().replace('`', "");
+    let printed: Vec<_> = section(&readme, "## Exit codes")
+        .lines()
+        .filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | "))
+        .filter_map(coded)
+        .collect();
+    let codes = |table: &[(String, String)]| table.iter().map(|(code, _)| code.clone()).collect::<Vec<_>>();
+    assert!(printed.len() > 10, "{printed:?}");
+    assert_eq!(codes(&printed), codes(&helped));
+    // One may say more than the other, and nothing else.
+    for ((code, printed), (_, helped)) in printed.iter().zip(&helped) {
+        assert!(printed.starts_with(helped) || helped.starts_with(printed), "{code}: '{printed}', but '{helped}'");
+    }
+}
+
+fn readme() -> String {
+    read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md"))
+}
+
+/// What the README calls an image is one that this makes.
+const MAKE_IMAGE: [&str; 10] =
+    ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "1600", "--out", "IMAGE"];
+
+/// The commands run as they are printed. What they leave to the user is given here: the port and the password by the
+/// environment, the answer to a question by `--yes`, the end of a stream by an interrupt.
+#[test]
+fn the_everyday_commands_of_the_readme_work() {
+    let readme = readme();
+    let cells = section(&readme, "## Everyday tasks").lines().filter_map(|line| line.split('|').nth(3));
     let commands: Vec<&str> =
         cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).filter(|text| text.starts_with("axcon ")).collect();
-    assert!(commands.len() >= 7, "{commands:?}");
+    assert!(commands.len() >= 8, "{commands:?}");
     let world = World::new();
     let unit = world.start(&["emulate", "axtc4co", "--link", "u0", "--line-rate", "off"]);
     unit.wait_out("serial: ");
-    for command in commands.into_iter().filter(|command| !command.contains("IMAGE")) {
+    assert_eq!(world.run(&MAKE_IMAGE, b"").code, Some(0));
+    for command in commands {
         let mut args: Vec<&str> = command.split(' ').skip(1).collect();
-        if args[0] == "stream" && !args.contains(&"--count") {
-            args.extend(["--count", "3"]);
+        let file_of_a_stream = match args[..] {
+            ["stream", .., "--out", file] if !args.contains(&"--count") => Some(file),
+            ["load", ..] => {
+                args.push("--yes");
+                None
+            }
+            _ => None,
+        };
+        let mut started = world.command(&args);
+        started.env("AXCON_PORT", "u0").env("AXCON_PASSWORD", "AXIO-2010");
+        let running = Running::start(started);
+        if let Some(file) = file_of_a_stream {
+            world.wait_in(file, ",fv,");
+            running.signal(Signal::INT);
         }
-        if !args.starts_with(&["dictionary", "diff"]) {
-            args.extend(["--port", "u0", "--baud", "3000000"]);
-        }
-        let ran = world.start(&args).wait_within(EXAMPLE);
+        let ran = running.wait_within(EXAMPLE);
         assert_eq!(ran.code, Some(0), "{command}\n{}\n{}", ran.out, ran.err);
     }
-    assert!(world.path("values.csv").exists());
 }
 
-/// The longest that an example may take: it has units in real time, on a machine that may be busy.
+/// The longest an example may take: its units run in real time, on a machine that may be busy.
 const EXAMPLE: Duration = Duration::from_secs(240);
 
-/// A file that a document prints: the block behind `<!-- file: NAME -->`.
+/// A file that a document prints: the block after `<!-- file: NAME -->`.
 struct Printed {
     document: String,
     name: String,
@@ -162,10 +204,10 @@ struct Printed {
 fn printed_files() -> Vec<Printed> {
     let mut files = Vec::new();
     for (path, text) in documents() {
-        for behind in text.split("<!-- file: ").skip(1) {
-            let (name, behind) = behind.split_once(" -->\n```").expect("a name, then the file");
-            let (language, behind) = behind.split_once('\n').expect("a language");
-            let (text, _) = behind.split_once("```").expect("the file's end");
+        for rest in text.split("<!-- file: ").skip(1) {
+            let (name, rest) = rest.split_once(" -->\n```").expect("a name, then the file");
+            let (language, rest) = rest.split_once('\n').expect("a language");
+            let (text, _) = rest.split_once("```").expect("the file's end");
             files.push(Printed {
                 document: path.display().to_string(),
                 name: name.into(),
@@ -177,7 +219,7 @@ fn printed_files() -> Vec<Printed> {
     files
 }
 
-/// A world in which the files of a document lie.
+/// A world with the files of a document.
 fn world_of(document: &str) -> World {
     let world = World::new();
     let files: Vec<Printed> = printed_files().into_iter().filter(|file| file.document == document).collect();
@@ -186,7 +228,7 @@ fn world_of(document: &str) -> World {
     world
 }
 
-/// Runs one of them with another program, with this on its standard input.
+/// Runs another program, usually on one of those files, with this on its standard input.
 fn run_example(world: &World, program: &Path, args: &[&str], input: &[u8]) -> Ran {
     let mut running = Running::start(world.tool(program, args));
     running.input(input);
@@ -211,8 +253,21 @@ fn every_script_in_the_documents_is_a_file_that_a_test_runs() {
     printed.sort();
     assert_eq!(
         printed,
-        ["docs/automation.md check.sh", "docs/automation.md test_unit.py", "docs/emulator.md faults.sh"]
+        [
+            "README.md upload.sh",
+            "docs/automation.md check.sh",
+            "docs/automation.md test_unit.py",
+            "docs/emulator.md faults.sh"
+        ]
     );
+}
+
+#[test]
+fn the_upload_of_the_readme_works_as_printed() {
+    let world = world_of("README.md");
+    let ran = run_example(&world, Path::new("/bin/sh"), &["-eu", "upload.sh"], b"");
+    assert_eq!(ran.code, Some(0), "{}\n{}", ran.out, ran.err);
+    assert!(ran.out.contains("V1.2.0"), "{}\n{}", ran.out, ran.err);
 }
 
 #[test]

@@ -1,10 +1,17 @@
-//! The tree keeps its promises: arrows point downward, the pure part touches no system, nothing stays behind.
+//! The tree keeps its promises: arrows point downward, the pure part touches no system, nothing is left unfinished, and the
+//! documents show what the program shows.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What each module may use, itself aside. `docs/architecture.md` draws it.
+use axcon::time::Instant;
+use axcon::tui::{App, Input, Options, Palette};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{Event, KeyCode};
+
+/// What each module may use besides itself. `docs/architecture.md` draws it.
 const ARROWS: &[(&str, &[&str])] = &[
     ("time", &[]),
     ("rng", &[]),
@@ -39,10 +46,10 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// The one part of the console on the screen that may touch the system.
+/// The only part of the console on the screen that may touch the system.
 const TUI_LOOP: &str = "src/tui/run";
 
-/// Names that bring in the system's clock, threads, files, environment, or an order that changes from run to run.
+/// Names that bring in the system's clock, threads, files or environment, or an order that changes from run to run.
 const BANNED_IN_THE_PURE_PART: &[&str] = &[
     "std::time",
     "SystemTime",
@@ -98,7 +105,7 @@ fn the_pure_part_touches_no_system() {
 }
 
 #[test]
-fn nothing_is_left_open() {
+fn nothing_is_left_unfinished() {
     let marks = [
         "to".to_owned() + "do!(",
         "unimplemented".to_owned() + "!(",
@@ -128,39 +135,98 @@ fn every_link_in_the_documents_leads_somewhere() {
     assert!(dead.is_empty(), "dead links:\n{}", dead.join("\n"));
 }
 
+#[test]
+fn a_word_is_spelt_the_same_in_all_documents() {
+    for (path, text) in documents() {
+        let wrong = text.lines().position(|line| line.to_lowercase().contains("check sum"));
+        assert_eq!(wrong.map(|line| line + 1), None, "{}: checksum is one word", path.display());
+    }
+}
+
 /// With this in the environment what a document shows of the program is replaced by what the program shows.
 pub const UPDATE: &str = "AXCON_UPDATE_DOCS";
 
 #[test]
-fn the_pictures_in_the_documents_are_those_the_program_draws() {
+fn the_pictures_and_keys_in_the_documents_are_those_of_the_program() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut shown = 0;
+    let (mut pictures, mut screens) = (0, 0);
     for (path, text) in documents() {
         let current = with_blocks(&text, "picture", |name| {
-            shown += 1;
+            pictures += 1;
             let snapshot = read(&root.join(format!("src/tui/snapshots/axcon__tui__pictures__{name}.snap")));
-            snapshot.splitn(3, "---\n").nth(2).expect("a picture behind the header").trim_end().to_owned()
+            snapshot.splitn(3, "---\n").nth(2).expect("a picture after the header").trim_end().to_owned()
+        });
+        let current = with_blocks(&current, "keys", |name| {
+            screens += 1;
+            keys(name)
         });
         if current != text && std::env::var_os(UPDATE).is_some() {
             fs::write(root.join(&path), &current).expect("the document can be written");
             continue;
         }
         let path = path.display();
-        assert!(current == text, "{path} shows other pictures than the program draws; {UPDATE}=1 replaces them");
+        assert!(current == text, "{path} shows other pictures or keys than the program; {UPDATE}=1 replaces them");
     }
-    assert!(shown >= 10, "pictures are looked for: {shown}");
+    assert!(pictures >= 10, "pictures are looked for: {pictures}");
+    assert_eq!(screens, SCREENS.len() + 1, "every screen's keys, and those that work everywhere");
 }
 
-/// A document in which every block of text behind `<!-- KIND: NAME -->` is what `draw` gives for its name.
+/// Keys that show the screens.
+const SCREENS: &str = "123456789";
+
+/// The keys of a screen, by its name, or those that work `everywhere`, as the help page lists them.
+fn keys(name: &str) -> String {
+    if name == "everywhere" {
+        let page = help_page('1');
+        return [&page["The unit's menu"], "", &page["Everywhere"]].join("\n");
+    }
+    let mut pages = SCREENS.chars().map(help_page);
+    pages.find_map(|mut page| page.remove(name)).unwrap_or_else(|| panic!("there is no screen {name}"))
+}
+
+/// The help page of the screen that this key shows: the lines of each section, by its heading.
+fn help_page(screen: char) -> BTreeMap<String, String> {
+    let (columns, rows) = (80, 120);
+    let mut app = App::new(Options {
+        link: None,
+        directory: PathBuf::from("/"),
+        home: None,
+        palette: Palette::Mono,
+        size: (columns, rows),
+    });
+    for key in [KeyCode::Char(screen), KeyCode::F(1)] {
+        app.handle(Instant::ZERO, Input::Terminal(Event::Key(key.into())));
+    }
+    let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a test backend");
+    terminal.draw(|frame| app.draw(frame)).expect("drawing in memory");
+    let picture = terminal.backend().to_string();
+    let lines = picture.lines().map(|line| line.trim_matches('"').trim_end());
+    let mut sections = BTreeMap::new();
+    let mut heading = None;
+    for line in lines {
+        if let Some(rule) = line.strip_prefix("── ") {
+            heading = rule.split(" ──").next();
+        } else if line.is_empty() {
+            heading = None;
+        } else if let Some(heading) = heading {
+            let section: &mut String = sections.entry(heading.to_owned()).or_default();
+            section.push_str(if section.is_empty() { "" } else { "\n" });
+            section.push_str(line);
+        }
+    }
+    sections
+}
+
+/// The document with every block of text after `<!-- KIND: NAME -->` replaced by what `draw` gives for its name.
 pub fn with_blocks(text: &str, kind: &str, mut draw: impl FnMut(&str) -> String) -> String {
     let mark = format!("<!-- {kind}: ");
     let mut current = String::new();
     let mut rest = text;
-    while let Some((before, behind)) = rest.split_once(&mark) {
-        let (name, behind) = behind.split_once(" -->\n```text\n").expect("a name, then the block");
-        let (_, behind) = behind.split_once("```").expect("the block's end");
+    while let Some((before, block)) = rest.split_once(&mark) {
+        let (name, block) = block.split_once(" -->\n```text\n").expect("a name, then the block");
+        let (_, after) = block.split_once("```").expect("the block's end");
         current.push_str(&format!("{before}{mark}{name} -->\n```text\n{}\n```", draw(name)));
-        rest = behind;
+        rest = after;
     }
     current + rest
 }
@@ -211,7 +277,7 @@ fn what_the_documents_list_is_all_there_is() {
 }
 
 /// The part of a document below a heading.
-fn section<'a>(text: &'a str, heading: &str) -> &'a str {
+pub fn section<'a>(text: &'a str, heading: &str) -> &'a str {
     let below = text.split_once(heading).unwrap_or_else(|| panic!("no {heading}")).1;
     below.split("\n## ").next().unwrap_or_default()
 }
@@ -255,7 +321,7 @@ fn constant(cell: &str) -> Option<(&str, &str)> {
     is_constant.then(|| (&cell[1..file.len() + 4], name))
 }
 
-/// A number, or a time in ms, as documents write it: `550`, `1.5 s`, `80 ms`.
+/// A number, or a time in ms, as the documents write it: `550`, `1.5 s`, `80 ms`.
 fn limit(cell: &str) -> Option<f64> {
     let (number, unit) = cell.split_once(' ').unwrap_or((cell, ""));
     let number: f64 = number.replace(',', "").parse().ok()?;
@@ -266,7 +332,7 @@ fn limit(cell: &str) -> Option<f64> {
     }
 }
 
-/// The same as the code writes it.
+/// The same, as the code writes it.
 fn coded(definition: &str) -> Option<f64> {
     let (factor, number) = match definition.trim_end_matches(')').split_once('(') {
         Some(("Duration::from_secs", number)) => (1000.0, number),
@@ -328,7 +394,7 @@ fn module_of(path: &Path) -> Option<String> {
     (!matches!(module, "lib" | "main")).then(|| module.to_owned())
 }
 
-/// Lines of code with their numbers: no comments.
+/// Lines of code with their numbers, without comments.
 fn code_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines()
         .enumerate()
@@ -336,7 +402,7 @@ fn code_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .map(|(number, line)| (number + 1, line))
 }
 
-/// First path segments behind `crate::` in a line.
+/// First path segments after `crate::` in a line.
 fn crate_paths(line: &str) -> Vec<String> {
     line.split("crate::")
         .skip(1)
