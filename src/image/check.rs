@@ -108,7 +108,7 @@ mod tests {
         let one = "S307000000001122C5\n";
         let two = "S30700000001334480\n";
         let end = "S70500000000FA\n";
-        let table: [(String, &[Found]); 23] = [
+        let table: [(String, &[Found]); 25] = [
             (format!("{HEAD}{one}{two}{end}"), &[("no-identity", 1, 1)]),
             (String::new(), &[("empty-file", 1, 1)]),
             ("\r\n \n".into(), &[("empty-file", 1, 1)]),
@@ -137,6 +137,11 @@ mod tests {
             (format!("{HEAD}{one}{end}{end}{one}"), &[("no-identity", 1, 1), ("after-terminator", 4, 1)]),
             (format!("{HEAD}{one}S9030000FC\n"), &[("no-identity", 1, 1), ("refused-type", 3, 1)]),
             (format!("{HEAD}{one}S30300EE\n{end}"), &[("bad-length", 3, 3)]),
+            (format!("S3G7\n{HEAD}{one}{end}"), &[("bad-character", 1, 3), ("data-before-header", 1, 1)]),
+            (
+                format!("{HEAD}S30900000000112233444C\nS30700000001334480\nS30900000001112233444B\n{end}"),
+                &[("no-identity", 1, 1), ("overlap", 3, 5), ("overlap", 4, 5)],
+            ),
             (format!("S001FE\n{one}{end}"), &[("bad-length", 1, 3)]),
         ];
         for (file, expected) in table {
@@ -144,6 +149,28 @@ mod tests {
             found.sort_unstable();
             expected.sort_unstable();
             assert_eq!(found, expected, "{file:?}");
+        }
+    }
+
+    #[test]
+    fn an_overlap_names_the_line_that_reaches_as_far_first() {
+        let file = "S30900000000112233444C\nS30700000001334480\nS30900000001112233444B\nS70500000000FA\n";
+        let report = report(format!("{HEAD}{file}").as_bytes());
+        let overlaps = report.defects.iter().filter(|defect| defect.id == DefectId::Overlap);
+        let said: Vec<&str> = overlaps.map(|defect| defect.message.as_str()).collect();
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(said.iter().all(|said| said.ends_with("written by line 2 already")), "{said:?}");
+    }
+
+    #[test]
+    fn one_record_does_not_show_what_addresses_count_so_they_count_what_the_units_do() {
+        for (address_unit, end) in [(AddressUnit::Word, 2), (AddressUnit::Byte, 4)] {
+            let mut target = target();
+            target.flash.address_unit = address_unit;
+            let file = format!("{HEAD}S3090000000011223344{:02X}\nS70500000000FA\n", !(9u8 + 0xAA));
+            let report = check(file.as_bytes(), None, &[target], None, &[]).expect("a slice");
+            assert_eq!(report.facts.address_unit, None);
+            assert_eq!(report.facts.ranges, [AddressRange { start: 0, end }]);
         }
     }
 
@@ -224,7 +251,7 @@ mod tests {
         let one = ":040000001122334452\n:040002005566778840\n";
         let (start, end) = (":0400000500000000F7\n", ":00000001FF\n");
         let sound: Found = ("no-identity", 1, 1);
-        let table: [(String, &[Found]); 24] = [
+        let table: [(String, &[Found]); 27] = [
             (format!("{one}{start}{end}"), &[sound]),
             (format!("\u{FEFF}{one}{start}{end}"), &[sound, ("byte-order-mark", 1, 1)]),
             (format!("{one}{end}"), &[sound, ("missing-entry", 3, 1)]),
@@ -236,6 +263,12 @@ mod tests {
             (format!("{one}{start}{start}{end}"), &[sound, ("duplicate-entry", 4, 10)]),
             (format!("{one}:0400000300000000F9\n{end}"), &[sound]),
             (format!("{one}:0400000300010000F8\n{end}"), &[sound, ("entry-outside", 3, 10)]),
+            (format!("{one}:0400000300000001F8\n{end}"), &[sound]),
+            (
+                format!(":040002005566778840\n{end}"),
+                &[sound, ("gap", 1, 4), ("missing-entry", 2, 1), ("entry-outside", 2, 1)],
+            ),
+            (format!("{one}:04FFFE001122334455\n{start}{end}"), &[sound, ("gap", 3, 4)]),
             (
                 format!("{one}:00000000000\n{start}{end}"),
                 &[sound, ("empty-record", 3, 2), ("trailing-characters", 3, 12)],

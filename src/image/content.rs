@@ -101,3 +101,23 @@ impl Steps {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_is_room_for_the_largest_flash_and_for_its_records_and_for_no_more() {
+        let mut content = Content::new();
+        for number in 0..(MOST_BYTES / 128) as u32 {
+            assert!(content.keep(1, number * 64, &[0; 128]), "{number}");
+        }
+        assert!(!content.keep(1, 0, &[0]));
+        assert_eq!(content.kept(), MOST_BYTES);
+
+        let mut content = Content::new();
+        assert!((0..MOST_PIECES).all(|_| content.keep(1, 0, &[0])));
+        assert!(!content.keep(1, 0, &[0]));
+        assert_eq!(content.pieces.len(), MOST_PIECES);
+    }
+}

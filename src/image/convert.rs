@@ -227,6 +227,16 @@ mod tests {
     }
 
     #[test]
+    fn records_that_follow_on_each_other_are_joined_before_they_are_cut_anew() {
+        let image =
+            image(AddressUnit::Word, 0, &[(4, &[1, 2, 3, 4]), (6, &[5, 6]), (7, &[7, 8, 9, 10]), (16, &[11, 12])]);
+        let blocks = regrouped(&image, AddressUnit::Word, Some(8)).expect("they have addresses");
+        let expected = [(4, vec![1, 2, 3, 4, 5, 6, 7, 8]), (8, vec![9, 10]), (16, vec![11, 12])]
+            .map(|(address, data)| Block { address, data });
+        assert_eq!(blocks, expected);
+    }
+
+    #[test]
     fn half_a_word_is_filled_up_where_addresses_count_words() {
         let odd = image(AddressUnit::Byte, 0, &[(0, &[1, 2, 3])]);
         let blocks = |unit| regrouped(&odd, unit, None).expect("it has an address");

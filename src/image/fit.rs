@@ -230,6 +230,24 @@ mod tests {
     }
 
     #[test]
+    fn a_gap_anywhere_in_the_program_counts_and_none_behind_it() {
+        let recipe = make::Recipe { target: &small(), version: Version::new(1, 2, 0), words: 600, flaw: None };
+        let file = String::from_utf8(make::make(&recipe).expect("an image")).expect("text");
+        let lines: Vec<&str> = file.split_inclusive('\n').collect();
+        // Header, 16 words a record, terminator: the record of words 0x240 to 0x24F.
+        let gapped = [&lines[..37], &lines[38..]].concat().concat();
+        let allow = [DefectId::IdentityCrc];
+        let report = check(gapped.as_bytes(), None, &[small()], Some("AXSMALL"), &allow).expect("a slice");
+        let gapped = report.image().unwrap_or_else(|| panic!("{:?}", report.defects));
+        assert_eq!(gapped.gap(), Some(AddressRange { start: 0x240, end: 0x250 }));
+    }
+
+    #[test]
+    fn a_program_may_fill_the_flash() {
+        assert_eq!(image(&small(), 0x1_0000, &[]).misfits(&small(), None), []);
+    }
+
+    #[test]
     fn older_software_than_what_runs_is_told() {
         let image = image(&small(), 600, &[]);
         for (major, minor, patch, expected) in

@@ -253,6 +253,49 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_line_of_any_length_may_end_on_the_border_of_the_buffer() {
+        for length in [1, LONGEST - 1, LONGEST, LONGEST + 1] {
+            for end in ["\r", "\n", "\r\n"] {
+                for border in HEAD - 2..HEAD + 2 {
+                    let mut bytes = vec![b'a'; border - length - 1];
+                    bytes.push(b'\n');
+                    bytes.extend(std::iter::repeat_n(b'x', length));
+                    bytes.extend(end.bytes());
+                    bytes.extend(b"y\n");
+                    assert_eq!(all(&bytes, HEAD), plain(&bytes), "{length} {end:?} {border}");
+                }
+            }
+        }
+    }
+
+    /// Is interrupted before each byte, and fails behind the last.
+    struct Interrupted(Vec<u8>, bool);
+
+    impl Read for Interrupted {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            self.1 = !self.1;
+            match (self.1, self.0.pop()) {
+                (true, byte) => {
+                    self.0.extend(byte);
+                    Err(io::ErrorKind::Interrupted.into())
+                }
+                (false, None) => Err(io::ErrorKind::UnexpectedEof.into()),
+                (false, Some(byte)) => {
+                    buffer[0] = byte;
+                    Ok(1)
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_reader_that_is_interrupted_is_asked_again_and_one_that_fails_is_not() {
+        let mut lines = Lines::with_buffer(Interrupted(vec![b'x'; HEAD], false), HEAD);
+        assert_eq!(lines.head().map(<[u8]>::len).ok(), Some(HEAD));
+        assert_eq!(lines.next().map_err(|error| error.kind()), Err(io::ErrorKind::UnexpectedEof));
+    }
+
     /// The same rules, written down without any regard to memory.
     fn plain(bytes: &[u8]) -> Vec<(Vec<u8>, bool, LineEnd)> {
         let mut all = Vec::new();

@@ -398,7 +398,7 @@ mod tests {
 
     #[test]
     fn lines_that_are_no_records_say_where_and_why() {
-        let table: [(&[u8], LineError); 15] = [
+        let table: [(&[u8], LineError); 16] = [
             (b"", LineError::NotARecord(b' ')),
             (b"T305", LineError::NotARecord(b'T')),
             (b"\xEF\xBB\xBFS0", LineError::NotARecord(0xEF)),
@@ -408,6 +408,7 @@ mod tests {
             (b"S4030000FC", LineError::UnknownType(b'4')),
             (b"S\xFF", LineError::UnknownType(0xFF)),
             (b"S9+30000FC", LineError::Character { column: 3, found: b'+' }),
+            (b"S3GG", LineError::Character { column: 3, found: b'G' }),
             (b"S30600010G00A553", LineError::Character { column: 10, found: b'G' }),
             (b"S3060001\x000000A553", LineError::Character { column: 9, found: 0 }),
             (b"S30600010000A5", LineError::Short { says: 6, holds: 5 }),

@@ -221,5 +221,6 @@ mod tests {
         assert_eq!(lines[2], serde_json::json!([1.5, "i", "*********"]));
         assert_eq!(lines[3], serde_json::json!([1.5, "m", "link lost"]));
         assert!(!text.contains("AXIO"));
+        assert!(text.contains(r"\u0008\t\n\u000b\u000c\r\u000e"), "short forms where JSON has them: {text}");
     }
 }

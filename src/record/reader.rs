@@ -122,12 +122,7 @@ impl Reader {
     /// # Errors
     /// If there was nothing in it.
     pub fn finish(&mut self, mut out: impl FnMut(Piece)) -> Result<Ending, ReadError> {
-        if self.line.iter().all(u8::is_ascii_whitespace) {
-            self.line.clear();
-        }
-        let ending = if self.line.is_empty() {
-            Ending::Whole
-        } else if self.format.is_none() {
+        let ending = if self.format.is_none() {
             self.end_line(&mut out)?;
             Ending::Whole
         } else {

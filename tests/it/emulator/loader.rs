@@ -264,6 +264,42 @@ fn a_character_that_cannot_be_read_while_a_page_is_written_is_error_1_when_that_
 }
 
 #[test]
+fn what_is_sent_while_it_says_who_it_is_is_not_heard() {
+    let mut bench = Bench::at_menu();
+    bench.send(b"lAXIO-2010\r");
+    bench.run_ms(2);
+    // The header of the file leaves before the header of the loader has.
+    let said = talk_over(&mut bench, &S0[..S0.len() - 8]);
+    assert!(said.ends_with(PROMPT), "{said}");
+    let said = talk_over(&mut bench, &S0[S0.len() - 8..]);
+    assert!(said.starts_with("Error # 0002"), "the rest of a record alone is not a record: {said}");
+}
+
+#[test]
+fn another_header_begins_the_load_from_scratch_even_while_the_sender_is_held() {
+    let mut bench = in_loader();
+    // The last record begins the second page, so it is parked and the sender held.
+    let first = file(&new_program())[..18].concat() + S0;
+    let said = talk_over(&mut bench, &first);
+    assert_eq!(said, "\x13\x11", "held, and let go on by the header");
+    let said = talk_over(&mut bench, &(s3(0x310, &[1, 2, 3, 4]) + S7));
+    assert!(without_flow_control(&said).contains("Loaded 0x0002 Program and 0x0000 Data words."), "{said}");
+}
+
+#[test]
+fn a_character_that_cannot_be_read_behind_s7_is_error_1_and_nothing_is_started() {
+    let mut bench = in_loader();
+    let records = file(&new_program());
+    send_obeying(&mut bench, &records, Instant::NEVER);
+    let now = bench.now;
+    bench.unit().handle_framing_error(now);
+    bench.run_ms(500);
+    let said = without_flow_control(&bench.take());
+    assert!(said.ends_with(&format!("Error # 0001\r\nRestarting.\r\n{PROMPT}")), "{said}");
+    assert_eq!(bench.unit().running(), Running::Loader);
+}
+
+#[test]
 fn behind_s7_the_last_page_waits_for_silence_whatever_is_on_the_line() {
     let mut bench = in_loader();
     let program = new_program();

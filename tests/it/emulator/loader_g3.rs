@@ -184,6 +184,7 @@ fn each_record_is_acknowledged_by_a_short_hold() {
     bench.run_ms(20);
     let heard: Vec<(Instant, u8)> = bench.heard[bench.taken..].to_vec();
     assert_eq!(heard.iter().map(|&(_, byte)| byte).collect::<Vec<_>>(), [XOFF, b'.', XON]);
+    assert!(!bench.unit().holds_sender());
     // The words are programmed before the check sum is read: 16 of 20 µs, while its digits and the CR come.
     let took = heard[2].0.since(last);
     assert!(took < Duration::from_micros(400), "{took:?} from the CR to the XON");
@@ -218,6 +219,15 @@ fn each_error_has_its_bits_and_leads_back_to_the_prompt() {
     let mut bench = in_loader();
     assert_eq!(without_flow_control(&talk_over(&mut bench, "S3")), complaint("0002"), "data before the header");
     assert_eq!(bench.unit().flash(), flash_with(&old_program()), "nothing is erased yet");
+}
+
+#[test]
+fn the_last_word_of_the_flash_can_be_loaded() {
+    let mut bench = erased();
+    let said = talk_over(&mut bench, &s3(0x3_FFFF, &[0x12, 0x34]));
+    assert_eq!(without_flow_control(&said), ".");
+    let flash = bench.unit().flash();
+    assert_eq!(flash[flash.len() - 2..], [0x12, 0x34]);
 }
 
 #[test]

@@ -360,6 +360,23 @@ mod tests {
     }
 
     #[test]
+    fn the_first_one_takes_the_sum_of_any_odd_record_for_data() {
+        for (text, words, is_lost) in [
+            ("S306000000801168\r", vec![0x6811], true),
+            ("S30700000080112245\r", vec![0x2211], false),
+            ("S3080000008011223311\r", vec![0x2211, 0x1133], true),
+            ("S3090000008011223344CC\r", vec![0x2211, 0x4433], false),
+            ("S30A00000080112233445576\r", vec![0x2211, 0x4433, 0x7655], true),
+        ] {
+            let mut reader = Reader::new(Version::V1_3);
+            let reads: Vec<Read> = text.bytes().map(|character| reader.take(character, true)).flatten().collect();
+            let said: Vec<&Read> = reads.iter().filter(|read| **read != Read::Nothing).collect();
+            let end = if is_lost { &[][..] } else { &[&Read::End(Kind::Data)] };
+            assert_eq!(said, [&[&Read::Words { address: 0x80, words }], end].concat(), "{text}");
+        }
+    }
+
+    #[test]
     fn nothing_that_comes_makes_it_panic() {
         let mut rng = crate::rng::Rng::new(1);
         for round in 0..2_000 {
