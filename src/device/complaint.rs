@@ -13,7 +13,7 @@ pub struct Complaint {
     pub line: usize,
     /// Column, from 1.
     pub column: usize,
-    /// The key it is about, e.g. `object 6126h, entry 1, default`; empty if the file is no TOML.
+    /// The key it is about, e.g. `object 6126h, entry 1, default`; empty if the file is not TOML.
     pub key: String,
     /// What was found, and what is allowed.
     pub message: String,
@@ -36,9 +36,9 @@ impl fmt::Display for Complaint {
     }
 }
 
-/// Complaints about one file that are told: more help nobody, and each is looked up in the text.
+/// The most complaints about one file that are shown: more help nobody, and each is looked up in the text.
 const MOST_COMPLAINTS: usize = 100;
-/// Characters of a message that are told: a key or a text of the file may have any length.
+/// The most characters of a message that are shown: a key or a text of the file may have any length.
 const LONGEST_MESSAGE: usize = 400;
 
 /// The complaints about one file.
@@ -55,7 +55,7 @@ impl<'a> Complaints<'a> {
         Complaints { file, text, found: Vec::new() }
     }
 
-    /// One more, about what stands at a byte of the text. What comes behind the last one that is told is only said to be.
+    /// One more, about what is at a byte of the text. After the last one that is shown, it is only said that there are more.
     pub fn add(&mut self, at: usize, key: impl Into<String>, message: impl Into<String>) {
         match self.found.len() {
             0..MOST_COMPLAINTS => self.put(at, key.into(), message.into()),
@@ -80,7 +80,7 @@ impl<'a> Complaints<'a> {
         });
     }
 
-    /// The complaints with one more behind them: the text is no TOML, or not of the shape that is wanted.
+    /// The complaints with one more at the end: the text is not TOML, or not of the shape that is wanted.
     pub fn ended_by(mut self, error: &toml::de::Error) -> Vec<Complaint> {
         let at = error.span().map_or(0, |span| span.start);
         self.add(at, "", error.message().trim_end().replace('\n', "; "));

@@ -1,6 +1,6 @@
 //! A product's object dictionary as its manual prints it: names, types, access, limits, defaults, meanings.
 //!
-//! What is here is the same for every unit of a product; the values of one unit are kept by whoever talks to it or
+//! What is here is the same for every unit of a product; the values of one unit are kept by what talks to it or
 //! is it.
 
 use crate::canopen::{DataType, ObjectAddress, Value};
@@ -31,9 +31,9 @@ pub struct Object {
 pub enum ObjectKind {
     /// One value.
     Var,
-    /// Entries of one type behind sub-index 0, which counts them.
+    /// Entries of one type after sub-index 0, which counts them.
     Array,
-    /// Entries of different types behind sub-index 0, which counts them.
+    /// Entries of different types after sub-index 0, which counts them.
     Record,
 }
 
@@ -56,7 +56,7 @@ pub struct Entry {
     pub limits: Limits,
     /// Unit of its value, e.g. `°C`.
     pub unit: Option<String>,
-    /// What its values stand for, where they are not numbers of something.
+    /// What its values mean, where they are not numbers of something.
     pub meanings: Vec<Meaning>,
     /// What it is for, in a sentence or two.
     pub description: Option<String>,
@@ -106,7 +106,7 @@ pub enum Bound {
     },
 }
 
-/// What a value stands for.
+/// What a value means.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Meaning {
     /// The value.
@@ -191,7 +191,7 @@ impl Limits {
 }
 
 impl Entry {
-    /// What a value stands for.
+    /// What a value means.
     pub fn meaning(&self, value: Value) -> Option<&str> {
         self.meanings.iter().find(|meaning| meaning.value == value).map(|meaning| meaning.text.as_str())
     }

@@ -1,7 +1,7 @@
 //! The serial bootloaders a unit may have, as profiles.
 //!
 //! Which one a real unit runs is not known; three generations of the Freescale S-record loader for 16-bit 56F8xx parts
-//! are public facts, and a product's file says which one is believed. Both ends use this page: the emulated loader
+//! are public facts, and a product's file says which one is assumed. Both ends use this page: the emulated loader
 //! behaves as its profile says, the console sends as the profile wants.
 
 use serde::Deserialize;
@@ -15,10 +15,10 @@ use crate::time::Duration;
 pub enum LoaderKind {
     /// SDK, 2000-2004: one page buffer, one parked record, XOFF when the data crosses into another page.
     G1,
-    /// 56F83xx generation: known by its texts and error numbers. How it stops its sender is not known; it is believed to
+    /// 56F83xx generation: known by its texts and error numbers. How it stops its sender is not known; it is assumed to
     /// do so like [`G1`](LoaderKind::G1), with which it shares prompt, dots and errors (a guess).
     G2,
-    /// Circular buffer, 2005 and later: XOFF behind every record.
+    /// Circular buffer, 2005 and later: XOFF after every record.
     G3,
     /// The same up to version 1.3: it takes the check sum of a record with an odd number of data bytes as data, and waits
     /// for ever. The console sends whole words to every loader, so it treats both alike.
@@ -63,7 +63,7 @@ pub enum Pacing {
     /// XOFF when the data crosses into another page, XON when the old page is written. One more record may be on its
     /// way, no second one.
     Pages,
-    /// XOFF behind every record, XON when the receive ring is empty: each pair says that a record has been taken. S0
+    /// XOFF after every record, XON when the receive ring is empty: each pair says that a record has been taken. S0
     /// erases all of the program flash before its XON. Nobody counts what is in the ring of [`RING`] characters.
     Records,
 }
@@ -80,10 +80,10 @@ pub const SECTOR_WORDS: u32 = 512;
 /// Programming one word (public data sheet of the 56F83xx, likely the part).
 pub const PROGRAM_TIME: Duration = Duration::from_micros(20);
 
-/// How long an image of so many characters with so many bytes of data takes, from its first record to its last: the line
+/// How long an image of this many characters with this many bytes of data takes, from its first record to its last: the line
 /// at 115200 baud with ten bits a character, and what the loader of the unit does besides. One that stops for pages
-/// erases and programs one after the other while the line stands still; one that stops for records erases all of the
-/// flash behind the header, whatever the image's size, and programs while characters come. An estimate, for plans only.
+/// erases and programs one after the other while the line is idle; one that stops for records erases all of the
+/// flash after the header, whatever the image's size, and programs while characters come. An estimate, for plans only.
 pub fn transfer_time(characters: u64, data_bytes: u64, unit: Option<(LoaderKind, &FlashMap)>) -> Duration {
     let line = Duration::from_secs_f64(characters as f64 / CHARACTERS_PER_SECOND);
     match unit {
@@ -91,8 +91,9 @@ pub fn transfer_time(characters: u64, data_bytes: u64, unit: Option<(LoaderKind,
             line + ERASE_TIME * flash.program_words.div_ceil(SECTOR_WORDS)
         }
         _ => {
-            let pages = u32::try_from(data_bytes.div_ceil(2 * PAGE_WORDS)).unwrap_or(u32::MAX);
-            line + (ERASE_TIME + PROGRAM_TIME * PAGE_WORDS as u32) * pages
+            let page_words = unit.map_or(SMALLEST_PAGE_WORDS, |(_, flash)| flash.page_words);
+            let pages = data_bytes.div_ceil(2 * u64::from(page_words));
+            line + (ERASE_TIME + PROGRAM_TIME * page_words) * u32::try_from(pages).unwrap_or(u32::MAX)
         }
     }
 }
@@ -100,12 +101,12 @@ pub fn transfer_time(characters: u64, data_bytes: u64, unit: Option<(LoaderKind,
 /// What the units' line carries at 115200 baud, 8N1.
 const CHARACTERS_PER_SECOND: f64 = 11_520.0;
 /// Words of the smallest page any part of the family has.
-const PAGE_WORDS: u64 = 256;
+const SMALLEST_PAGE_WORDS: u32 = 256;
 
 /// The longest that erasing all of the program flash can take: page by page, with the smallest pages any part of the
 /// family has. A part with larger sectors, or one that erases in bulk, is quicker.
 pub fn longest_erase(flash: &FlashMap) -> Duration {
-    ERASE_TIME * flash.program_words.div_ceil(flash.page_words)
+    ERASE_TIME * flash.program_words.div_ceil(SMALLEST_PAGE_WORDS)
 }
 
 #[cfg(test)]
@@ -125,11 +126,17 @@ mod tests {
         for whole in [of(LoaderKind::G3), of(LoaderKind::G3Early)] {
             assert!((whole - 11.24).abs() < 1e-6, "{whole}");
         }
+        // Five larger pages: half the time for erasing.
+        let larger = FlashMap { page_words: 512, ..flash };
+        let five = seconds(Some((LoaderKind::G1, &larger)));
+        assert!((five - 1.1512).abs() < 1e-6, "{five}");
     }
 
     #[test]
     fn erasing_half_a_megabyte_page_by_page_takes_twenty_seconds() {
-        let flash = FlashMap { address_unit: AddressUnit::Word, program_words: 0x40000, page_words: 256 };
-        assert_eq!(longest_erase(&flash), Duration::from_millis(20_480));
+        for page_words in [256, 512] {
+            let flash = FlashMap { address_unit: AddressUnit::Word, program_words: 0x40000, page_words };
+            assert_eq!(longest_erase(&flash), Duration::from_millis(20_480), "the part may have smaller ones");
+        }
     }
 }

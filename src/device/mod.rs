@@ -153,7 +153,7 @@ pub struct BootFlash {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Loader {
-    /// The kind that is believed to be in the unit.
+    /// The kind that is assumed to be in the unit.
     pub kind: LoaderKind,
     /// Whether it waits for any key before it wants the file.
     pub asks_for_key: bool,
@@ -205,7 +205,7 @@ impl Product {
         }
     }
 
-    /// The same with another loader than the product is believed to have.
+    /// The same with another loader than the product is assumed to have.
     pub fn target_with(&self, loader: LoaderKind) -> Target {
         Target { outside: loader.outside(), ..self.target() }
     }
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_question_is_known_before_a_row_that_came_behind_it() {
+    fn a_question_is_known_before_a_row_that_follows_it() {
         let products = Product::all();
         let vocabulary = Vocabulary {
             products: products.iter().map(|product| product.name.as_str()).collect(),

@@ -1,8 +1,9 @@
 //! What differs between two dumps.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Dump, DumpEntry, hexadecimal, rounding};
+use crate::canopen::ObjectAddress;
 use crate::device::Product;
 use crate::device::dictionary::Access;
 
@@ -19,9 +20,9 @@ pub struct Difference {
     pub left: Option<String>,
     /// Its value on the right; `None` if it is not there.
     pub right: Option<String>,
-    /// Bits, and not a number of something: people read these in hexadecimal digits.
+    /// Bits, not a number of something: people read these in hexadecimal digits.
     bits: bool,
-    /// Somebody has set it. What a unit measures, and what is its own, differs without anybody's doing.
+    /// Somebody has set it. What a unit measures, and what is its own, differs by itself.
     pub setting: bool,
 }
 
@@ -46,58 +47,76 @@ impl Difference {
 
 /// Every entry that differs, by index and sub-index. Against the factory only what it sets can differ.
 pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
-    let by_address = |dump: &Dump| -> BTreeMap<(String, u8), DumpEntry> {
-        dump.entries.iter().map(|entry| ((entry.index.clone(), entry.subindex), entry.clone())).collect()
-    };
-    let (of_left, of_right) = (by_address(left), by_address(right));
-    // The manual gives its numbers in as few digits as will do, and means them.
-    let rounding =
-        |dump: &Dump, entry: &DumpEntry, value| if dump.factory { 0.0 } else { rounding(&entry.text, value) };
     let product = left.product.as_deref().or(right.product.as_deref()).and_then(Product::named);
-    let is_setting = |entry: Option<&DumpEntry>| {
-        let at = entry.and_then(DumpEntry::at);
-        let known = product.zip(at).and_then(|(product, at)| product.dictionary.object(at.index)?.entry(at.sub));
+    let is_setting = |entry: &DumpEntry| {
+        let known = product.zip(entry.at()).and_then(|(product, at)| product.dictionary.entry(at));
         known.is_none_or(|entry| entry.access == Access::ReadWrite)
     };
-    let mut addresses: Vec<&(String, u8)> = of_left.keys().chain(of_right.keys()).collect();
-    addresses.sort();
-    addresses.dedup();
-    let differs = |address: &(String, u8)| {
-        let number = |entry: &DumpEntry| entry.value.as_ref().and_then(serde_json::Number::as_f64);
-        let (of_left, of_right) = (of_left.get(address), of_right.get(address));
-        let same = match (of_left, of_right) {
-            (Some(of_left), Some(of_right)) => match (number(of_left), number(of_right)) {
-                (Some(a), Some(b)) => {
-                    let open = rounding(left, of_left, a).max(rounding(right, of_right, b));
-                    (a - b).abs() <= open.max(b.abs() * f64::from(f32::EPSILON))
-                }
-                // What is no number is what the unit printed.
-                (None, None) => of_left.text == of_right.text,
-                (Some(_), None) | (None, Some(_)) => false,
-            },
-            // The factory has nothing to say of what it does not set; a unit that does not show what it sets lacks it.
-            (Some(_), None) => right.factory,
-            (None, Some(_)) => left.factory,
-            (None, None) => true,
-        };
-        let (left, right) = (of_left, of_right);
-        let shown = |entry: Option<&DumpEntry>| {
-            entry.map(|entry| if entry.value.is_some() { entry.number() } else { entry.text.clone() })
-        };
-        let name = left.or(right).map(|entry| entry.name.clone()).unwrap_or_default();
-        let (index, subindex) = address.clone();
-        let entry = left.or(right);
-        (!same).then(|| Difference {
-            index,
-            subindex,
-            name,
-            left: shown(left),
-            right: shown(right),
-            bits: entry.is_some_and(|entry| entry.bits),
+    let (of_left, of_right) = (by_place(left), by_place(right));
+    let places: BTreeSet<Place<'_>> = of_left.keys().chain(of_right.keys()).copied().collect();
+    let differs = |place: Place<'_>| {
+        let left = Side { entry: of_left.get(&place).copied(), factory: left.factory };
+        let right = Side { entry: of_right.get(&place).copied(), factory: right.factory };
+        let entry = left.entry.or(right.entry).filter(|_| !same(left, right))?;
+        Some(Difference {
+            index: place.map_or_else(|(index, _)| index.to_owned(), |at| format!("{:04X}", at.index)),
+            subindex: entry.subindex,
+            name: entry.name.clone(),
+            left: left.entry.map(printed),
+            right: right.entry.map(printed),
+            bits: entry.bits,
             setting: is_setting(entry),
         })
     };
-    addresses.into_iter().filter_map(differs).collect()
+    places.into_iter().filter_map(differs).collect()
+}
+
+/// Where an entry lies; index and sub-index as they are written in a dump that somebody has edited badly.
+type Place<'a> = Result<ObjectAddress, (&'a str, u8)>;
+
+fn by_place(dump: &Dump) -> BTreeMap<Place<'_>, &DumpEntry> {
+    dump.entries.iter().map(|entry| (entry.at().ok_or((entry.index.as_str(), entry.subindex)), entry)).collect()
+}
+
+/// One side of a comparison.
+#[derive(Clone, Copy)]
+struct Side<'a> {
+    /// The entry, if the dump has it.
+    entry: Option<&'a DumpEntry>,
+    /// Whether the dump is the factory's.
+    factory: bool,
+}
+
+impl Side<'_> {
+    /// How far an entry's value may be from what is printed of it. The manual gives its numbers in as few digits as will
+    /// do, and means them.
+    fn rounding(self, entry: &DumpEntry, value: f64) -> f64 {
+        if self.factory { 0.0 } else { rounding(&entry.text, value) }
+    }
+}
+
+fn same(left: Side<'_>, right: Side<'_>) -> bool {
+    let number = |entry: &DumpEntry| entry.value.as_ref().and_then(serde_json::Number::as_f64);
+    match (left.entry, right.entry) {
+        (Some(of_left), Some(of_right)) => match (number(of_left), number(of_right)) {
+            (Some(a), Some(b)) => {
+                let open = left.rounding(of_left, a).max(right.rounding(of_right, b));
+                (a - b).abs() <= open.max(b.abs() * f64::from(f32::EPSILON))
+            }
+            // What is not a number is compared as the unit printed it.
+            (None, None) => of_left.text == of_right.text,
+            (Some(_), None) | (None, Some(_)) => false,
+        },
+        // The factory has nothing to say about what it does not set; a unit that does not show what it sets lacks it.
+        (Some(_), None) => right.factory,
+        (None, Some(_)) => left.factory,
+        (None, None) => true,
+    }
+}
+
+/// An entry's value as a number; as the unit printed it if it is not one.
+fn printed(entry: &DumpEntry) -> String {
+    if entry.value.is_some() { entry.number() } else { entry.text.clone() }
 }
 
 #[cfg(test)]
@@ -123,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_compared_as_it_is_printed() {
+    fn what_is_not_a_number_is_compared_as_it_is_printed() {
         let product = Product::named("AXTC4CO").expect("built in");
         let (left, mut right) = (Dump::factory(product), Dump::factory(product));
         assert_eq!(differences(&left, &right), []);
@@ -140,6 +159,27 @@ mod tests {
         assert_eq!(sides, [(Some("Ver. A"), Some("Ver. B"))]);
         left.entries[0].value = Some(1.into());
         assert_eq!(differences(&left, &right)[0].left.as_deref(), Some("1"));
+    }
+
+    #[test]
+    fn an_index_is_the_same_in_any_case_and_a_bad_one_is_shown_as_it_is() {
+        let product = Product::named("AXTC4CO").expect("built in");
+        let (left, mut right) = (Dump::factory(product), Dump::factory(product));
+        for entry in &mut right.entries {
+            entry.index.make_ascii_lowercase();
+        }
+        assert_eq!(differences(&left, &right), []);
+        let mut left = left;
+        (left.factory, right.factory) = (false, false);
+        right.entries.truncate(1);
+        left.entries.truncate(1);
+        left.entries[0].index = "6l26".into();
+        let found = differences(&left, &right);
+        let places: Vec<_> = found.iter().map(|found| (found.index.as_str(), found.left.is_some())).collect();
+        assert_eq!(
+            places,
+            [(format!("{:04X}", right.entries[0].at().expect("good").index).as_str(), false), ("6l26", true)]
+        );
     }
 
     #[test]

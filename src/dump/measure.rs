@@ -2,7 +2,7 @@
 //!
 //! Only for people. Files keep what the unit keeps.
 
-/// How the numbers of an entry stand for a quantity.
+/// How the numbers of an entry express a quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measure {
     /// What a number counts, in `unit`s; `None` where it is the quantity itself.
@@ -42,7 +42,7 @@ impl Measure {
     }
 }
 
-/// Digits behind the point that a step has, so that no number of steps needs more.
+/// Decimal places that a step has, so that no number of steps needs more.
 fn decimals(step: f64) -> usize {
     let is_whole = |decimals: &i32| {
         let shifted = step * 10f64.powi(*decimals);

@@ -58,7 +58,7 @@ pub struct DumpEntry {
     pub name: String,
     /// The value, where the unit shows one that fits the entry's type.
     pub value: Option<serde_json::Number>,
-    /// The value as the unit printed it; where it is not understood, all that stands behind index and sub-index.
+    /// The value as the unit printed it; where it is not understood, all that follows index and sub-index.
     pub text: String,
     /// The factory's value on this node, where it has one.
     pub default: Option<serde_json::Number>,
@@ -66,9 +66,9 @@ pub struct DumpEntry {
     pub deviates: bool,
     /// Physical unit.
     pub unit: Option<String>,
-    /// What the value stands for.
+    /// What the value means.
     pub meaning: Option<String>,
-    /// Bits, and not a number of something: people read these in hexadecimal digits.
+    /// Bits, not a number of something: people read these in hexadecimal digits.
     #[serde(skip)]
     bits: bool,
 }
@@ -82,21 +82,21 @@ pub struct Missing {
     pub subindex: u8,
 }
 
-/// What FFFFFFFFh, `nan`, or dashes stand for in an entry that is measured (AXTC4CO manual, section 3.3.3).
+/// What FFFFFFFFh, `nan`, or dashes mean in an entry that is measured (AXTC4CO manual, section 3.3.3).
 const NO_READING: &str = "no reading";
 
-/// What digits stand for that may be decimal or hexadecimal ones.
+/// What digits mean that may be decimal or hexadecimal.
 const DOUBTFUL: &str = "not certain: hexadecimal?";
 
-/// Why a text is no dump.
+/// Why a text is not a dump.
 #[derive(Debug, thiserror::Error)]
 pub enum DumpError {
-    /// It is no JSON, or not that of a dump.
-    #[error("{name}:{}:{}: this is no dump: {}", fault.line(), fault.column(), without_place(fault))]
+    /// It is not JSON, or not that of a dump.
+    #[error("{name}:{}:{}: this is not a dump: {}", fault.line(), fault.column(), without_place(fault))]
     Syntax {
         /// What it was read from.
         name: String,
-        /// Where and what. It is in the message, so it is no cause that would be said behind it again.
+        /// Where and what. It is in the message, so not a cause, which would be printed again after it.
         fault: serde_json::Error,
     },
     /// It is another kind of document.
@@ -181,11 +181,11 @@ impl Dump {
         }
     }
 
-    /// Reads a dump back that [`Dump::json`] has written; `name` stands in errors. Texts in it are made harmless: nobody
-    /// knows who has had the file in hands.
+    /// Reads a dump back that [`Dump::json`] has written; `name` is for errors. Texts in it are made harmless: anybody
+    /// may have edited the file.
     ///
     /// # Errors
-    /// If it is none.
+    /// If it is not one.
     pub fn parse(name: &str, text: &str) -> Result<Self, DumpError> {
         let mut dump: Dump =
             serde_json::from_str(text).map_err(|fault| DumpError::Syntax { name: name.to_owned(), fault })?;
@@ -266,7 +266,7 @@ impl DumpEntry {
     }
 }
 
-/// What is wrong with a text, without the place that serde puts behind it.
+/// What is wrong with a text, without the place that serde adds to it.
 fn without_place(fault: &serde_json::Error) -> String {
     let text = fault.to_string();
     text.rfind(" at line ").map_or(text.as_str(), |end| &text[..end]).to_owned()
@@ -289,7 +289,7 @@ fn hexadecimal(bits: u64) -> String {
     format!("0x{bits:08X}")
 }
 
-/// What a value stands for; an error of the list 1003h in words.
+/// What a value means; an error of the list 1003h in words.
 fn meaning(product: &Product, at: ObjectAddress, entry: &Entry, value: Value) -> Option<String> {
     let error = value.as_integer().and_then(|bits| u32::try_from(bits).ok()).filter(|&bits| bits != 0);
     match (at.index, at.sub, error) {
@@ -303,7 +303,7 @@ fn is_bits(entry: &Entry) -> bool {
     entry.data_type == DataType::Unsigned32 && entry.unit.is_none()
 }
 
-/// Whether a parameter is not what the factory made it. Measurements and what is a unit's own are no deviations.
+/// Whether a parameter is not what the factory made it. Measurements and what is a unit's own are not deviations.
 fn deviates(read: &ReadEntry, entry: &Entry, default: Option<Value>) -> bool {
     let parameter = entry.access == Access::ReadWrite && !matches!(read.at.index, 0x1003 | 0x1010 | 0x1011);
     let differs = read.value.zip(default).is_some_and(|(value, default)| match (value, default) {
@@ -329,7 +329,7 @@ fn rounding(text: &str, value: f64) -> f64 {
 /// Half a unit of a numeral's last digit.
 fn half_a_unit(numeral: &str) -> f64 {
     let (mantissa, exponent) = numeral.split_once(['e', 'E']).unwrap_or((numeral, "0"));
-    let decimals = mantissa.split_once('.').map_or(0, |(_, behind)| behind.len()) as i32;
+    let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| decimals.len()) as i32;
     0.5 * 10f64.powi(exponent.parse::<i32>().unwrap_or(0).saturating_sub(decimals).clamp(-40, 40))
 }
 

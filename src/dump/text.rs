@@ -32,14 +32,15 @@ impl Dump {
         text
     }
 
-    /// For spreadsheets, with a heading.
+    /// For spreadsheets, with a heading. A text that a spreadsheet would take for a formula gets a `'` in front; numbers
+    /// never do.
     pub fn csv(&self) -> String {
         let mut text = String::from("index,subindex,name,value,unit,meaning,default,deviates,text\n");
         for entry in &self.entries {
             let number =
                 |number: &Option<serde_json::Number>| number.as_ref().map(ToString::to_string).unwrap_or_default();
             let fields = [
-                entry.index.clone(),
+                quoted(&entry.index),
                 entry.subindex.to_string(),
                 quoted(&entry.name),
                 number(&entry.value),
@@ -56,14 +57,38 @@ impl Dump {
     }
 }
 
+/// A text as a field that no spreadsheet evaluates: the unit, or somebody who has edited a dump, has written it.
 fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+    let is_formula = text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err();
+    let text = if is_formula { format!("'{text}") } else { text.to_owned() };
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::device::Product;
+
+    #[test]
+    fn no_text_of_a_csv_is_a_formula_and_numbers_stay_numbers() {
+        let mut dump = Dump::factory(Product::named("AXTC4CO").expect("built in"));
+        dump.entries.truncate(1);
+        let entry = &mut dump.entries[0];
+        (entry.index, entry.name) = ("@1000".into(), "+cmd|'/c calc'!A0".into());
+        (entry.value, entry.default) = (serde_json::Number::from_f64(-4.5), Some((-1).into()));
+        (entry.unit, entry.meaning) = (Some("-1+1".into()), Some("on".into()));
+        for (text, field) in [
+            ("=HYPERLINK(\"http://x\",\"y\")", "\"'=HYPERLINK(\"\"http://x\"\",\"\"y\"\")\""),
+            ("-4.50", "-4.50"),
+            ("- - -", "'- - -"),
+            ("0x10", "0x10"),
+        ] {
+            dump.entries[0].text = text.into();
+            let csv = dump.csv();
+            let expected = format!("'@1000,0,'+cmd|'/c calc'!A0,-4.5,'-1+1,on,-1,0,{field}");
+            assert_eq!(csv.lines().nth(1), Some(expected.as_str()));
+        }
+    }
 
     #[test]
     fn bits_and_what_the_factory_makes_them_are_written_alike() {

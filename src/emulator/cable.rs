@@ -24,7 +24,7 @@ impl Line {
         Line { character_time, latency, free_at: Instant::ZERO, in_flight: VecDeque::new() }
     }
 
-    /// Puts bytes on the line, behind those already waiting.
+    /// Puts bytes on the line, after those already waiting.
     pub fn push(&mut self, now: Instant, bytes: &[u8]) {
         for &byte in bytes {
             self.free_at = self.free_at.max(now) + self.character_time;

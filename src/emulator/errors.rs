@@ -1,4 +1,4 @@
-//! Active errors: what lies behind the error register 1001h and the list 1003h (manuals, sections 3.2.2 and 3.2.4).
+//! Active errors: what underlies the error register 1001h and the list 1003h (manuals, sections 3.2.2 and 3.2.4).
 //!
 //! The list holds what is active, the newest first; an error leaves it when it clears. A list that is emptied by hand
 //! stays empty of what is still active until that has gone and come again (errata E-73, E-D13).
@@ -23,20 +23,6 @@ pub enum Class {
     Scanner,
 }
 
-/// An error has come or gone: what an EMCY message tells the network.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ErrorEvent {
-    /// It has become active.
-    Raised(Emergency),
-    /// It has cleared; whether it was the last one.
-    Cleared {
-        /// Which.
-        error: Emergency,
-        /// No error is active any more: EMCY code 0000h (section 3.2.4).
-        last: bool,
-    },
-}
-
 /// The active errors of a unit.
 #[derive(Clone, Debug, Default)]
 pub struct ActiveErrors {
@@ -44,7 +30,6 @@ pub struct ActiveErrors {
     active: Vec<Emergency>,
     /// What 1003h shows, newest first.
     listed: VecDeque<Emergency>,
-    events: VecDeque<ErrorEvent>,
 }
 
 /// Open or short circuit (section 3.2.4, table of EMCY codes).
@@ -54,21 +39,24 @@ pub const LIMIT_EXCEEDED: u16 = 0xF011;
 /// Frozen converter or math error, AXRTD8CO only.
 pub const DEVICE_SPECIFIC: u16 = 0xFF00;
 
-/// Events that nobody has fetched at most; the oldest are lost.
-const MOST_EVENTS: usize = 64;
-
 impl Class {
     /// The class of an error of a unit with these sensors.
     pub fn of(error: Emergency, sensors: SensorKind) -> Class {
-        match (error.code, sensors) {
-            (INPUT_OVERLOAD, _) | (LIMIT_EXCEEDED, SensorKind::Thermocouple) => Class::Sensor,
-            (LIMIT_EXCEEDED, SensorKind::Rtd) => Class::System,
-            (DEVICE_SPECIFIC, _) => Class::Scanner,
-            (_, _) => Class::Communication,
+        match sensors {
+            SensorKind::Thermocouple => match error.code {
+                INPUT_OVERLOAD | LIMIT_EXCEEDED => Class::Sensor,
+                _ => Class::Communication,
+            },
+            SensorKind::Rtd => match error.code {
+                INPUT_OVERLOAD => Class::Sensor,
+                LIMIT_EXCEEDED => Class::System,
+                DEVICE_SPECIFIC => Class::Scanner,
+                _ => Class::Communication,
+            },
         }
     }
 
-    /// Its sub-index in 1029h.
+    /// Its sub-index in the 1029h of a unit that has such errors.
     pub fn sub_index(self) -> u8 {
         match self {
             Class::Communication => 1,
@@ -81,24 +69,22 @@ impl Class {
 
 impl ActiveErrors {
     /// Errors become active, and others clear, at one and the same moment: the list never holds both, and the unit is
-    /// never without an error in between. What is active already, or is not, is passed over.
-    pub fn change(&mut self, raised: &[Emergency], cleared: &[Emergency], objects: &mut Objects) {
+    /// never without an error in between. What is active already, or is not, is passed over. Gives those that have become
+    /// active.
+    pub fn change(&mut self, raised: &[Emergency], cleared: &[Emergency], objects: &mut Objects) -> Vec<Emergency> {
         let raised: Vec<Emergency> = raised.iter().copied().filter(|error| !self.active.contains(error)).collect();
         let cleared: Vec<Emergency> = cleared.iter().copied().filter(|error| self.active.contains(error)).collect();
         if raised.is_empty() && cleared.is_empty() {
-            return;
+            return raised;
         }
         self.active.retain(|active| !cleared.contains(active));
         self.listed.retain(|listed| !cleared.contains(listed));
         for &error in &raised {
             self.active.push(error);
             self.listed.push_front(error);
-            self.note(ErrorEvent::Raised(error));
         }
         self.publish(objects);
-        for (left, &error) in (0..cleared.len()).rev().zip(&cleared) {
-            self.note(ErrorEvent::Cleared { error, last: left == 0 && self.active.is_empty() });
-        }
+        raised
     }
 
     /// Empties the list, not the errors.
@@ -110,18 +96,6 @@ impl ActiveErrors {
     /// Number of active errors.
     pub fn count(&self) -> usize {
         self.active.len()
-    }
-
-    /// The next event.
-    pub fn poll_event(&mut self) -> Option<ErrorEvent> {
-        self.events.pop_front()
-    }
-
-    fn note(&mut self, event: ErrorEvent) {
-        if self.events.len() == MOST_EVENTS {
-            self.events.pop_front();
-        }
-        self.events.push_back(event);
     }
 
     fn publish(&mut self, objects: &mut Objects) {
@@ -159,9 +133,9 @@ mod tests {
     fn the_list_holds_what_is_active_newest_first() {
         let (mut objects, mut errors) = (objects("AXTC4CO"), ActiveErrors::default());
         let (low, high) = (threshold(1, 0x10), threshold(3, 0x20));
-        errors.change(&[low], &[], &mut objects);
-        errors.change(&[high], &[], &mut objects);
-        errors.change(&[high], &[], &mut objects);
+        assert_eq!(errors.change(&[low], &[], &mut objects), [low]);
+        assert_eq!(errors.change(&[high], &[], &mut objects), [high]);
+        assert_eq!(errors.change(&[high], &[], &mut objects), [], "it is active already");
         assert_eq!(list(&objects), [0x2003_F011, 0x1001_F011]);
         assert_eq!(objects.get(0x1001, 0), Value::Unsigned8(1));
         assert_eq!(objects.get(0x1003, 3), Value::Unsigned32(0), "beyond the count");
@@ -169,14 +143,6 @@ mod tests {
         assert_eq!(list(&objects), [0x2003_F011]);
         errors.change(&[], &[high], &mut objects);
         assert_eq!((list(&objects), objects.get(0x1001, 0)), (vec![], Value::Unsigned8(0)));
-        let events: Vec<ErrorEvent> = std::iter::from_fn(|| errors.poll_event()).collect();
-        let expected = [
-            ErrorEvent::Raised(low),
-            ErrorEvent::Raised(high),
-            ErrorEvent::Cleared { error: low, last: false },
-            ErrorEvent::Cleared { error: high, last: true },
-        ];
-        assert_eq!(events, expected);
     }
 
     #[test]
@@ -192,18 +158,12 @@ mod tests {
         let all = errors.active.clone();
         errors.change(&[], &all[1..], &mut objects);
         errors.change(&[open], &all, &mut objects);
-        errors.events.clear();
-        errors.change(&[threshold(1, 0x20), threshold(1, 0x40)], &[open], &mut objects);
-        errors.change(&[], &[open, threshold(1, 0x20), threshold(1, 0x40)], &mut objects);
-        let events: Vec<ErrorEvent> = std::iter::from_fn(|| errors.poll_event()).collect();
-        let expected = [
-            ErrorEvent::Raised(threshold(1, 0x20)),
-            ErrorEvent::Raised(threshold(1, 0x40)),
-            ErrorEvent::Cleared { error: open, last: false },
-            ErrorEvent::Cleared { error: threshold(1, 0x20), last: false },
-            ErrorEvent::Cleared { error: threshold(1, 0x40), last: true },
-        ];
-        assert_eq!(events, expected);
+        assert_eq!(list(&objects), [u32::from(open)]);
+        let thresholds = [threshold(1, 0x20), threshold(1, 0x40)];
+        assert_eq!(errors.change(&thresholds, &[open], &mut objects), thresholds);
+        assert_eq!((list(&objects), errors.count()), (vec![0x4001_F011, 0x2001_F011], 2));
+        assert_eq!(errors.change(&[], &[open, thresholds[0], thresholds[1]], &mut objects), []);
+        assert_eq!((list(&objects), errors.count()), (vec![], 0));
     }
 
     // B-113, B-73
@@ -248,7 +208,13 @@ mod tests {
                 .map(|code| Class::of(error(code), sensors))
         };
         use Class::{Communication, Scanner, Sensor, System};
-        assert_eq!(classes(SensorKind::Thermocouple), [Communication, Communication, Sensor, Sensor, Scanner]);
+        assert_eq!(classes(SensorKind::Thermocouple), [Communication, Communication, Sensor, Sensor, Communication]);
         assert_eq!(classes(SensorKind::Rtd), [Communication, Communication, Sensor, System, Scanner]);
+        for product in Product::all() {
+            let behaviour = product.dictionary.object(0x1029).expect("every product has it");
+            for class in classes(product.measurement.sensors) {
+                assert!(behaviour.entry(class.sub_index()).is_some(), "{}: {class:?}", product.name);
+            }
+        }
     }
 }

@@ -61,7 +61,7 @@ pub enum KnobError {
         /// What was to be turned.
         what: &'static str,
     },
-    /// The number is none it can have.
+    /// It cannot have this number.
     #[error("{what} cannot be {}: it is from {low} to {high}", crate::emulator::words::number(*value))]
     Value {
         /// What was to be turned.

@@ -141,7 +141,7 @@ enum Program {
     Application(Box<Firmware>),
 }
 
-/// Why the unit starts anew.
+/// Why the unit restarts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reset {
     /// The usual way: power, restored defaults, a finished load.
@@ -245,7 +245,7 @@ impl Unit {
     /// Turns a knob at the unit's terminals; the unit notices at its next reading.
     ///
     /// # Errors
-    /// If this unit has no such thing, or the number is none it can have.
+    /// If this unit has no such thing, or cannot have this number.
     pub fn turn(&mut self, now: Instant, knob: Knob) -> Result<(), KnobError> {
         self.run_until(now);
         self.sensors.turn(knob)
@@ -296,7 +296,8 @@ impl Unit {
     ///
     /// # Errors
     /// If the unit does not answer, or refuses.
-    pub fn read_object(&self, at: ObjectAddress) -> Result<Value, Refusal> {
+    pub fn read_object(&mut self, now: Instant, at: ObjectAddress) -> Result<Value, Refusal> {
+        self.run_until(now);
         self.application().ok_or(Refusal::NoAnswer)?.read_object(at)
     }
 
@@ -349,7 +350,7 @@ impl Unit {
         }
     }
 
-    /// Starts anew if the program has asked for it. The last text leaves first: the programs print it before they let go.
+    /// Restarts if the program has asked for it. The last text leaves first: the programs print it before they let go.
     fn reset_if_asked(&mut self, now: Instant) {
         if let Power::On { program, reset } = &mut self.power
             && self.uart.backlog() == 0
@@ -363,7 +364,7 @@ impl Unit {
     /// The boot ROM's decision.
     fn start_program(&mut self, now: Instant, cause: Reset) {
         let identity = Identity::verify(self.flash.bytes()).ok();
-        let own = identity.filter(|identity| identity.product == self.product.name);
+        let own = identity.filter(|identity| identity.is_for(&self.product.name));
         let startable = own.filter(|_| self.parameters.values().start_delay == StartDelay::AtOnce);
         let may_leave = startable.is_some();
         let may_start = match cause {

@@ -27,9 +27,9 @@ pub enum NmtCommand {
     Stop,
     /// Become pre-operational.
     PreOperational,
-    /// Start the application anew.
+    /// Restart the application.
     ResetNode,
-    /// Start the communication anew, with its stored parameters.
+    /// Restart the communication, with its stored parameters.
     ResetCommunication,
 }
 

@@ -93,7 +93,7 @@ impl Sensors {
     /// Turns a knob; the unit notices at its next reading.
     ///
     /// # Errors
-    /// If this unit has no such thing, or the number is none it can have.
+    /// If this unit has no such thing, or cannot have this number.
     pub fn turn(&mut self, knob: Knob) -> Result<(), KnobError> {
         use SensorKind::{Rtd, Thermocouple};
         match knob {
@@ -174,7 +174,7 @@ impl Sensors {
     /// open. The thermocouple is of the type the channel is set to. Channels count from 1.
     pub fn thermocouple(&self, now: Instant, channel: u8, thermocouple: Thermocouple) -> Option<f64> {
         let input = &self.inputs[usize::from(channel) - 1];
-        // A short bridges whatever is broken behind it, as at an RTD.
+        // A short bridges whatever is broken beyond it, as at an RTD.
         if input.shorted {
             return Some(0.0);
         }
@@ -210,7 +210,7 @@ impl Sensors {
         let main = match wiring {
             _ if open => None,
             Wiring::Two | Wiring::Three => Some(ampere * (ohm + 2.0 * lead)),
-            // Without current there is no voltage at B, and without a wire none either (section 1.1).
+            // Without current there is no voltage at B, nor without a wire (section 1.1).
             Wiring::Four if a || b => Some(0.0),
             Wiring::Four => Some(ampere * (ohm + lead)),
         };

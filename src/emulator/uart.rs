@@ -63,7 +63,7 @@ impl Uart {
         }
     }
 
-    /// Queues bytes behind those already waiting.
+    /// Queues bytes after those already waiting.
     pub fn send(&mut self, now: Instant, bytes: &[u8]) {
         if self.waiting.is_empty() {
             self.begin = self.begin.max(now);
@@ -138,7 +138,7 @@ impl Uart {
         self.end_of(self.waiting.len())
     }
 
-    /// Reckons the next release anew. It ends behind a flow-control character, whose moment matters to the reader.
+    /// Works out the next release again. It ends after a flow-control character, whose moment matters to the reader.
     fn plan(&mut self) {
         let characters = match self.hold {
             Hold::Held { last_character } => usize::from(last_character),

@@ -30,7 +30,7 @@ pub const LONGEST_OFF_S: f64 = 86_400.0;
 pub struct Words<'a> {
     words: Vec<(usize, &'a str)>,
     next: usize,
-    /// Column behind the last word.
+    /// The column after the last word.
     end: usize,
 }
 
@@ -83,7 +83,7 @@ impl<'a> Words<'a> {
     /// A finite number.
     ///
     /// # Errors
-    /// If the next word is none; `what` it should have been.
+    /// If the next word is not a number; `what` says what it should have been.
     pub fn number(&mut self, what: &str) -> Result<f64, WordError> {
         let (column, word) = self.require(what, "a number")?;
         word.parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(|| WordError {
@@ -95,7 +95,7 @@ impl<'a> Words<'a> {
     /// A whole number of these, decimal or, with 0x before it, hexadecimal; `what` it is.
     ///
     /// # Errors
-    /// If the next word is none of them.
+    /// If the next word is not one of them.
     pub fn whole(&mut self, what: &str, range: std::ops::RangeInclusive<u64>) -> Result<u64, WordError> {
         let allowed = format!("{} to {}", range.start(), range.end());
         let (column, word) = self.require(what, &allowed)?;
@@ -112,7 +112,7 @@ impl<'a> Words<'a> {
     /// A time of up to `longest` seconds.
     ///
     /// # Errors
-    /// If the next word is none.
+    /// If the next word is not a time.
     pub fn seconds(&mut self, longest: f64) -> Result<Duration, WordError> {
         let (column, word) = self.words.get(self.next).copied().unwrap_or((self.end, ""));
         let seconds = self.number("a time in seconds")?;
@@ -137,7 +137,7 @@ impl<'a> Words<'a> {
     }
 }
 
-/// A word that is none of those there are.
+/// A word that is not one of those there are.
 pub fn unknown(column: usize, word: &str, allowed: &str) -> WordError {
     WordError { column, message: format!("'{}' is not known; there is: {allowed}", shown(word)) }
 }

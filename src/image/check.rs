@@ -191,9 +191,10 @@ mod tests {
             let report = report(file.as_bytes());
             report.defects.into_iter().find(|defect| defect.id == id).map(|defect| defect.message)
         };
-        let behind = |rest: &str| said(format!("{HEAD}S307000000001122C5{rest}\n{end}"), DefectId::TrailingCharacters);
-        assert_eq!(behind("X").as_deref(), Some("1 character follows the checksum"));
-        assert_eq!(behind("XY").as_deref(), Some("2 characters follow the checksum"));
+        let trailing =
+            |rest: &str| said(format!("{HEAD}S307000000001122C5{rest}\n{end}"), DefectId::TrailingCharacters);
+        assert_eq!(trailing("X").as_deref(), Some("1 character follows the checksum"));
+        assert_eq!(trailing("XY").as_deref(), Some("2 characters follow the checksum"));
         let odd = said(format!("{HEAD}{one}S3060000000133C5\n{end}"), DefectId::OddLength);
         assert_eq!(odd.as_deref(), Some("1 data byte: the last word has no high byte"));
         let short = said(format!("{HEAD}{one}S3\n{end}"), DefectId::ShortRecord);
@@ -216,8 +217,8 @@ mod tests {
             String::from_utf8(Record { kind: Kind::Data32, address, data }.to_text()).expect("digits") + "\n"
         };
         let inside = record(0, &[1, 2]);
-        let (outside, behind) = (record(0x1_8000, &[1, 2]), record(0x1_8001, &[3, 4]));
-        let report = report(format!("{HEAD}{inside}{outside}{behind}S70500000000FA\n").as_bytes());
+        let (outside, next) = (record(0x1_8000, &[1, 2]), record(0x1_8001, &[3, 4]));
+        let report = report(format!("{HEAD}{inside}{outside}{next}S70500000000FA\n").as_bytes());
         let complaints: Vec<_> = report.defects.iter().filter(|defect| defect.id == DefectId::OutOfRange).collect();
         let [one] = complaints.as_slice() else { panic!("{:?}", found(&report)) };
         assert_eq!((one.line, one.column), (3, 5));
@@ -282,7 +283,7 @@ mod tests {
             (format!("{one}S9030000FC\n{start}{end}"), &[("not-a-record", 3, 1)]),
             (format!("{one}{one}{start}{end}"), &[sound, ("descending", 3, 4), ("overlap", 3, 4), ("overlap", 4, 4)]),
             (
-                // The base of the data behind it is not known, so nothing is said of its place.
+                // The base of the data after it is not known, so nothing is said about its place.
                 format!("{one}:02000004000GF9\n{one}{start}{end}"),
                 &[("bad-character", 3, 13)],
             ),

@@ -4,6 +4,8 @@
 //! addresses (00, 01, 04, 05). Records keep their order, so that what is written twice ends as it did. The whole file
 //! is made in memory: an image has 512 KByte at most.
 
+use std::collections::BTreeMap;
+
 use ::ihex::Record as HexRecord;
 
 use super::report::Format;
@@ -26,11 +28,11 @@ pub struct Shape {
 /// Why an image cannot be written in this shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConvertError {
-    /// Counted in bytes, it needs more than 32 bits.
-    #[error("word 0x{address:08X} lies behind the last byte address a file can name")]
+    /// An address of the new file needs more than 32 bits.
+    #[error("address 0x{address:X} in the new file would need more than 32 bits")]
     TooHigh {
-        /// The word's address.
-        address: u32,
+        /// The address, in the new unit.
+        address: u64,
     },
     /// Counted in words, it lies between two.
     #[error("byte address 0x{address:08X} is in the middle of a word")]
@@ -90,7 +92,8 @@ fn address_in(byte_address: u64, unit: AddressUnit) -> Result<u32, ConvertError>
     if !byte_address.is_multiple_of(bytes) {
         return Err(ConvertError::Odd { address: byte_address });
     }
-    u32::try_from(byte_address / bytes).map_err(|_| ConvertError::TooHigh { address: (byte_address / 2) as u32 })
+    let address = byte_address / bytes;
+    u32::try_from(address).map_err(|_| ConvertError::TooHigh { address })
 }
 
 /// The data in records of another size or unit. What follows on each other is joined first.
@@ -105,16 +108,31 @@ fn regrouped(image: &Image, unit: AddressUnit, record_bytes: Option<u8>) -> Resu
             _ => runs.push((start, block.data.clone())),
         }
     }
+    if unit == AddressUnit::Word {
+        complete_words(&mut runs);
+    }
     let mut blocks = Vec::new();
     for (start, data) in runs {
         for (number, data) in data.chunks(size).enumerate() {
-            let mut data = data.to_vec();
-            // The missing half of a last word reads as erased flash does.
-            data.resize(data.len().next_multiple_of(unit.bytes() as usize), 0xFF);
-            blocks.push(Block { address: address_in(start + (number * size) as u64, unit)?, data });
+            blocks.push(Block { address: address_in(start + (number * size) as u64, unit)?, data: data.to_vec() });
         }
     }
     Ok(blocks)
+}
+
+/// Gives every run that ends in the middle of a word the other half: as an earlier run left it, else as erased flash reads.
+fn complete_words(runs: &mut [(u64, Vec<u8>)]) {
+    let ends_within_a_word = |start: u64, data: &[u8]| (start + data.len() as u64) % 2 == 1;
+    if !runs.iter().any(|(start, data)| ends_within_a_word(*start, data)) {
+        return;
+    }
+    let mut high_bytes: BTreeMap<u64, u8> = BTreeMap::new();
+    for (start, data) in runs {
+        if ends_within_a_word(*start, data) {
+            data.push(high_bytes.get(&(*start + data.len() as u64)).copied().unwrap_or(0xFF));
+        }
+        high_bytes.extend((*start..).zip(data.iter().copied()).filter(|(address, _)| address % 2 == 1));
+    }
 }
 
 /// A file in the making.
@@ -245,10 +263,21 @@ mod tests {
     }
 
     #[test]
+    fn half_a_word_that_is_written_again_keeps_the_other_half() {
+        let twice = image(AddressUnit::Byte, 0, &[(2, &[0xAA, 0xBB]), (0, &[0xCC, 0xDD, 0xEE]), (8, &[1])]);
+        let blocks = regrouped(&twice, AddressUnit::Word, None).expect("even addresses");
+        let expected = [(1, vec![0xAA, 0xBB]), (0, vec![0xCC, 0xDD, 0xEE, 0xBB]), (4, vec![1, 0xFF])];
+        assert_eq!(blocks, expected.map(|(address, data)| Block { address, data }));
+        let thrice = image(AddressUnit::Byte, 0, &[(0, &[1, 2]), (0, &[3]), (0, &[4, 5]), (0, &[6])]);
+        let blocks = regrouped(&thrice, AddressUnit::Word, None).expect("even addresses");
+        assert_eq!(blocks.last(), Some(&Block { address: 0, data: vec![6, 5] }));
+    }
+
+    #[test]
     fn what_has_no_address_in_the_unit_is_refused() {
         let high = image(AddressUnit::Word, 0, &[(0x8000_0000, &[1, 2])]);
         let to_bytes = shape(Format::SRecord, AddressUnit::Byte);
-        assert_eq!(convert(&high, &to_bytes), Err(ConvertError::TooHigh { address: 0x8000_0000 }));
+        assert_eq!(convert(&high, &to_bytes), Err(ConvertError::TooHigh { address: 0x1_0000_0000 }));
         let to_words = shape(Format::SRecord, AddressUnit::Word);
         let odd = image(AddressUnit::Byte, 0, &[(3, &[1, 2])]);
         assert_eq!(convert(&odd, &to_words), Err(ConvertError::Odd { address: 3 }));

@@ -33,7 +33,7 @@ pub enum DefectId {
     NotSRecord,
     /// More data than any unit's flash holds.
     TooLarge,
-    /// A UTF-8 byte order mark in front.
+    /// A UTF-8 byte order mark at the start.
     ByteOrderMark,
     /// A line longer than any record.
     LongLine,
@@ -41,15 +41,15 @@ pub enum DefectId {
     NotARecord,
     /// A record type that does not exist.
     UnknownType,
-    /// A character that is no hexadecimal digit.
+    /// A character that is not a hexadecimal digit.
     BadCharacter,
     /// The line ends before the record does.
     ShortRecord,
     /// A length that is impossible for the type.
     BadLength,
-    /// The check sum is not the record's.
+    /// The checksum is not the record's.
     BadChecksum,
-    /// The line goes on behind the check sum.
+    /// The line goes on after the checksum.
     TrailingCharacters,
     /// The line ends with blanks.
     TrailingBlanks,
@@ -67,7 +67,7 @@ pub enum DefectId {
     NoLineEnd,
     /// No S0 at all.
     MissingHeader,
-    /// Data in front of S0.
+    /// Data before S0.
     DataBeforeHeader,
     /// A second S0.
     DuplicateHeader,
@@ -75,7 +75,7 @@ pub enum DefectId {
     HeaderForm,
     /// No S7: the file is cut off.
     MissingTerminator,
-    /// Lines behind S7.
+    /// Lines after S7.
     AfterTerminator,
     /// A record count, which is not sent.
     CountRecord,

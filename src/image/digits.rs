@@ -5,12 +5,12 @@ pub(super) const fn digit(character: u8) -> u8 {
     VALUES[character as usize]
 }
 
-/// The byte two digits stand for, whatever their marks.
+/// The byte that two digits spell, whatever their marks.
 pub(super) const fn byte(high: u8, low: u8) -> u8 {
     (high << 4) | (low & VALUE)
 }
 
-/// Where in a text, from 0, the first character stands that is no digit.
+/// Where in a text, from 0, the first character is that is not a digit.
 #[cold]
 pub(super) fn first_bad(text: &[u8]) -> Option<(usize, u8)> {
     text.iter().copied().enumerate().find(|&(_, character)| digit(character) & INVALID != 0)
@@ -27,7 +27,7 @@ const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
 const VALUE: u8 = 0x0F;
 /// Marks a lower-case digit.
 pub(super) const LOWER: u8 = 0x10;
-/// Marks what is no digit.
+/// Marks what is not a digit.
 pub(super) const INVALID: u8 = 0x80;
 
 const VALUES: [u8; 256] = {

@@ -1,6 +1,6 @@
 //! Whether a sound image is right for the unit it is about to be sent to.
 //!
-//! A file is checked before anybody knows the unit: for the product it names, or for whatever it may be. The unit's own
+//! A file is checked before anybody knows the unit: for the product it names, or for any. The unit's own
 //! flash, its loader, and the software that runs in it now are known later, and decide.
 
 use super::defect::DefectId;
@@ -18,7 +18,7 @@ pub struct Misfit {
     pub message: String,
 }
 
-/// The unit's software, as far as anybody knows it.
+/// The unit's software, as far as it is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Software {
     /// It runs now.
@@ -29,7 +29,7 @@ pub enum Software {
 
 impl CheckedImage {
     /// What speaks against sending this image to such a unit, whose software is this if that is known. Each kind of
-    /// misfit once; those that were allowed when the file was checked are none.
+    /// misfit once; those that were allowed when the file was checked do not count.
     pub fn misfits(&self, unit: &Target, software: Option<Software>) -> Vec<Misfit> {
         let mut misfits: Vec<Misfit> = Vec::new();
         let mut note = |id: DefectId, message: &dyn Fn() -> String| {
@@ -40,7 +40,7 @@ impl CheckedImage {
         let product = &unit.product;
         if let Some(identity) = self.identity() {
             let is_known_stranger = self.overridden().contains(&DefectId::UnknownProduct);
-            if !identity.product.eq_ignore_ascii_case(product) && !is_known_stranger {
+            if !identity.is_for(product) && !is_known_stranger {
                 note(DefectId::WrongProduct, &|| {
                     format!("the image is for {}, the unit is an {product}", identity.product)
                 });
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::image::{FlashMap, check, make};
 
-    /// A unit with so much flash and its boot flash behind it.
+    /// A unit with this much flash, followed by its boot flash.
     fn unit(product: &str, program_words: u32, outside: Outside) -> Target {
         let start = u64::from(program_words) * 2;
         Target {
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_fits_its_own_product_and_no_smaller_flash() {
+    fn an_image_fits_its_own_product_and_not_a_smaller_flash() {
         assert_eq!(image(&small(), 600, &[]).misfits(&small(), None), []);
         assert_eq!(ids(&image(&small(), 600, &[]).misfits(&large(), None)), ["wrong-product"]);
         let large_one = image(&large(), 0x1_2000, OTHER);
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_that_the_check_sum_covers_wants_a_loader_that_erases_it() {
+    fn a_gap_that_the_checksum_covers_wants_a_loader_that_erases_it() {
         let file = |flaw| {
             let recipe = make::Recipe { target: &small(), version: Version::new(1, 2, 0), words: 600, flaw };
             let file = make::make(&recipe).expect("an image");
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_anywhere_in_the_program_counts_and_none_behind_it() {
+    fn a_gap_anywhere_in_the_program_counts_and_none_after_it() {
         let recipe = make::Recipe { target: &small(), version: Version::new(1, 2, 0), words: 600, flaw: None };
         let file = String::from_utf8(make::make(&recipe).expect("an image")).expect("text");
         let lines: Vec<&str> = file.split_inclusive('\n').collect();
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn older_software_than_what_runs_is_told() {
+    fn software_older_than_what_runs_is_reported() {
         let image = image(&small(), 600, &[]);
         for (major, minor, patch, expected) in
             [(1, 1, 9, &[][..]), (1, 2, 0, &[]), (1, 2, 1, &["downgrade"]), (2, 0, 0, &["downgrade"])]

@@ -1,12 +1,12 @@
 //! The identity block: what a program image says about itself.
 //!
-//! The emulated application *is* what lies in flash, so product, version and a check sum have to lie there too. The
+//! The emulated application *is* what lies in flash, so product, version and a checksum have to be there too. The
 //! block is our own convention (`docs/images.md` has the table); nothing is known about one in the real units, so
 //! the console treats a file without it as "says nothing", not as wrong by itself.
 
 use crate::version::Version;
 
-/// Program word at which the block starts (byte offset 100h in flash, behind the interrupt vectors).
+/// Program word at which the block starts (byte offset 100h in flash, after the interrupt vectors).
 pub const WORD_ADDRESS: u32 = 0x80;
 /// Bytes the block takes.
 pub const LENGTH: usize = 64;
@@ -64,6 +64,11 @@ impl Identity {
         let identity = Self::read(program)?;
         let computed = identity.crc_of(program);
         if computed == identity.crc { Ok(identity) } else { Err(IdentityError::Crc { stored: identity.crc, computed }) }
+    }
+
+    /// Whether the program is for this product. Names are compared in any case of their letters.
+    pub fn is_for(&self, product: &str) -> bool {
+        self.product.eq_ignore_ascii_case(product)
     }
 
     /// Reads the block without checking the CRC.
@@ -160,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_stamped_is_read_whatever_lies_behind_the_program() {
+    fn what_is_stamped_is_read_whatever_follows_the_program() {
         let (identity, mut program) = stamped(512);
         assert_eq!(Identity::verify(&program), Ok(identity.clone()));
         program.resize(131_072, 0xFF);

@@ -1,6 +1,6 @@
 //! One line of Intel HEX text, read and written.
 //!
-//! `:`, a length byte (of the data alone), a two-byte offset, a type, data, and a check sum: all bytes add up to 0
+//! `:`, a length byte (of the data alone), a two-byte offset, a type, data, and a checksum: all bytes add up to 0
 //! modulo 256. Six types: data, the end, two ways to say where the 64 K of the offsets lie, and two to name the entry
 //! point. Whole-file rules are `ihex_file`'s. Lines are read here, since a file may hold anything and a defect
 //! needs its column; they are written by the crate `ihex`.
@@ -84,7 +84,7 @@ impl Record<'_> {
 pub struct Line<'a> {
     /// What it says.
     pub record: Record<'a>,
-    /// The check sums stored and computed, if they differ.
+    /// The checksums stored and computed, if they differ.
     pub wrong_checksum: Option<(u8, u8)>,
     /// Characters the record takes; whatever follows on the line is not part of it.
     pub characters: usize,
@@ -143,7 +143,7 @@ pub type Room = [u8; 260];
 /// Reads one line, without its line end. Whatever follows the record is left to the caller.
 ///
 /// # Errors
-/// If the line is not a record. A wrong check sum is not an error here: the record can still be shown.
+/// If the line is not a record. A wrong checksum is not an error here: the record can still be shown.
 pub fn parse<'a>(line: &[u8], room: &'a mut Room) -> Result<Line<'a>, LineError> {
     let (&first, body) = line.split_first().ok_or(LineError::NotARecord(b' '))?;
     if first != b':' {
@@ -185,7 +185,7 @@ pub fn parse<'a>(line: &[u8], room: &'a mut Room) -> Result<Line<'a>, LineError>
     })
 }
 
-/// The first character that is no digit, among those of the first `bytes`; the length's are always looked at.
+/// The first character that is not a digit, among those of the first `bytes`; the length's are always looked at.
 #[cold]
 fn bad_character(body: &[u8], bytes: usize) -> Option<LineError> {
     let end = body.len().min(bytes.max(1) * 2);
@@ -193,7 +193,7 @@ fn bad_character(body: &[u8], bytes: usize) -> Option<LineError> {
     Some(LineError::Character { column: at + 2, found })
 }
 
-/// Bytes of a record without data: length, offset, type, check sum.
+/// Bytes of a record without data: length, offset, type, checksum.
 const FEWEST_BYTES: usize = 5;
 /// Which byte is the type.
 const TYPE_BYTE: usize = 3;

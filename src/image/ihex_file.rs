@@ -1,7 +1,7 @@
 //! What the lines of an Intel HEX file mean: data, where its offsets lie, the entry point, the end.
 //!
 //! There is no header, and an entry point need not be given. Addresses are offsets to a base; readers disagree whether
-//! data that runs past offset FFFFh begins again at the base or goes on behind it, so such a file is refused.
+//! data that runs past offset FFFFh starts again at the base or goes on after it, so such a file is refused.
 
 use super::defect::{DefectId, MOST_LISTED};
 use super::ihex::{self, DATA_COLUMN, Kind, LENGTH_COLUMN, LineError, OFFSET_COLUMN, Record, Room};
@@ -11,7 +11,7 @@ use super::{AddressUnit, srecord};
 
 /// An Intel HEX file as far as it has been read.
 pub(super) struct IntelHexFile {
-    /// What is added to offsets; unknown behind a record that should have said it and cannot be read.
+    /// What is added to offsets; unknown after a record that should have said it and cannot be read.
     base: Option<u32>,
     /// Line of the entry point.
     start: Option<u64>,
@@ -150,7 +150,7 @@ impl IntelHexFile {
 
 fn note_wrap(scan: &mut Scan, line: u64) {
     scan.findings.note(DefectId::SegmentWrap, line, OFFSET_COLUMN, || {
-        "the data runs past offset 0xFFFF; some readers begin again at the base, others go on behind it".into()
+        "the data runs past offset 0xFFFF; some readers start again at the base, others go on after it".into()
     });
 }
 

@@ -128,7 +128,7 @@ impl<R: Read> Lines<R> {
         }
     }
 
-    /// Hands out `length` bytes and moves behind their line end.
+    /// Hands out `length` bytes and moves past their line end.
     fn take(&mut self, length: usize, end: LineEnd) -> RawLine<'_> {
         let start = self.from;
         self.from += length + end.characters();
@@ -170,7 +170,7 @@ impl<R: Read> Lines<R> {
         Ok(RawLine { text: &self.buffer[..LONGEST], cut: true, end })
     }
 
-    /// Moves what is left to `to_offset` and fills the buffer behind it, completely unless the file ends: what a
+    /// Moves what is left to `to_offset` and fills the buffer after it, completely unless the file ends: what a
     /// report says must not depend on the pieces a reader gives.
     fn refill(&mut self, to_offset: usize) -> io::Result<()> {
         self.buffer.copy_within(self.from..self.to, to_offset);

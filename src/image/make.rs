@@ -1,7 +1,7 @@
 //! Sample images in the form CodeWarrior gives them, sound ones and ones with a single defect.
 //!
 //! The same product, version and size give the same bytes for ever: the repository holds such files, and a test makes
-//! them anew. The "program" is drawn from a generator and does nothing; only its identity block means something, to
+//! them again. The "program" is drawn from a generator and does nothing; only its identity block means something, to
 //! the emulated unit and to the console.
 
 use crate::rng::Rng;
@@ -28,7 +28,7 @@ pub struct Recipe<'a> {
 /// Why an image cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MakeError {
-    /// There is no room for vectors, identity block and a few instructions, or for a flaw behind them.
+    /// There is no room for vectors, identity block and a few instructions, or for a flaw after them.
     #[error("an image needs {FEWEST_WORDS} words at least, not {words}")]
     TooSmall {
         /// What was asked for.
@@ -49,7 +49,7 @@ pub enum MakeError {
     NoSuchFlaw(DefectId),
 }
 
-/// The smallest image: vectors, identity block, and enough behind them to put a flaw into.
+/// The smallest image: vectors, identity block, and enough after them for a flaw.
 pub const FEWEST_WORDS: u32 = 320;
 
 /// The defects [`make`] can put into a file. The others need a file of more than 512 KByte, depend on what is
@@ -270,7 +270,7 @@ impl Draft {
                 self.lines.insert(damaged, record);
             }
             DefectId::OutOfRange => {
-                // Some boot flash follows right behind; that would be another defect.
+                // Some boot flash follows directly; that would be another defect.
                 let end = recipe.target.flash.end();
                 let boot = recipe.target.boot.filter(|boot| (boot.start..boot.end).contains(&end));
                 self.insert(last, data32(boot.map_or(end, |boot| boot.end) as u32, &[0x12, 0x34]));
@@ -318,9 +318,9 @@ impl Draft {
 const HEADER: &[u8] = b"PROGRAM&DATA";
 /// Data bytes of a record.
 const STEP: usize = 32;
-/// Number of the data record that carries a flaw: behind the identity block, in the middle of the code.
+/// Number of the data record that carries a flaw: after the identity block, in the middle of the code.
 const DAMAGED: usize = 13;
-/// Word at which the program starts, right behind the identity block.
+/// Word at which the program starts, directly after the identity block.
 const ENTRY: u32 = identity::WORD_ADDRESS + identity::LENGTH as u32 / 2;
 /// First word of a vector.
 const JUMP: u16 = 0xE254;

@@ -2,7 +2,7 @@
 //!
 //! [`check()`] reads a file of any size once and gives a [`Report`] with every defect in it; only a report without an
 //! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] and [`ihex`] know
-//! one line, [`make`] builds sample files. This module does not know the products: whoever asks passes them as [`Target`]s.
+//! one line, [`make`] builds sample files. This module does not know the products: the caller passes them as [`Target`]s.
 
 mod check;
 mod content;
@@ -63,7 +63,7 @@ impl AddressUnit {
         }
     }
 
-    /// Addresses that so many bytes take; half a word takes a whole one.
+    /// Addresses that this many bytes take; half a word takes a whole one.
     pub const fn addresses(self, bytes: usize) -> u64 {
         (bytes as u64).div_ceil(self.bytes() as u64)
     }
@@ -82,7 +82,7 @@ pub struct FlashMap {
 }
 
 impl FlashMap {
-    /// The first address behind the program flash, in the map's unit.
+    /// The first address after the program flash, in the map's unit.
     pub fn end(&self) -> u64 {
         self.address_unit.addresses(self.program_words as usize * 2)
     }
@@ -95,7 +95,7 @@ pub struct Target {
     pub product: String,
     /// Its program flash.
     pub flash: FlashMap,
-    /// How its upload files are named, `{version}` standing for the version.
+    /// How its upload files are named, with `{version}` for the version.
     pub file_name: String,
     /// Its boot flash, in the flash map's unit: the loader lives there and cannot replace itself.
     pub boot: Option<AddressRange>,
@@ -106,14 +106,49 @@ pub struct Target {
 /// What a loader does with data outside of the program flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Outside {
-    /// Addresses of a larger part of the family (below 00200000h) are folded onto the program flash, those whose upper
-    /// half is 0020h go to data memory, others are skipped: all that without a word, and success is reported.
+    /// Addresses of a larger part of the family (below 00200000h) are folded onto the program flash, those marked as data
+    /// memory go there ([`Destination`]), others are skipped: all that silently, and success is reported.
     Folds,
     /// It stops with an error, when the old program is erased already.
     Refuses,
     /// Nobody knows which loader it is.
     Unknown,
 }
+
+/// Where a loader that [folds](Outside::Folds) puts a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Destination {
+    /// Into program flash, at the address modulo its size.
+    Program,
+    /// Into data memory.
+    Data,
+    /// Nowhere.
+    Skipped,
+}
+
+impl Destination {
+    /// Where a word of this address goes.
+    pub const fn of(address: u64) -> Self {
+        let high_half = address >> 16;
+        if is_marked_as_data(address) || high_half == DATA_HIGH_HALF {
+            Destination::Data
+        } else if high_half < DATA_HIGH_HALF {
+            Destination::Program
+        } else {
+            Destination::Skipped
+        }
+    }
+}
+
+/// Whether an address carries the linker's mark for data memory, whatever other bits it has.
+const fn is_marked_as_data(address: u64) -> bool {
+    address & DATA_MARK != 0
+}
+
+/// CodeWarrior's mark for data memory in an address.
+const DATA_MARK: u64 = 0x0200_0000;
+/// The upper half of the addresses that loaders which fold take for data memory.
+const DATA_HIGH_HALF: u64 = 0x0020;
 
 impl Target {
     /// The version a file name claims to hold, if the name is one of this product's.

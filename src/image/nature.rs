@@ -5,9 +5,9 @@ use super::lines;
 /// What a file is.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Nature {
-    /// S-records, behind a byte order mark of this length.
+    /// S-records, after a byte order mark of this length.
     SRecord { mark: usize },
-    /// Intel HEX, behind a byte order mark of this length.
+    /// Intel HEX, after a byte order mark of this length.
     IntelHex { mark: usize },
     /// Nothing, or nothing but blanks.
     Empty,

@@ -163,7 +163,7 @@ impl Format {
 pub struct AddressRange {
     /// First address.
     pub start: u64,
-    /// The address behind the last.
+    /// The address after the last.
     pub end: u64,
 }
 

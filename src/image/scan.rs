@@ -20,7 +20,7 @@ pub(super) trait Grammar {
     /// It, empty.
     const ROOM: Self::Room;
 
-    /// Reads a line that is not blank, not too long and not behind the terminator.
+    /// Reads a line that is not blank, not too long and not after the terminator.
     fn line(&mut self, scan: &mut Scan, text: &[u8], room: &mut Self::Room);
 
     /// Believes of a line nothing can be made of what it was meant to be, so that a damaged header is not reported as
@@ -83,7 +83,7 @@ pub(super) enum Terminator {
     Lost,
 }
 
-/// Where the reading stands.
+/// How far the reading has come.
 pub(super) struct Scan {
     pub(super) findings: Findings,
     pub(super) facts: Facts,
@@ -102,7 +102,7 @@ pub(super) struct Scan {
     last_end: Option<LineEnd>,
     mixed: Option<(u64, LineEnd)>,
     blank: Repeated,
-    blanks_behind: Repeated,
+    trailing_blanks: Repeated,
 }
 
 impl Scan {
@@ -122,7 +122,7 @@ impl Scan {
             last_end: None,
             mixed: None,
             blank: Repeated::default(),
-            blanks_behind: Repeated::default(),
+            trailing_blanks: Repeated::default(),
         }
     }
 
@@ -154,11 +154,11 @@ impl Scan {
         });
     }
 
-    /// Looks at what follows a record of so many characters on its line.
+    /// Looks at what follows a record of this many characters on its line.
     pub(super) fn rest_of_line(&mut self, text: &[u8], characters: usize) {
         let Some(rest) = text.get(characters..).filter(|rest| !rest.is_empty()) else { return };
         if rest.trim_ascii().is_empty() {
-            self.blanks_behind.seen(self.line, characters + 1);
+            self.trailing_blanks.seen(self.line, characters + 1);
         } else {
             self.findings.note(DefectId::TrailingCharacters, self.line, characters + 1, || {
                 let follow = if rest.len() == 1 { "follows" } else { "follow" };
@@ -246,8 +246,8 @@ impl Scan {
     fn note_repeated(&mut self) {
         let findings = &mut self.findings;
         self.blank.note(findings, DefectId::BlankLine, "nothing but blanks");
-        self.blanks_behind.note(findings, DefectId::TrailingBlanks, "blanks behind the record");
-        self.after.note(findings, DefectId::AfterTerminator, "something behind the terminator");
+        self.trailing_blanks.note(findings, DefectId::TrailingBlanks, "blanks after the record");
+        self.after.note(findings, DefectId::AfterTerminator, "something after the terminator");
         if let (Some((line, end)), Some(first)) = (self.mixed, self.facts.line_end) {
             findings.note(DefectId::MixedLineEnds, line, 1, || {
                 format!("this line ends with {}, those before with {}", end.name(), first.name())

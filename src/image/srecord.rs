@@ -1,7 +1,7 @@
 //! One line of S-record text, in both directions.
 //!
 //! `S`, a type digit, a length byte (what follows it, in bytes), an address of two to four bytes, data, and a check
-//! sum: all bytes from the length on, the check sum included, add up to FFh modulo 256. Whole-file rules are
+//! sum: all bytes from the length on, the checksum included, add up to FFh modulo 256. Whole-file rules are
 //! [`super::check()`]'s. The decoder works on bytes and into the caller's room, because a file of any size passes
 //! through it and may hold anything at all.
 
@@ -63,7 +63,7 @@ impl Kind {
         })
     }
 
-    /// The digit behind the `S`.
+    /// The digit after the `S`.
     pub const fn digit(self) -> u8 {
         match self {
             Kind::Header => b'0',
@@ -120,7 +120,7 @@ pub struct Record<'a> {
 pub struct Line<'a> {
     /// What it says.
     pub record: Record<'a>,
-    /// The check sum, if it is not the record's.
+    /// The checksum, if it is not the record's.
     pub wrong_checksum: Option<WrongChecksum>,
     /// Whether a letter in it is lower case.
     pub lower_case: bool,
@@ -128,7 +128,7 @@ pub struct Line<'a> {
     pub characters: usize,
 }
 
-/// A check sum that does not belong to its record.
+/// A checksum that does not belong to its record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WrongChecksum {
     /// What the line says.
@@ -169,7 +169,7 @@ pub enum LineError {
         kind: Kind,
         /// Bytes the length announces.
         says: usize,
-        /// Bytes for address and check sum.
+        /// Bytes for address and checksum.
         needs: usize,
     },
 }
@@ -186,13 +186,13 @@ impl LineError {
     }
 }
 
-/// Room for the bytes of one record, from the address to the check sum.
+/// Room for the bytes of one record, from the address to the checksum.
 pub type Room = [u8; 255];
 
 /// Reads one line, without its line end. Whatever follows the record is left to the caller.
 ///
 /// # Errors
-/// If the line is not a record. A wrong check sum is not an error here: the record can still be shown.
+/// If the line is not a record. A wrong checksum is not an error here: the record can still be shown.
 pub fn parse<'a>(line: &[u8], room: &'a mut Room) -> Result<Line<'a>, LineError> {
     let (&first, rest) = line.split_first().ok_or(LineError::NotARecord(b' '))?;
     if !first.eq_ignore_ascii_case(&b'S') {
@@ -321,7 +321,7 @@ impl fmt::Display for Bare {
     }
 }
 
-/// The first character that is no digit, among those the record takes; called only when there is one.
+/// The first character that is not a digit, among those the record takes; called only when there is one.
 #[cold]
 fn first_bad_character(line: &[u8], says: usize) -> LineError {
     let end = line.len().min(4 + says * 2);

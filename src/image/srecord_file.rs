@@ -8,7 +8,7 @@ use super::srecord::{self, Kind, LineError, Record, Room};
 /// An S-record file as far as it has been read.
 pub(super) struct SRecordFile {
     header_seen: bool,
-    /// First data in front of a header.
+    /// First data before a header.
     early_data: Option<u64>,
     /// Lines that begin as data records, readable or not: what a count record counts.
     data_lines: u64,
@@ -101,7 +101,7 @@ impl SRecordFile {
         }
     }
 
-    /// A record of a type that loaders stop at: as a rule every line is of one, so each type is told once.
+    /// A record of a type that loaders stop at: as a rule every line is of one, so each type is reported once.
     fn refused(&mut self, scan: &Scan, kind: Kind, instead: &'static str) {
         let known = self.refused.iter_mut().find(|(known, ..)| *known == kind);
         match known {
@@ -117,7 +117,7 @@ impl SRecordFile {
     fn header(&mut self, scan: &mut Scan, record: &Record<'_>) {
         if self.header_seen {
             scan.findings.note(DefectId::DuplicateHeader, scan.line, 1, || {
-                "a second header: it would start the download anew".into()
+                "a second header: it would restart the download".into()
             });
             return;
         }
@@ -166,7 +166,7 @@ impl SRecordFile {
         scan.findings.note(DefectId::CountRecord, scan.line, 1, || format!("an {kind} record; not sent"));
         if says != counted {
             scan.findings.note(DefectId::WrongCount, scan.line, ADDRESS_COLUMN, || {
-                format!("its number of data records is {says}, and {counted} stand before it")
+                format!("its number of data records is {says}, and {counted} precede it")
             });
         }
     }

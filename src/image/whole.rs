@@ -4,7 +4,7 @@ use super::content::{Content, MOST_BYTES, Piece, Steps};
 use super::defect::{DefectId, Findings, Severity, counted};
 use super::identity::{self, Identity, IdentityError};
 use super::report::{AddressRange, Facts, Format};
-use super::{AddressUnit, Outside, Target};
+use super::{AddressUnit, Destination, Outside, Target, is_marked_as_data};
 
 /// What the caller knows and wants.
 pub(super) struct Request<'a> {
@@ -90,15 +90,16 @@ impl Whole<'_> {
         let known = named(request.targets, &identity.product);
         let line = line.unwrap_or(1);
         if known.is_none() {
-            findings.note(DefectId::UnknownProduct, line, 1, || format!("'{}' is no known product", identity.product));
+            findings
+                .note(DefectId::UnknownProduct, line, 1, || format!("'{}' is not a known product", identity.product));
         }
-        if let Some(expected) = request.expected.filter(|expected| !expected.eq_ignore_ascii_case(&identity.product)) {
+        if let Some(expected) = request.expected.filter(|expected| !identity.is_for(expected)) {
             findings.note(DefectId::WrongProduct, line, 1, || {
                 format!("the image is for {}, not for {expected}", identity.product)
             });
         }
         if let Some((product, version)) = claim(request)
-            && (!product.eq_ignore_ascii_case(&identity.product) || version != identity.version)
+            && (!identity.is_for(product) || version != identity.version)
         {
             findings.note(DefectId::FileName, line, 1, || {
                 format!(
@@ -261,21 +262,20 @@ impl Judged {
 
     /// Whether the address carries a mark for data memory: the linker's, or the one of a loader that knows such.
     pub(super) fn is_data_memory(&self, address: u32) -> bool {
-        let mark_of_loader = match self.outside {
-            Outside::Folds | Outside::Unknown => address >> 16 == DATA_HIGH_HALF,
-            Outside::Refuses => false,
-        };
-        address >> 24 == DATA_MEMORY >> 24 || mark_of_loader
+        match self.outside {
+            Outside::Folds | Outside::Unknown => Destination::of(address.into()) == Destination::Data,
+            Outside::Refuses => is_marked_as_data(address.into()),
+        }
     }
 
     /// What becomes of data outside of the program flash, from this address on.
     pub(super) fn fate(&self, start: u64, flash_end: u64) -> String {
         let folded = address(start % flash_end);
         match self.outside {
-            Outside::Folds if start >> 16 < u64::from(DATA_HIGH_HALF) => {
-                format!("the loader folds that to {folded} over the program, silently")
-            }
-            Outside::Folds => "the loader skips that, silently".into(),
+            Outside::Folds => match Destination::of(start) {
+                Destination::Program => format!("the loader folds that to {folded} over the program, silently"),
+                Destination::Data | Destination::Skipped => "the loader skips that, silently".into(),
+            },
             Outside::Refuses => "the loader stops there, with the old program erased".into(),
             Outside::Unknown => format!("a loader skips that or folds it to {folded}, silently"),
         }
@@ -283,7 +283,11 @@ impl Judged {
 }
 
 fn data_memory(content: &Content, target: &Judged, column: usize, findings: &mut Findings) {
-    let flagged = content.pieces.iter().copied().filter(|piece| target.is_data_memory(piece.address));
+    let flagged = content
+        .pieces
+        .iter()
+        .copied()
+        .filter(|piece| span(content, piece).end <= ADDRESSES && target.is_data_memory(piece.address));
     runs(content, flagged, |line, run| {
         findings.note(DefectId::DataMemory, line, column, || {
             format!(
@@ -374,7 +378,3 @@ fn address(address: u64) -> String {
 
 /// Number of addresses a record can name.
 const ADDRESSES: u64 = 1 << 32;
-/// CodeWarrior's mark for data memory in an address.
-const DATA_MEMORY: u32 = 0x0200_0000;
-/// The upper half of addresses that loaders which fold take for data memory.
-const DATA_HIGH_HALF: u32 = 0x0020;

@@ -12,7 +12,7 @@ use super::{Direction, REDACTED};
 use crate::endpoint::Secrecy;
 use crate::time::Instant;
 
-/// What stands at the head of a recording.
+/// What a recording begins with.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
     /// When the recording began, in milliseconds since 1970.
@@ -176,10 +176,10 @@ fn latin_1(bytes: &[u8], line: &mut Vec<u8>) {
     let mut rest = bytes;
     while let Some(&first) = rest.first() {
         let plain = rest.iter().position(|byte| !matches!(byte, b' '..=b'!' | b'#'..=b'[' | b']'..=0x7F));
-        let (run, behind) = rest.split_at(plain.unwrap_or(rest.len()));
+        let (run, after) = rest.split_at(plain.unwrap_or(rest.len()));
         if !run.is_empty() {
             line.extend_from_slice(run);
-            rest = behind;
+            rest = after;
             continue;
         }
         rest = &rest[1..];

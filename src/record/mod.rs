@@ -30,7 +30,7 @@ pub enum Direction {
 pub struct Span {
     /// Offset of the first byte.
     pub start: u64,
-    /// Offset behind the last byte.
+    /// The offset after the last byte.
     pub end: u64,
 }
 
@@ -71,7 +71,7 @@ pub const XON: u8 = 0x11;
 /// Xoff, "stop".
 pub const XOFF: u8 = 0x13;
 
-/// What stands in the record for a secret byte.
+/// What replaces a secret byte in the record.
 pub const REDACTED: u8 = b'*';
 
 /// What a recording notes when the link is lost.

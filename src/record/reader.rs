@@ -1,7 +1,7 @@
 //! Recordings read back: chunks of a file in, bytes with their direction and time out.
 //!
 //! Reads what [`super::Cast`] writes, and asciicast v2 and v3 of other programs. A line is all that is kept in memory,
-//! and its length is bounded. What is no recording is refused with the line and column where it stops being one; only a
+//! and its length is bounded. What is not a recording is refused with the line and column where it stops being one; only a
 //! last line without its end is forgiven, since that is what a killed writer leaves.
 
 use serde::Deserialize;
@@ -40,7 +40,7 @@ pub enum Piece {
     },
 }
 
-/// Why a file is no recording, and where.
+/// Why a file is not a recording, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{line}:{column}: {what}")]
 pub struct ReadError {
@@ -102,7 +102,7 @@ impl Reader {
     /// Takes the next bytes of the file and hands out what they complete.
     ///
     /// # Errors
-    /// If a line is no line of a recording. The reader is of no more use then.
+    /// If a line is not one of a recording. The reader is of no more use then.
     pub fn push(&mut self, bytes: &[u8], mut out: impl FnMut(Piece)) -> Result<(), ReadError> {
         for part in bytes.split_inclusive(|&byte| byte == b'\n') {
             if self.line.len() + part.len() > LONGEST_LINE {
@@ -159,7 +159,7 @@ impl Reader {
 
     fn header(&mut self, line: &[u8]) -> Result<Header, ReadError> {
         let read: HeaderLine = serde_json::from_slice(line).map_err(|error| {
-            let what = format!("this is no asciicast recording: {}", cause(&error));
+            let what = format!("this is not an asciicast recording: {}", cause(&error));
             self.error(error.column(), what)
         })?;
         if !matches!(read.version, 2 | 3) {
@@ -195,9 +195,9 @@ impl Reader {
 
     fn event(&mut self, line: &[u8], format: Format) -> Result<Option<Piece>, ReadError> {
         let (seconds, code, data): (f64, String, Value) = serde_json::from_slice(line)
-            .map_err(|error| self.error(error.column(), format!("this is no event: {}", cause(&error))))?;
+            .map_err(|error| self.error(error.column(), format!("this is not an event: {}", cause(&error))))?;
         if !(0.0..=LONGEST).contains(&seconds) {
-            return Err(self.error(2, format!("{seconds} s is no time of a recording")));
+            return Err(self.error(2, format!("{seconds} s is not a time of a recording")));
         }
         let since = if format.relative { self.last } else { Instant::ZERO };
         // A clock that was set back while somebody recorded.
@@ -220,7 +220,7 @@ impl Reader {
         };
         let bytes = if format.latin_1 {
             let bytes: Result<Vec<u8>, char> = text.chars().map(|c| u8::try_from(c).map_err(|_| c)).collect();
-            bytes.map_err(|c| self.error(column_of(line, c), format!("'{}' is no byte", c.escape_debug())))?
+            bytes.map_err(|c| self.error(column_of(line, c), format!("'{}' is not a byte", c.escape_debug())))?
         } else {
             text.into_bytes()
         };
@@ -232,7 +232,7 @@ impl Reader {
     }
 }
 
-/// Where a character stands in a line, as itself; 1 if it is written as an escape.
+/// Where a character is in a line, as itself; 1 if it is written as an escape.
 fn column_of(line: &[u8], character: char) -> usize {
     let written = character.to_string();
     line.windows(written.len()).position(|window| window == written.as_bytes()).map_or(1, |at| at + 1)
@@ -298,8 +298,8 @@ mod tests {
         let with = |line: &str| format!("{own}{line}\n");
         let table = [
             (String::new(), 1, 1, "the file is empty"),
-            ("S0030000FC\n".into(), 1, 1, "this is no asciicast recording: expected value"),
-            ("{\"width\":80}\n".into(), 1, 12, "this is no asciicast recording: missing field `version`"),
+            ("S0030000FC\n".into(), 1, 1, "this is not an asciicast recording: expected value"),
+            ("{\"width\":80}\n".into(), 1, 12, "this is not an asciicast recording: missing field `version`"),
             ("{\"version\":1}\n".into(), 1, 1, "asciicast version 1 is not read; 2 and 3 are"),
             (
                 "{\"version\":2,\"axcon\":{\"schema\":\"axcon.recording/9\"}}\n".into(),
@@ -307,13 +307,13 @@ mod tests {
                 1,
                 "a recording of the kind 'axcon.recording/9' is not read; 'axcon.recording/1' is",
             ),
-            (with("[0.1,\"o\",\"a\""), 2, 12, "this is no event: EOF while parsing a list"),
-            (with("[0.1,\"o\"]"), 2, 9, "this is no event: invalid length 2, expected a tuple of size 3"),
-            (with("\n[\"o\",\"o\",\"a\"]"), 3, 4, "this is no event: invalid type: string \"o\", expected f64"),
-            (with("[-1,\"o\",\"a\"]"), 2, 2, "-1 s is no time of a recording"),
+            (with("[0.1,\"o\",\"a\""), 2, 12, "this is not an event: EOF while parsing a list"),
+            (with("[0.1,\"o\"]"), 2, 9, "this is not an event: invalid length 2, expected a tuple of size 3"),
+            (with("\n[\"o\",\"o\",\"a\"]"), 3, 4, "this is not an event: invalid type: string \"o\", expected f64"),
+            (with("[-1,\"o\",\"a\"]"), 2, 2, "-1 s is not a time of a recording"),
             (with("[1e300,\"o\",\"a\"]"), 2, 2, "1000"),
             (with("[0,\"o\",7]"), 2, 1, "an event 'o' holds text, and this one does not"),
-            (with("[0,\"o\",\"a\u{20ac}\"]"), 2, 10, "'\u{20ac}' is no byte"),
+            (with("[0,\"o\",\"a\u{20ac}\"]"), 2, 10, "'\u{20ac}' is not a byte"),
         ];
         for (text, line, column, what) in table {
             let error = whole(&text).expect_err(&text);

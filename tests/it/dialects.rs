@@ -134,7 +134,7 @@ fn every_dialects_dictionary_is_read_to_the_same_facts() {
         let mut wrong = Vec::new();
         for (at, object, entry) in product.dictionary.entries() {
             let read = reading.entries.iter().find(|read| read.at == at);
-            let (Some(read), Ok(value)) = (read, bench.unit.unit().read_object(at)) else {
+            let (Some(read), Ok(value)) = (read, bench.unit.unit_mut().read_object(bench.now, at)) else {
                 let said = bench.transcript();
                 let line = said.lines().find(|line| line.contains(&format!("{:04X}", at.index))).unwrap_or_default();
                 wrong.push(format!("{at} {} {} is missing: {line}", object.name, entry.name));

@@ -149,9 +149,13 @@ fn what_is_no_recording_is_said_with_its_place() {
     let world = World::new();
     let head = "{\"version\":2,\"axcon\":{\"schema\":\"axcon.recording/1\",\"encoding\":\"latin-1\"}}\n";
     for (name, text, said) in [
-        ("text", "S0030000FC\n".to_owned(), "text:1:1: this is no asciicast recording"),
+        ("text", "S0030000FC\n".to_owned(), "text:1:1: this is not an asciicast recording"),
         ("empty", String::new(), "empty:1:1: the file is empty"),
-        ("later", format!("{head}[0.1,\"o\",\"a\"]\n[0.2,\"o\"\n[0.3,\"o\",\"b\"]\n"), "later:3:8: this is no event"),
+        (
+            "later",
+            format!("{head}[0.1,\"o\",\"a\"]\n[0.2,\"o\"\n[0.3,\"o\",\"b\"]\n"),
+            "later:3:8: this is not an event",
+        ),
     ] {
         fs::write(world.path(name), text).expect("written");
         for command in ["identify", "stream", "terminal", "diagnostics"] {

@@ -181,7 +181,11 @@ fn a_reading_of_the_dictionary_that_is_cancelled_at_any_moment_leaves_the_view()
             Outcome::DictionaryRead(read) => assert!(!read.is_complete(), "cancelled after {moment_ms} ms"),
             other => panic!("{other:?}, cancelled after {moment_ms} ms"),
         }
-        assert!(bench.unit.unit().read_object(entry).is_ok(), "after {moment_ms} ms: {}", bench.transcript());
+        assert!(
+            bench.unit.unit_mut().read_object(bench.now, entry).is_ok(),
+            "after {moment_ms} ms: {}",
+            bench.transcript()
+        );
     }
 }
 
@@ -288,7 +292,7 @@ fn a_unit_that_falls_silent_in_its_view_is_left_and_what_was_read_is_kept() {
     let Outcome::DictionaryRead(reading) = bench.ask(Command::ReadDictionary) else { panic!("{}", bench.transcript()) };
     assert!(!reading.is_complete() && reading.entries.len() > 90, "{}", reading.entries.len());
     let entry = "6100:1".parse().expect("an entry");
-    assert!(bench.unit.unit().read_object(entry).is_ok(), "the view has been left");
+    assert!(bench.unit.unit_mut().read_object(bench.now, entry).is_ok(), "the view has been left");
 }
 
 /// Reads the dictionary while a part of what the unit answers is lost, by the characters received since the key. Gives
@@ -303,7 +307,7 @@ fn read_with_a_loss(lost: std::ops::Range<u64>) -> (DictionaryReading, usize, us
     let Outcome::DictionaryRead(reading) = bench.ask(Command::ReadDictionary) else { panic!("{}", bench.transcript()) };
     let views = bench.wire.iter().filter(|key| **key == b'v').count();
     let entry = "6100:1".parse().expect("an entry");
-    assert!(bench.unit.unit().read_object(entry).is_ok(), "the view has been left");
+    assert!(bench.unit.unit_mut().read_object(bench.now, entry).is_ok(), "the view has been left");
     (*reading, axtc4co().dictionary.entries().count(), views)
 }
 

@@ -377,6 +377,7 @@ fn numbered(path: &Path, place: usize) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::emulator::fault::Setting;
     use crate::time::Duration;
 
     #[test]
@@ -386,7 +387,8 @@ mod tests {
             let specs: Vec<String> = specs.iter().map(|&spec| spec.to_owned()).collect();
             faults(&specs, &products).map_err(|error| error.to_string())
         };
-        let (latency, queue) = (Fault::Latency(Duration::from_millis(16)), Fault::Queue(64));
+        let latency = Fault::Adapter(Setting::Latency(Duration::from_millis(16)));
+        let queue = Fault::Adapter(Setting::Queue(64));
         assert_eq!(read(&["latency 16", " 2 queue 64"]), Ok(vec![vec![latency], vec![latency, queue]]));
         // Only the second unit has so much flash.
         assert!(read(&["2 flash stuck at word 0x20000"]).is_ok());

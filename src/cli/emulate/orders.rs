@@ -79,7 +79,7 @@ mod tests {
         let complaint = read("explode\x1b[2J").expect_err("no such verb");
         assert!(complaint.starts_with("column 1: 'explode^[[2J' is not known; there is: set"), "{complaint}");
         let complaint = read(" 2 open 0").expect_err("no such input");
-        assert!(complaint.starts_with("column 9: '0' is no input"), "the column of the line: {complaint}");
+        assert!(complaint.starts_with("column 9: '0' is not an input"), "the column of the line: {complaint}");
         let complaint = read(&format!("open {}", "x".repeat(100_000))).expect_err("no input");
         assert!(complaint.len() < 300, "{complaint}");
         assert!(read("2").expect_err("nothing to do").contains("a verb is missing"));

@@ -1,6 +1,6 @@
 //! The format of a product's file, and what makes one sound.
 //!
-//! A file is TOML. What serde refuses (a key that does not exist, a number that is none) ends the reading with one
+//! A file is TOML. What serde refuses (a key that does not exist, something that is not a number) ends the reading with one
 //! complaint; everything that can be read is then checked as a whole, and every fault is reported, each with file, line,
 //! column, key, what was found and what is allowed. Here is the product as a whole; `object` reads its dictionary.
 
@@ -38,8 +38,8 @@ struct RawProduct {
     object: Vec<Spanned<RawObject>>,
 }
 
-/// Channels of a row at most, and characters of one of its fields: more than any product of this kind has, and so few
-/// that a row stays a line.
+/// The most channels of a row, and characters of a field: more than any product of this kind has, and few enough for a row
+/// to stay a line.
 const MOST_CHANNELS: usize = 64;
 const WIDEST_FIELD: usize = 40;
 /// Words of program flash at most: an emulated unit has all of it in memory. The largest product has 262,144.
@@ -48,7 +48,7 @@ const MOST_WORDS: u32 = 1 << 22;
 /// Reads a product's file.
 ///
 /// # Errors
-/// If it is no TOML or no product's file, with one complaint; otherwise with everything that is wrong with it.
+/// If it is not TOML or not a product's file, with one complaint; otherwise with everything that is wrong with it.
 pub fn read(file: &str, text: &str) -> Result<Product, Vec<Complaint>> {
     let complaints = Complaints::about(file, text);
     let raw: RawProduct = match toml::from_str(text) {
@@ -126,7 +126,7 @@ impl Reader<'_> {
         }
         if !BIT_RATES_KBPS.contains(&kbps) {
             let allowed = BIT_RATES_KBPS.map(|rate| rate.to_string()).join(", ");
-            self.complain(can.span().start, "can.kbps", format!("{kbps} is none of {allowed}"));
+            self.complain(can.span().start, "can.kbps", format!("{kbps} is not one of {allowed}"));
         }
     }
 
@@ -150,9 +150,9 @@ impl Reader<'_> {
                 let message = format!("{wrong} is not a width of 1 to {WIDEST_FIELD} characters");
                 self.complain(at, format!("{key}.widths"), message);
             }
-            // Before the point stands a digit at least.
+            // There is at least one digit before the point.
             if format.decimals > 0 && format.decimals.saturating_add(2) > width {
-                let message = format!("{} digits behind the point do not fit into {width} characters", format.decimals);
+                let message = format!("{} decimal places do not fit into {width} characters", format.decimals);
                 self.complain(at, format!("{key}.decimals"), message);
             }
             let words = [Some(&format.disabled), Some(&format.open), format.short.as_ref(), format.error.as_ref()];
@@ -180,7 +180,7 @@ impl Reader<'_> {
             self.complain(at, "measurement.channels", message);
         }
         if shortest == 0 || shortest > longest {
-            let message = format!("from {shortest} to {longest} is no range of times");
+            let message = format!("from {shortest} to {longest} is not a range of times");
             self.complain(at, "measurement.stream_period_ms", message);
         }
     }
@@ -188,7 +188,7 @@ impl Reader<'_> {
     fn check_flash(&mut self, flash: &Spanned<FlashMap>) {
         let FlashMap { program_words, page_words, .. } = *flash.get_ref();
         if page_words == 0 || program_words == 0 || !program_words.is_multiple_of(page_words) {
-            let message = format!("{program_words} words are no whole number of pages of {page_words}");
+            let message = format!("{program_words} words are not a whole number of pages of {page_words}");
             self.complain(flash.span().start, "flash.program_words", message);
         }
         if program_words > MOST_WORDS {
@@ -200,7 +200,7 @@ impl Reader<'_> {
     fn check_boot_flash(&mut self, boot: &Spanned<BootFlash>, flash: &FlashMap) {
         let BootFlash { start, words } = *boot.get_ref();
         if words == 0 || u64::from(start) < flash.end() || start.checked_add(words).is_none() {
-            let message = format!("{words} words at {start:#x} do not lie behind the program flash");
+            let message = format!("{words} words at {start:#x} do not lie after the program flash");
             self.complain(boot.span().start, "boot_flash", message);
         }
     }
@@ -224,41 +224,49 @@ mod tests {
         let threshold = "limits = [-2730, \"4010:n - 100\"]";
         let table = [
             ("node_id = 127 ", "node_id = 128 ", "can.node_id: 128 is not 1 to 127"),
-            ("kbps = 125 ", "kbps = 115 ", "can.kbps: 115 is none of 10, 20, 50, 125, 250, 500, 800, 1000"),
+            ("kbps = 125 ", "kbps = 115 ", "can.kbps: 115 is not one of 10, 20, 50, 125, 250, 500, 800, 1000"),
             ("name = \"AXTC4CO\"", "name = \"AX TC4\"", "name: 'AX TC4' is not 1 to 12 letters and digits"),
-            ("page_words = 256", "page_words = 255", "65536 words are no whole number of pages of 255"),
-            ("start = 0x20000", "start = 0x2000", "boot_flash: 4096 words at 0x2000 do not lie behind"),
+            ("page_words = 256", "page_words = 255", "65536 words are not a whole number of pages of 255"),
+            ("start = 0x20000", "start = 0x2000", "boot_flash: 4096 words at 0x2000 do not lie after"),
             ("_V{version}", "_V", "loader.file_name: 'AXTC4CO_V.elf.S' has no {version} in it"),
             ("widths = [8]", "widths = [0]", "stream.field_value.widths: 0 is not a width of 1 to 40 characters"),
             ("widths = [8]", "widths = [8, 4000000000]", "stream.field_value.widths: 4000000000 is not a width"),
-            ("decimals = 3", "decimals = 7", "field_value.decimals: 7 digits behind the point do not fit into 8"),
+            ("decimals = 3", "decimals = 7", "field_value.decimals: 7 decimal places do not fit into 8"),
             ("decimals = 3", "decimals = 9223372036854775807", "do not fit into 8 characters"),
             ("program_words = 0x10000", "program_words = 4294967040", "4294967040 words are more than 4194304"),
             ("open = \"OpenCct\"", "open = \"OpenCircuit\"", "stream.field_value: 'OpenCircuit' is not a word"),
-            ("[1, 60000]", "[100, 10]", "measurement.stream_period_ms: from 100 to 10 is no range"),
+            ("[1, 60000]", "[100, 10]", "measurement.stream_period_ms: from 100 to 10 is not a range"),
             ("index = 0x5010", "index = 0x5000", "object.index: 5000h is there already"),
             ("values = [1, 2, 7]", "values = [1, 70000]", "object 6110h, entry 1, values: 70000 is not a whole number"),
             ("values = [50, 60]", "values = [50, 61]", "object 5010h, default: 60 is not within the limits"),
             (threshold, "limits = [-2730, \"4011:n - 100\"]", "4000h, entry 1, limits: there is no entry 4011:01"),
-            (threshold, "limits = [-2730, \"4010 less 100\"]", "limits: '4010 less 100' is no bound: write a number"),
-            (threshold, "limits = [-2730, \"4010:n --9223372036854775808\"]", "is no bound: write a number"),
-            (threshold, "limits = [-2730, \"4010:n + -100\"]", "limits: '4010:n + -100' is no bound"),
+            (
+                threshold,
+                "limits = [-2730, \"4010 less 100\"]",
+                "limits: '4010 less 100' is not a bound: write a number",
+            ),
+            (threshold, "limits = [-2730, \"4010:n --9223372036854775808\"]", "is not a bound: write a number"),
+            (threshold, "limits = [-2730, \"4010:n + -100\"]", "limits: '4010:n + -100' is not a bound"),
             (threshold, "limits = [-2730]", "limits: 1 values are not the lowest and the highest"),
-            (threshold, "limits = [-100, -200]", "limits: -100 to -200 is no range"),
-            ("\"$NODEID + 0x40000180\"", "\"$NODE + 1\"", "object 1800h, entry 1, default: '$NODE + 1' is no default"),
+            (threshold, "limits = [-100, -200]", "limits: -100 to -200 is not a range"),
+            (
+                "\"$NODEID + 0x40000180\"",
+                "\"$NODE + 1\"",
+                "object 1800h, entry 1, default: '$NODE + 1' is not a default",
+            ),
             (
                 "channels = 4\n",
                 "channels = 5\n",
                 "measurement.channels: a row of 6 fields belongs to them, not one of 5",
             ),
-            ("\"$NODEID + 0x40000180\"", "\"$NODEID + 0xFFFFFF81\"", "'$NODEID + 0xFFFFFF81' is no default"),
-            ("\"$NODEID + 0x40000180\"", "\"$NODEID + 0x+180\"", "'$NODEID + 0x+180' is no default"),
+            ("\"$NODEID + 0x40000180\"", "\"$NODEID + 0xFFFFFF81\"", "'$NODEID + 0xFFFFFF81' is not a default"),
+            ("\"$NODEID + 0x40000180\"", "\"$NODEID + 0x+180\"", "'$NODEID + 0x+180' is not a default"),
             (
                 "default = 200000",
                 "default = 1.5",
                 "object 6114h, entry 1, default: 1.5 is not a whole number from 0 to",
             ),
-            ("\"7\" = \"type T\"", "\"T\" = \"type T\"", "meanings: 'T' is no value of an UNSIGNED16"),
+            ("\"7\" = \"type T\"", "\"T\" = \"type T\"", "meanings: 'T' is not a value of an UNSIGNED16"),
             ("section = \"3.4.17\"", "section = \"\"", "object 5010h, section: there is none"),
             (
                 "entries = [\"Configuration Date\", \"Configuration Time\"]",

@@ -1,6 +1,6 @@
 //! Objects of the dictionary as a product's file writes them.
 //!
-//! What an object says, every entry says that says nothing else. What it says of values (limits, defaults, unit,
+//! What an object says holds for every entry that does not say otherwise. What it says of values (limits, defaults, unit,
 //! meanings) is only for entries of its own type.
 
 use serde::Deserialize;
@@ -21,7 +21,8 @@ pub(super) struct RawObject {
     kind: RawKind,
     #[serde(rename = "type")]
     data_type: DataType,
-    access: Option<RawAccess>,
+    #[serde(default)]
+    access: RawAccess,
     #[serde(default)]
     pdo: bool,
     limits: Option<Vec<Toml>>,
@@ -36,7 +37,7 @@ pub(super) struct RawObject {
 }
 
 /// An entry that says something of its own.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawEntry {
     sub: Option<u8>,
@@ -59,9 +60,10 @@ enum RawKind {
     Record,
 }
 
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum RawAccess {
+    #[default]
     Ro,
     Rw,
 }
@@ -70,7 +72,7 @@ enum RawAccess {
 const COUNT_NAME: &str = "Number of entries";
 
 impl Reader<'_> {
-    pub(super) fn object(&mut self, raw: RawObject) -> Object {
+    pub(super) fn object(&mut self, mut raw: RawObject) -> Object {
         let index = *raw.index.get_ref();
         let start = raw.index.span().start;
         let key = format!("object {index:04X}h");
@@ -82,40 +84,30 @@ impl Reader<'_> {
             RawKind::Array => ObjectKind::Array,
             RawKind::Record => ObjectKind::Record,
         };
-        let common = Common {
-            data_type: raw.data_type,
-            access: raw.access.unwrap_or(RawAccess::Ro),
-            pdo: raw.pdo,
-            limits: raw.limits,
-            values: raw.values,
-            unit: raw.unit,
-            default: raw.default,
-            description: raw.description,
-            meanings: raw.meanings,
-        };
+        let own = std::mem::take(&mut raw.entries);
         let entries = if kind == ObjectKind::Var {
-            if let Some(entry) = raw.entries.first() {
+            if let Some(entry) = own.first() {
                 self.complain(entry.span().start, format!("{key}, entries"), "a variable has none");
             }
-            vec![self.entry(&key, start, 0, RawEntry::named(raw.name.clone()), &common)]
+            vec![self.entry(&key, start, 0, RawEntry::named(raw.name.clone()), &raw)]
         } else {
-            if raw.entries.is_empty() {
+            if own.is_empty() {
                 self.complain(start, format!("{key}, entries"), "there are none");
             }
-            self.entries(&key, kind, raw.entries, &common)
+            self.entries(&key, kind, own, &raw)
         };
         Object { index, name: raw.name, kind, section: raw.section.into_inner(), entries }
     }
 
     /// The entries of an array or record, that which counts them included.
-    fn entries(&mut self, key: &str, kind: ObjectKind, raw: Vec<Spanned<Toml>>, common: &Common) -> Vec<Entry> {
+    fn entries(&mut self, key: &str, kind: ObjectKind, raw: Vec<Spanned<Toml>>, object: &RawObject) -> Vec<Entry> {
         let mut entries: Vec<Entry> = Vec::new();
         let mut next = 1u8;
         for raw in raw {
             let at = raw.span().start;
             let Some(entry) = self.raw_entry(key, at, raw.into_inner()) else { continue };
             let sub = entry.sub.unwrap_or(next);
-            let own_type = entry.data_type.is_some_and(|own| own != common.data_type);
+            let own_type = entry.data_type.is_some_and(|own| own != object.data_type);
             if own_type && kind == ObjectKind::Array && sub > 0 {
                 let message = "an entry of an array has the array's type; a record may mix them";
                 self.complain(at, format!("{key}, entry {sub}, type"), message);
@@ -125,7 +117,7 @@ impl Reader<'_> {
                 self.complain(at, format!("{key}, entry {sub}"), message);
             }
             next = next.max(sub.saturating_add(1));
-            entries.push(self.entry(&format!("{key}, entry {sub}"), at, sub, entry, common));
+            entries.push(self.entry(&format!("{key}, entry {sub}"), at, sub, entry, object));
         }
         if !entries.iter().any(|entry| entry.sub == 0) {
             entries.push(count_entry(next - 1));
@@ -152,12 +144,13 @@ impl Reader<'_> {
         }
     }
 
-    fn entry(&mut self, key: &str, at: usize, sub: u8, raw: RawEntry, common: &Common) -> Entry {
-        let data_type = raw.data_type.unwrap_or(common.data_type);
+    fn entry(&mut self, key: &str, at: usize, sub: u8, raw: RawEntry, object: &RawObject) -> Entry {
+        let data_type = raw.data_type.unwrap_or(object.data_type);
         // Another type has other values: what the object says of them is not meant for this entry.
-        let alike = data_type == common.data_type;
-        let shared = |own: Option<Vec<Toml>>, object: &Option<Vec<Toml>>| own.or(object.clone().filter(|_| alike));
-        let access = match raw.access.unwrap_or(common.access) {
+        let alike = data_type == object.data_type;
+        let shared =
+            |own: Option<Vec<Toml>>, of_object: &Option<Vec<Toml>>| own.or(of_object.clone().filter(|_| alike));
+        let access = match raw.access.unwrap_or(object.access) {
             RawAccess::Ro => Access::ReadOnly,
             RawAccess::Rw => Access::ReadWrite,
         };
@@ -166,11 +159,11 @@ impl Reader<'_> {
             at,
             sub,
             data_type,
-            shared(raw.limits, &common.limits),
-            shared(raw.values, &common.values).unwrap_or_default(),
+            shared(raw.limits, &object.limits),
+            shared(raw.values, &object.values).unwrap_or_default(),
         );
         let own_default = raw.default.is_some();
-        let default = raw.default.or(common.default.clone()).and_then(|default| {
+        let default = raw.default.or(object.default.clone()).and_then(|default| {
             self.default(&format!("{key}, default"), at, data_type, &default, alike || own_default)
         });
         if let Some(default) = default
@@ -179,18 +172,18 @@ impl Reader<'_> {
         {
             self.complain(at, format!("{key}, default"), format!("{} is not within the limits", default.value));
         }
-        let meanings = if alike { self.meanings(key, at, data_type, &common.meanings) } else { Vec::new() };
+        let meanings = if alike { self.meanings(key, at, data_type, &object.meanings) } else { Vec::new() };
         Entry {
             sub,
             name: raw.name,
             data_type,
             access,
-            mappable: common.pdo && alike,
+            mappable: object.pdo && alike,
             default,
             limits,
-            unit: raw.unit.or(common.unit.clone().filter(|_| alike)),
+            unit: raw.unit.or(object.unit.clone().filter(|_| alike)),
             meanings,
-            description: common.description.clone(),
+            description: object.description.clone(),
         }
     }
 
@@ -212,7 +205,7 @@ impl Reader<'_> {
                 if let (Some(Bound::Value(low)), Some(Bound::Value(high))) = (limits.low, limits.high)
                     && low.as_f64() > high.as_f64()
                 {
-                    self.complain(at, key, format!("{low} to {high} is no range"));
+                    self.complain(at, key, format!("{low} to {high} is not a range"));
                 }
             } else {
                 self.complain(at, key, format!("{} values are not the lowest and the highest", range.len()));
@@ -230,7 +223,7 @@ impl Reader<'_> {
         };
         let parsed = dependent(text, sub);
         if parsed.is_none() {
-            let message = format!("'{text}' is no bound: write a number, or another entry like \"4010:n - 100\"");
+            let message = format!("'{text}' is not a bound: write a number, or another entry like \"4010:n - 100\"");
             self.complain(at, key, message);
         }
         parsed
@@ -242,7 +235,7 @@ impl Reader<'_> {
                 Some(base) => Some(FactoryValue { value: Value::Unsigned32(base), plus_node_id: true }),
                 None => {
                     let message = format!(
-                        "'{text}' is no default: write a number, or for an UNSIGNED32 \"$NODEID + 0x40000180\""
+                        "'{text}' is not a default: write a number, or for an UNSIGNED32 \"$NODEID + 0x40000180\""
                     );
                     self.complain(at, key, message);
                     None
@@ -263,11 +256,11 @@ impl Reader<'_> {
             match (value, text) {
                 (Some(value), Toml::String(text)) => meanings.push(Meaning { value, text: text.clone() }),
                 (None, _) => {
-                    let message = format!("'{number}' is no value of an {}", data_type.name());
+                    let message = format!("'{number}' is not a value of an {}", data_type.name());
                     self.complain(at, format!("{key}, meanings"), message);
                 }
                 (Some(_), other) => {
-                    self.complain(at, format!("{key}, meanings"), format!("{} is no text", shown(other)));
+                    self.complain(at, format!("{key}, meanings"), format!("{} is not a text", shown(other)));
                 }
             }
         }
@@ -303,31 +296,9 @@ impl Reader<'_> {
     }
 }
 
-/// What an object says for all its entries.
-struct Common {
-    data_type: DataType,
-    access: RawAccess,
-    pdo: bool,
-    limits: Option<Vec<Toml>>,
-    values: Option<Vec<Toml>>,
-    unit: Option<String>,
-    default: Option<Toml>,
-    description: Option<String>,
-    meanings: toml::Table,
-}
-
 impl RawEntry {
     fn named(name: String) -> Self {
-        RawEntry {
-            sub: None,
-            name,
-            data_type: None,
-            access: None,
-            limits: None,
-            values: None,
-            unit: None,
-            default: None,
-        }
+        RawEntry { name, ..RawEntry::default() }
     }
 }
 

@@ -23,12 +23,12 @@ impl Voice {
         self.say(board, &format!("{}\r\n", board.product.console.loader_prompt));
     }
 
-    /// Prints the product's mark of progress, behind those on the line.
+    /// Prints the product's mark of progress, after those on the line.
     pub fn mark(&mut self, board: &mut Board<'_>) {
         self.echo(board, board.product.loader.progress.to_string().as_bytes());
     }
 
-    /// Prints bytes behind those on the line, as they are.
+    /// Prints bytes as they are, after those on the line.
     pub fn echo(&mut self, board: &mut Board<'_>, bytes: &[u8]) {
         board.uart.send(board.now, bytes);
         self.line_begun = true;

@@ -80,7 +80,7 @@ pub struct Quantity {
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// Digits behind the point.
+    /// Decimal places.
     pub decimals: usize,
     /// Its unit.
     pub unit: &'static str,
@@ -127,7 +127,7 @@ impl Dialect {
         self.phrases.echo
     }
 
-    /// Whether the question for the stream's source wants Enter behind its key.
+    /// Whether the question for the stream's source wants Enter after its key.
     pub fn source_wants_enter(&self) -> bool {
         self.phrases.source.wants_enter
     }
@@ -215,7 +215,7 @@ impl Dialect {
         format!("{}\r\n", self.phrases.letters.of(&text))
     }
 
-    /// A sentence. Prompts have no line end: the answer is echoed behind them.
+    /// A sentence. Prompts have no line end: the answer is echoed after them.
     pub fn sentence(&self, sentence: Sentence) -> String {
         let phrases = &self.phrases;
         let line = |phrase: &str| format!("\r\n{}\r\n", phrases.letters.of(phrase));
@@ -245,7 +245,7 @@ impl Dialect {
         format!("\r\n{}", question.replace("{default}", &default_ms.to_string()))
     }
 
-    /// The repetition rate is none.
+    /// What was typed is not a repetition rate.
     pub fn bad_period(&self, (shortest, longest): (u16, u16)) -> String {
         format!("\r\nInvalid rate: not {shortest} to {longest} ms. Nothing changed.\r\n")
     }

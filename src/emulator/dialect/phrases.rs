@@ -141,7 +141,7 @@ pub enum EntryStyle {
 /// How numbers are written.
 #[derive(Clone, Copy, Debug)]
 pub struct NumberStyle {
-    /// Digits behind the point.
+    /// Decimal places.
     pub decimals: usize,
     pub not_a_number: &'static str,
     /// Unsigned numbers without a unit in hexadecimal digits.
@@ -172,7 +172,7 @@ impl Letters {
 }
 
 impl EntryStyle {
-    /// Whether a line with the object's index and name stands above its entries.
+    /// Whether a line with the object's index and name comes before its entries.
     pub fn has_heading(self) -> bool {
         matches!(self, EntryStyle::Heading | EntryStyle::SubHeading)
     }

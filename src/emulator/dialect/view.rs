@@ -21,7 +21,7 @@ pub struct ViewEntry {
     pub value: Value,
 }
 
-/// Digits behind the point of measured values other than temperatures: of V, mA and ohm (a guess).
+/// Decimal places of measured values other than temperatures: of V, mA and ohm (a guess).
 const MEASURED_DECIMALS: usize = 3;
 
 impl Dialect {
@@ -104,11 +104,11 @@ impl Dialect {
     }
 }
 
-/// As many digits as it takes to read the same number again, and at least `decimals` behind the point.
+/// As many digits as it takes to read the same number again, and at least `decimals` decimal places.
 fn with_all_digits(number: f32, decimals: usize) -> String {
     let shortest = number.to_string();
-    let behind_point = shortest.split_once('.').map_or(0, |(_, behind)| behind.len());
-    if behind_point < decimals { format!("{number:.decimals$}") } else { shortest }
+    let decimal_places = shortest.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    if decimal_places < decimals { format!("{number:.decimals$}") } else { shortest }
 }
 
 /// A unit's name in the characters a serial terminal has.

@@ -1,13 +1,13 @@
-//! Who sits on the cable and does to bytes what the faults say: loses, doubles, changes and delays them, and counts.
+//! The cable with someone on it who does to bytes what the faults say: loses, doubles, changes and delays them, and counts.
 //!
 //! Pure: a byte goes in with the moment at which an undisturbed line would deliver it, and comes out when it arrives.
-//! A byte behind a late one waits for it, and then follows at the line's rate, not at once: what stalls is the adapter,
-//! not the wire behind it.
+//! What follows a late byte waits for it, and then arrives at the line's rate, not all at once: what stalls is the
+//! adapter, not the wire behind it.
 
 use std::collections::VecDeque;
 
 use super::super::uart::{BAUD, XOFF, XON};
-use super::{Fault, Mishap, Way, When};
+use super::{Deed, LineFault, Mishap, RecordFault, Setting, Way, When};
 use crate::rng::Rng;
 use crate::time::{Duration, Instant, character_time};
 
@@ -20,52 +20,50 @@ pub enum Arrival {
     Unreadable,
 }
 
-/// What the unit suffers behind a record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Deed {
-    /// Its microcontroller resets.
-    Reset,
-    /// Its supply fails, and comes back after this time, if at all.
-    PowerCut(Option<Duration>),
-}
-
 /// The cable with what goes wrong on it.
 #[derive(Debug)]
 pub struct Middleman {
     chance: Rng,
-    /// Faults ever ordered: each gets a chance of its own.
+    /// Line faults ordered so far: each gets a chance of its own.
     ordered: u64,
-    faults: Vec<Ordered>,
+    line_faults: Vec<Ordered>,
+    /// Each with the number of records still to come.
+    record_faults: Vec<RecordFault>,
     latency: Duration,
     queue: usize,
-    plugged: bool,
-    plug_at: Option<Instant>,
-    /// The next XON is lost.
-    loses_xon: bool,
-    /// The last word that the client has heard on it was XOFF.
-    client_is_held: bool,
+    cable: Cable,
     to_unit: Delayed,
-    to_client: Delayed,
+    to_client: ToClient,
     text: Text,
 }
 
+/// A line fault that lies in wait.
 #[derive(Debug)]
 struct Ordered {
-    fault: Fault,
+    fault: LineFault,
     /// How many of what it counts have come.
     seen: u64,
     chance: Rng,
 }
 
-/// Faults that lie in wait at most; an order beyond them is refused. A scenario that begins anew orders its own each
-/// time.
+/// The most faults that lie in wait; an order beyond them is refused. A scenario that repeats orders its own each time.
 pub const MOST_FAULTS: usize = 1_000;
 
-/// Bytes under way at most, on one way: more than the line carries in the longest lateness. What comes beyond is lost, as
-/// in an adapter that is full; only faults that add up get there, such as every byte doubled.
+/// The most bytes under way in one direction: more than the line carries in the longest lateness. What comes beyond is
+/// lost, as in an adapter that is full; only faults that add up get there, such as every byte doubled.
 const MOST_UNDER_WAY: usize = 1 << 20;
 
-/// Bytes on one way.
+/// Where the plug is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cable {
+    In,
+    /// Plugged in again at this moment, or by hand.
+    Out {
+        back_at: Option<Instant>,
+    },
+}
+
+/// Bytes in one direction.
 #[derive(Debug, Default)]
 struct Delayed {
     pending: VecDeque<(Instant, Arrival)>,
@@ -73,7 +71,17 @@ struct Delayed {
     last: Instant,
 }
 
-/// What stands before the present character on its line, as far as counting records goes.
+/// The direction in which the unit's flow control goes.
+#[derive(Debug, Default)]
+struct ToClient {
+    bytes: Delayed,
+    /// The next XON is lost.
+    loses_xon: bool,
+    /// The last flow control character that the client has got was XOFF.
+    holds_client: bool,
+}
+
+/// What precedes the present character on its line, as far as counting records goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Text {
     Nothing,
@@ -95,65 +103,68 @@ impl Middleman {
         Middleman {
             chance: Rng::new(seed).fork("faults"),
             ordered: 0,
-            faults: Vec::new(),
+            line_faults: Vec::new(),
+            record_faults: Vec::new(),
             latency: Duration::ZERO,
             queue: 0,
-            plugged: true,
-            plug_at: None,
-            loses_xon: false,
-            client_is_held: false,
+            cable: Cable::In,
             to_unit: Delayed::default(),
-            to_client: Delayed::default(),
+            to_client: ToClient::default(),
             text: Text::Nothing,
         }
     }
 
-    /// Orders a fault. Those of flash are not for the cable.
-    pub fn order(&mut self, fault: Fault) {
-        match fault {
-            Fault::Latency(latency) => self.latency = latency,
-            Fault::Queue(bytes) => self.queue = bytes,
-            Fault::Flash { .. } => {}
-            Fault::Line { .. }
-            | Fault::NoXon(_)
-            | Fault::Reset { .. }
-            | Fault::PowerCut { .. }
-            | Fault::Unplug { .. } => {
-                let chance = self.chance.fork(&self.ordered.to_string());
-                self.ordered += 1;
-                self.faults.push(Ordered { fault, seen: 0, chance });
-            }
+    /// Orders a fault of the line.
+    pub fn order_on_line(&mut self, fault: LineFault) {
+        let chance = self.chance.fork(&self.ordered.to_string());
+        self.ordered += 1;
+        self.line_faults.push(Ordered { fault, seen: 0, chance });
+    }
+
+    /// Orders a deed at a record.
+    pub fn order_at_record(&mut self, fault: RecordFault) {
+        self.record_faults.push(fault);
+    }
+
+    /// Changes the adapter.
+    pub fn set(&mut self, setting: Setting) {
+        match setting {
+            Setting::Latency(latency) => self.latency = latency,
+            Setting::Queue(bytes) => self.queue = bytes,
         }
     }
 
     /// Faults that lie in wait.
     pub fn faults(&self) -> usize {
-        self.faults.len()
+        self.line_faults.len() + self.record_faults.len()
     }
 
     /// Ends all faults, and plugs the cable in. What is late stays late.
     pub fn heal(&mut self) {
-        self.faults.clear();
+        self.line_faults.clear();
+        self.record_faults.clear();
         self.latency = Duration::ZERO;
         self.queue = 0;
-        self.loses_xon = false;
-        self.plug(true);
+        self.to_client.loses_xon = false;
+        self.plug();
     }
 
-    /// Plugs the cable in, or out: then what is on its way is lost.
-    pub fn plug(&mut self, plugged: bool) {
-        self.plugged = plugged;
-        self.plug_at = None;
-        if !plugged {
-            self.to_unit.pending.clear();
-            self.to_client.pending.clear();
-            self.client_is_held = false;
-        }
+    /// Plugs the cable in.
+    pub fn plug(&mut self) {
+        self.cable = Cable::In;
+    }
+
+    /// Pulls the cable out, until this moment if one is given. What is on its way is lost, and so is what is known about
+    /// flow control.
+    pub fn unplug(&mut self, back_at: Option<Instant>) {
+        self.cable = Cable::Out { back_at };
+        self.to_unit = Delayed::default();
+        self.to_client = ToClient::default();
     }
 
     /// Whether the cable is in.
     pub fn is_plugged(&self) -> bool {
-        self.plugged
+        self.cable == Cable::In
     }
 
     /// Bytes that the adapter takes ahead of the line.
@@ -163,57 +174,44 @@ impl Middleman {
 
     /// Whether bytes may pass by without asking.
     pub fn is_idle(&self) -> bool {
-        self.faults.is_empty()
+        self.faults() == 0
             && self.latency.is_zero()
-            && self.plugged
-            && !self.loses_xon
+            && self.is_plugged()
+            && !self.to_client.loses_xon
             && self.to_unit.pending.is_empty()
-            && self.to_client.pending.is_empty()
+            && self.to_client.bytes.pending.is_empty()
     }
 
     /// Takes a byte that an undisturbed line would deliver now.
     pub fn carry(&mut self, now: Instant, way: Way, byte: u8) {
-        if !self.plugged {
+        if !self.is_plugged() {
             return;
         }
         let mut fate = Fate { copies: 1, flipped: 0, unreadable: false, late: Duration::ZERO };
-        if way == Way::FromUnit && byte == XON && std::mem::take(&mut self.loses_xon) {
+        if way == Way::FromUnit && byte == XON && std::mem::take(&mut self.to_client.loses_xon) {
             fate.copies = 0;
         }
         let mut pulled = None;
-        for ordered in &mut self.faults {
-            let fault = ordered.fault;
-            match fault {
-                Fault::Line { mishap, way: its_way, when } if its_way == way && ordered.strikes(when) => {
-                    fate.suffer(mishap, &mut ordered.chance);
-                }
-                Fault::NoXon(when) if way == Way::FromUnit && byte == XOFF && ordered.strikes(when) => {
-                    self.loses_xon = true;
-                }
-                Fault::Unplug { way: its_way, byte, out } if its_way == way && ordered.strikes(When::At(byte)) => {
-                    pulled = Some(out);
-                }
-                Fault::Line { .. }
-                | Fault::NoXon(_)
-                | Fault::Unplug { .. }
-                | Fault::Reset { .. }
-                | Fault::PowerCut { .. }
-                | Fault::Flash { .. }
-                | Fault::Latency(_)
-                | Fault::Queue(_) => {}
+        for ordered in &mut self.line_faults {
+            if !ordered.counts(way, byte) || !ordered.strikes() {
+                continue;
+            }
+            match ordered.fault {
+                LineFault::Bytes { mishap, .. } => fate.suffer(mishap, &mut ordered.chance),
+                LineFault::NoXon(_) => self.to_client.loses_xon = true,
+                LineFault::Unplug { out, .. } => pulled = Some(out),
             }
         }
-        self.faults.retain(|ordered| !ordered.is_over());
+        self.line_faults.retain(|ordered| !ordered.is_over());
         if let Some(out) = pulled {
-            self.plug(false);
-            self.plug_at = out.map(|out| now + out);
+            self.unplug(out.map(|out| now + out));
             return;
         }
         let arrival = if fate.unreadable { Arrival::Unreadable } else { Arrival::Byte(byte ^ fate.flipped) };
         let at = now + self.latency + fate.late;
         let delayed = match way {
             Way::ToUnit => &mut self.to_unit,
-            Way::FromUnit => &mut self.to_client,
+            Way::FromUnit => &mut self.to_client.bytes,
         };
         for copy in 0..fate.copies {
             delayed.push(if copy == 0 { at } else { delayed.last + character_time(BAUD) }, arrival);
@@ -227,7 +225,7 @@ impl Middleman {
 
     /// What reaches the client by now.
     pub fn next_to_client(&mut self, now: Instant) -> Option<u8> {
-        match self.to_client.pop(now)? {
+        match self.to_client.bytes.pop(now)? {
             Arrival::Byte(byte) => Some(byte),
             // Orders of this kind are not taken.
             Arrival::Unreadable => None,
@@ -237,18 +235,18 @@ impl Middleman {
     /// The client has got these bytes.
     pub fn note_client_heard(&mut self, bytes: &[u8]) {
         if let Some(&last) = bytes.iter().rev().find(|byte| [XON, XOFF].contains(byte)) {
-            self.client_is_held = last == XOFF;
+            self.to_client.holds_client = last == XOFF;
         }
     }
 
-    /// The unit starts anew, or another client has come: nobody is held.
+    /// The unit restarts, or another client has come: nobody is held.
     pub fn forget_hold(&mut self) {
-        self.client_is_held = false;
+        self.to_client.holds_client = false;
     }
 
-    /// Whether the client has heard XOFF and not yet XON.
+    /// Whether the client has got XOFF and not yet XON.
     pub fn client_is_held(&self) -> bool {
-        self.client_is_held
+        self.to_client.holds_client
     }
 
     /// The loader has got a character. Gives what happens to the unit if a record ends with it: a line that begins
@@ -259,7 +257,7 @@ impl Middleman {
         self.text = match (was, arrival) {
             _ if ends => Text::Nothing,
             (Text::Nothing, Arrival::Byte(b'S')) => Text::Record,
-            // Flow control stands before a line without being part of it.
+            // Flow control before a line is not part of it.
             (Text::Nothing, Arrival::Byte(XON | XOFF)) => Text::Nothing,
             (Text::Nothing, _) => Text::Other,
             (Text::Record | Text::Other, _) => was,
@@ -267,26 +265,11 @@ impl Middleman {
         if !(ends && was == Text::Record) {
             return Vec::new();
         }
-        let mut deeds = Vec::new();
-        for ordered in &mut self.faults {
-            let fault = ordered.fault;
-            match fault {
-                Fault::Reset { record } if ordered.strikes(When::At(record)) => deeds.push(Deed::Reset),
-                Fault::PowerCut { record, off } if ordered.strikes(When::At(record)) => {
-                    deeds.push(Deed::PowerCut(off));
-                }
-                Fault::Reset { .. }
-                | Fault::PowerCut { .. }
-                | Fault::Line { .. }
-                | Fault::NoXon(_)
-                | Fault::Unplug { .. }
-                | Fault::Flash { .. }
-                | Fault::Latency(_)
-                | Fault::Queue(_) => {}
-            }
-        }
-        self.faults.retain(|ordered| !ordered.is_over());
-        deeds
+        let is_due = |fault: &mut RecordFault| {
+            fault.record = fault.record.saturating_sub(1);
+            fault.record == 0
+        };
+        self.record_faults.extract_if(.., is_due).map(|fault| fault.deed).collect()
     }
 
     /// No loader runs: the next character it gets begins a line.
@@ -296,22 +279,34 @@ impl Middleman {
 
     /// When something arrives, or the cable is plugged in again.
     pub fn deadline(&self) -> Option<Instant> {
-        [self.to_unit.next(), self.to_client.next(), self.plug_at].into_iter().flatten().min()
+        let back_at = match self.cable {
+            Cable::In => None,
+            Cable::Out { back_at } => back_at,
+        };
+        [self.to_unit.next(), self.to_client.bytes.next(), back_at].into_iter().flatten().min()
     }
 
     /// Plugs the cable in again if it is time.
     pub fn handle_timeout(&mut self, now: Instant) {
-        if self.plug_at.is_some_and(|at| at <= now) {
-            self.plug(true);
+        if matches!(self.cable, Cable::Out { back_at: Some(at) } if at <= now) {
+            self.plug();
         }
     }
 }
 
 impl Ordered {
+    /// Whether the fault counts such a byte.
+    fn counts(&self, way: Way, byte: u8) -> bool {
+        match self.fault {
+            LineFault::Bytes { way: its_way, .. } | LineFault::Unplug { way: its_way, .. } => its_way == way,
+            LineFault::NoXon(_) => way == Way::FromUnit && byte == XOFF,
+        }
+    }
+
     /// Counts one more; whether the fault strikes it.
-    fn strikes(&mut self, when: When) -> bool {
+    fn strikes(&mut self) -> bool {
         self.seen += 1;
-        match when {
+        match self.when() {
             When::At(number) => self.seen == number,
             When::OneIn(number) => self.chance.below(number) == 0,
         }
@@ -319,16 +314,16 @@ impl Ordered {
 
     /// Whether it will never strike again.
     fn is_over(&self) -> bool {
+        match self.when() {
+            When::At(number) => self.seen >= number,
+            When::OneIn(_) => false,
+        }
+    }
+
+    fn when(&self) -> When {
         match self.fault {
-            Fault::Line { when: When::At(number), .. } | Fault::NoXon(When::At(number)) => self.seen >= number,
-            Fault::Unplug { byte: number, .. }
-            | Fault::Reset { record: number }
-            | Fault::PowerCut { record: number, .. } => self.seen >= number,
-            Fault::Line { when: When::OneIn(_), .. }
-            | Fault::NoXon(When::OneIn(_))
-            | Fault::Flash { .. }
-            | Fault::Latency(_)
-            | Fault::Queue(_) => false,
+            LineFault::Bytes { when, .. } | LineFault::NoXon(when) => when,
+            LineFault::Unplug { byte, .. } => When::At(byte),
         }
     }
 }
@@ -337,7 +332,7 @@ impl Fate {
     fn suffer(&mut self, mishap: Mishap, chance: &mut Rng) {
         match mishap {
             Mishap::Lost => self.copies = 0,
-            // What is lost cannot be doubled, in whatever order the two were said.
+            // What is lost cannot be doubled, whichever of the two was ordered first.
             Mishap::Doubled => self.copies = self.copies.saturating_mul(2),
             Mishap::Corrupted => self.flipped ^= 1 << chance.below(8),
             Mishap::Unreadable => self.unreadable = true,
@@ -371,6 +366,7 @@ impl Delayed {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Fault;
     use super::*;
     use crate::device::Product;
 
@@ -378,7 +374,12 @@ mod tests {
         let product = Product::named("AXTC4CO").expect("built in");
         let mut middleman = Middleman::new(1);
         for fault in faults {
-            middleman.order(Fault::read(fault, product).expect(fault));
+            match Fault::read(fault, product).expect(fault) {
+                Fault::Line(fault) => middleman.order_on_line(fault),
+                Fault::Record(fault) => middleman.order_at_record(fault),
+                Fault::Adapter(setting) => middleman.set(setting),
+                Fault::Flash { .. } => panic!("{fault} is not on the cable"),
+            }
         }
         middleman
     }
@@ -455,7 +456,7 @@ mod tests {
     fn what_follows_a_late_byte_waits_for_it_and_follows_at_the_lines_rate() {
         let arrivals = carried(&mut middleman(&["late to-unit at byte 2 by 10"]), Way::ToUnit, &[b'x'; 16]);
         let moments: Vec<f64> = arrivals.iter().map(|&(at, _)| (at * 10.0).round() / 10.0).collect();
-        // Ten wait, one character of 0.087 ms behind the other; the 13th has caught up.
+        // Ten wait, and arrive one character time (0.087 ms) apart; the 13th has caught up.
         assert_eq!(moments[..4], [0.0, 11.0, 11.1, 11.2]);
         assert_eq!(moments[12..], [12.0, 13.0, 14.0, 15.0], "{moments:?}");
     }
@@ -469,7 +470,7 @@ mod tests {
     }
 
     #[test]
-    fn the_xon_behind_a_counted_xoff_is_lost() {
+    fn the_xon_after_a_counted_xoff_is_lost() {
         let mut cable = middleman(&["no-xon at xoff 2"]);
         assert_eq!(text(&carried(&mut cable, Way::ToUnit, b"\x13\x11")), "\x13\x11", "the client's own does not count");
         let said = text(&carried(&mut cable, Way::FromUnit, b"\x13a\x11\x13b\x11c\x13\x11"));
@@ -483,7 +484,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pulled_cable_carries_nothing_on_either_way_until_it_is_in_again() {
+    fn a_pulled_cable_carries_nothing_in_either_direction_until_it_is_in_again() {
         let mut cable = middleman(&["latency 5", "unplug to-unit at byte 3 for 0.1"]);
         let at = Instant::from_millis;
         cable.carry(at(0), Way::FromUnit, b'!');
@@ -495,10 +496,27 @@ mod tests {
         cable.handle_timeout(at(103));
         cable.carry(at(104), Way::ToUnit, b'e');
         assert_eq!((cable.is_plugged(), cable.next_to_unit(at(109))), (true, Some(Arrival::Byte(b'e'))));
-        cable.plug(false);
+        cable.unplug(None);
         assert_eq!(cable.deadline(), None, "nobody plugs it in");
         cable.heal();
         assert!(cable.is_plugged() && cable.is_idle());
+    }
+
+    #[test]
+    fn what_was_late_or_awaited_when_the_cable_was_pulled_is_forgotten() {
+        let mut cable = middleman(&["latency 5", "late to-unit at byte 1 by 60000", "no-xon at xoff 1"]);
+        let at = Instant::from_millis;
+        cable.carry(at(0), Way::ToUnit, b'm');
+        cable.carry(at(0), Way::FromUnit, XOFF);
+        cable.note_client_heard(&[XOFF]);
+        cable.unplug(None);
+        assert!(!cable.client_is_held());
+        cable.plug();
+        cable.carry(at(100), Way::ToUnit, b'm');
+        cable.carry(at(100), Way::FromUnit, XON);
+        assert_eq!(cable.next_to_unit(at(105)), Some(Arrival::Byte(b'm')));
+        assert_eq!(cable.next_to_client(at(105)), Some(XON));
+        assert_eq!(cable.deadline(), None);
     }
 
     #[test]

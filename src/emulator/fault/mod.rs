@@ -2,7 +2,7 @@
 //!
 //! A [`Fault`] is one order, read from a few words; what it does to the bytes is in [`Middleman`], what it does to the
 //! unit is done by the stage (`scenario`). Numbers count from 1, and from the moment the fault is ordered. Chance comes
-//! from a seed, a stream of its own for each fault, so one fault more does not move the others.
+//! from a seed, with a stream of its own for each fault, so that one more fault does not move the others.
 //!
 //! What the unit itself finds and tells the network is called an error, as in its manual, and is in `errors`.
 
@@ -10,7 +10,7 @@ mod middleman;
 
 use std::fmt;
 
-pub use middleman::{Arrival, Deed, MOST_FAULTS, Middleman};
+pub use middleman::{Arrival, MOST_FAULTS, Middleman};
 
 use super::memory::Defect;
 use super::words::{LONGEST_OFF_S, WordError, Words, unknown};
@@ -20,38 +20,10 @@ use crate::time::Duration;
 /// Something that goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
-    /// Something happens to bytes on the line.
-    Line {
-        /// What.
-        mishap: Mishap,
-        /// To bytes on which way.
-        way: Way,
-        /// To which of them.
-        when: When,
-    },
-    /// The XON behind an XOFF of the unit is lost; counted are the XOFFs.
-    NoXon(When),
-    /// The microcontroller resets when it has got this S-record.
-    Reset {
-        /// Which one.
-        record: u64,
-    },
-    /// The supply fails when the unit has got this S-record.
-    PowerCut {
-        /// Which one.
-        record: u64,
-        /// After which time it comes back, if it does by itself.
-        off: Option<Duration>,
-    },
-    /// The cable is pulled: this byte and all behind it are lost, on both ways.
-    Unplug {
-        /// On which way bytes are counted.
-        way: Way,
-        /// Which one.
-        byte: u64,
-        /// After which time it is plugged in again, if it is by itself.
-        out: Option<Duration>,
-    },
+    /// On the line.
+    Line(LineFault),
+    /// To the unit, at a record.
+    Record(RecordFault),
     /// A word of program flash is spoiled.
     Flash {
         /// Its address.
@@ -59,9 +31,59 @@ pub enum Fault {
         /// How.
         defect: Defect,
     },
-    /// Every byte arrives so much later, on both ways, as behind a USB adapter.
+    /// The adapter is not an ideal one.
+    Adapter(Setting),
+}
+
+/// Something that goes wrong on the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LineFault {
+    /// Something happens to bytes.
+    Bytes {
+        /// What.
+        mishap: Mishap,
+        /// To bytes in which direction.
+        way: Way,
+        /// To which of them.
+        when: When,
+    },
+    /// The XON after an XOFF of the unit is lost; the XOFFs are counted.
+    NoXon(When),
+    /// The cable is pulled: this byte and all that follow are lost, in both directions.
+    Unplug {
+        /// In which direction bytes are counted.
+        way: Way,
+        /// Which one.
+        byte: u64,
+        /// After what time it is plugged in again, unless by hand.
+        out: Option<Duration>,
+    },
+}
+
+/// Something that happens to the unit when its loader has got an S-record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordFault {
+    /// Which one, counted from 1.
+    pub record: u64,
+    /// What.
+    pub deed: Deed,
+}
+
+/// What the unit suffers after a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Deed {
+    /// Its microcontroller resets.
+    Reset,
+    /// Its supply fails, and comes back after this time, unless by hand.
+    PowerCut(Option<Duration>),
+}
+
+/// What the adapter does to all bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// Every byte arrives this much later, in both directions, as through a USB adapter.
     Latency(Duration),
-    /// The adapter holds so many bytes of a client that sends ahead; they leave whatever the unit says.
+    /// It holds this many bytes of a client that sends ahead; they leave whatever the unit says.
     Queue(usize),
 }
 
@@ -76,7 +98,7 @@ pub enum Mishap {
     Corrupted,
     /// Its stop bit is not where it should be: the unit's receiver notices.
     Unreadable,
-    /// It arrives so much later, and what follows behind it.
+    /// It arrives this much later, and what follows after it.
     Late(Duration),
 }
 
@@ -94,23 +116,23 @@ pub enum Way {
 pub enum When {
     /// To this one, counted from 1.
     At(u64),
-    /// To one in so many, by chance.
+    /// To one in this many, by chance.
     OneIn(u64),
 }
 
 /// All faults with what they mean, for help texts.
 pub const HELP: &str = "lost|doubled|corrupted WAY at byte N | one in N    WAY is to-unit or from-unit
 unreadable to-unit at byte N | one in N            the unit's receiver sees that something came, not what
-late WAY at byte N | one in N [by MS]              by 20 ms if not said; what follows waits behind it
-no-xon at xoff N | one in N                        the XON behind an XOFF of the unit is lost
-reset at record N                                  behind the N-th S-record that the loader gets
-power-cut at record N [for SECONDS]                stays off if no time is said
-unplug WAY at byte N [for SECONDS]                 stays out if no time is said
+late WAY at byte N | one in N [by MS]              by 20 ms by default; what follows waits for it
+no-xon at xoff N | one in N                        the XON after an XOFF of the unit is lost
+reset at record N                                  after the N-th S-record that the loader gets
+power-cut at record N [for SECONDS]                stays off if no time is given
+unplug WAY at byte N [for SECONDS]                 stays out if no time is given
 flash worn-out|protected|stuck at word ADDRESS     it takes nothing, is refused, or does not come to an end
-latency MS                                         of the adapter, on both ways
-queue BYTES                                        that the adapter has taken and sends whatever the unit says";
+latency MS                                         of the adapter, in both directions
+queue BYTES                                        the adapter takes ahead, and sends whatever the unit says";
 
-/// How late a byte is if nothing is said: what the slowest adapters take.
+/// How late a byte is by default: what the slowest adapters take.
 const USUAL_LATENESS: Duration = Duration::from_millis(20);
 /// Longest lateness or latency: longer than any console waits.
 const LONGEST_LATE_MS: u64 = 60_000;
@@ -126,7 +148,7 @@ impl Fault {
     /// Reads a fault of a unit of a product, in any case of its letters.
     ///
     /// # Errors
-    /// If the words are none, with the column.
+    /// If the words are not a fault, with the column.
     pub fn read(line: &str, product: &Product) -> Result<Fault, WordError> {
         let mut words = Words::of(line);
         let fault = Fault::parse(&mut words, product)?;
@@ -143,19 +165,25 @@ impl Fault {
             "corrupted" => Mishap::Corrupted,
             "unreadable" => Mishap::Unreadable,
             "late" => Mishap::Late(USUAL_LATENESS),
-            "no-xon" => return When::parse(words, "xoff").map(Fault::NoXon),
-            "reset" => return Ok(Fault::Reset { record: at(words, "record")? }),
+            "no-xon" => return When::parse(words, "xoff").map(|when| Fault::Line(LineFault::NoXon(when))),
+            "reset" => return Ok(Fault::Record(RecordFault { record: at(words, "record")?, deed: Deed::Reset })),
             "power-cut" => {
-                return Ok(Fault::PowerCut { record: at(words, "record")?, off: for_a_time(words)? });
+                let record = at(words, "record")?;
+                return Ok(Fault::Record(RecordFault { record, deed: Deed::PowerCut(for_a_time(words)?) }));
             }
             "unplug" => {
                 let way = Way::parse(words, "to-unit, from-unit")?;
-                return Ok(Fault::Unplug { way, byte: at(words, "byte")?, out: for_a_time(words)? });
+                let byte = at(words, "byte")?;
+                return Ok(Fault::Line(LineFault::Unplug { way, byte, out: for_a_time(words)? }));
             }
             "flash" => return Fault::of_flash(words, product),
-            "latency" => return words.whole("a time in ms", 0..=LONGEST_LATE_MS).map(milliseconds).map(Fault::Latency),
+            "latency" => {
+                let latency = words.whole("a time in ms", 0..=LONGEST_LATE_MS)?;
+                return Ok(Fault::Adapter(Setting::Latency(milliseconds(latency))));
+            }
             "queue" => {
-                return words.whole("a number of bytes", 0..=LARGEST_QUEUE).map(|bytes| Fault::Queue(bytes as usize));
+                let bytes = words.whole("a number of bytes", 0..=LARGEST_QUEUE)?;
+                return Ok(Fault::Adapter(Setting::Queue(bytes as usize)));
             }
             _ => return Err(unknown(column, word, NAMES)),
         };
@@ -169,7 +197,7 @@ impl Fault {
             }
             mishap => mishap,
         };
-        Ok(Fault::Line { mishap, way, when })
+        Ok(Fault::Line(LineFault::Bytes { mishap, way, when }))
     }
 
     fn of_flash(words: &mut Words<'_>, product: &Product) -> Result<Fault, WordError> {
@@ -242,7 +270,7 @@ impl fmt::Display for Fault {
         let time =
             |time: &Option<Duration>| time.map_or_else(String::new, |time| format!(" for {}", time.as_secs_f64()));
         match self {
-            Fault::Line { mishap, way, when } => {
+            Fault::Line(LineFault::Bytes { mishap, way, when }) => {
                 let (name, by) = match mishap {
                     Mishap::Lost => ("lost", String::new()),
                     Mishap::Doubled => ("doubled", String::new()),
@@ -252,10 +280,12 @@ impl fmt::Display for Fault {
                 };
                 write!(f, "{name} {way} {}{by}", when.of("byte"))
             }
-            Fault::NoXon(when) => write!(f, "no-xon {}", when.of("xoff")),
-            Fault::Reset { record } => write!(f, "reset at record {record}"),
-            Fault::PowerCut { record, off } => write!(f, "power-cut at record {record}{}", time(off)),
-            Fault::Unplug { way, byte, out } => write!(f, "unplug {way} at byte {byte}{}", time(out)),
+            Fault::Line(LineFault::NoXon(when)) => write!(f, "no-xon {}", when.of("xoff")),
+            Fault::Line(LineFault::Unplug { way, byte, out }) => write!(f, "unplug {way} at byte {byte}{}", time(out)),
+            Fault::Record(RecordFault { record, deed: Deed::Reset }) => write!(f, "reset at record {record}"),
+            Fault::Record(RecordFault { record, deed: Deed::PowerCut(off) }) => {
+                write!(f, "power-cut at record {record}{}", time(off))
+            }
             Fault::Flash { word, defect } => {
                 let defect = match defect {
                     Defect::WornOut => "worn-out",
@@ -264,8 +294,8 @@ impl fmt::Display for Fault {
                 };
                 write!(f, "flash {defect} at word {word:#x}")
             }
-            Fault::Latency(latency) => write!(f, "latency {}", latency.as_millis()),
-            Fault::Queue(bytes) => write!(f, "queue {bytes}"),
+            Fault::Adapter(Setting::Latency(latency)) => write!(f, "latency {}", latency.as_millis()),
+            Fault::Adapter(Setting::Queue(bytes)) => write!(f, "queue {bytes}"),
         }
     }
 }
@@ -300,9 +330,11 @@ mod tests {
 
     #[test]
     fn every_fault_is_read_in_any_case_and_written_as_it_is_read() {
-        let line = |mishap, way, when| Fault::Line { mishap, way, when };
+        let line = |mishap, way, when| Fault::Line(LineFault::Bytes { mishap, way, when });
+        let unplug = |way, byte, out| Fault::Line(LineFault::Unplug { way, byte, out });
+        let at_record = |record, deed| Fault::Record(RecordFault { record, deed });
         let late = |ms| Mishap::Late(Duration::from_millis(ms));
-        use {Mishap::*, Way::*, When::*};
+        use {Deed::*, Mishap::*, Way::*, When::*};
         let table = [
             ("lost to-unit at byte 5000", line(Lost, ToUnit, At(5000))),
             ("Doubled FROM-unit one in 200", line(Doubled, FromUnit, OneIn(200))),
@@ -310,21 +342,18 @@ mod tests {
             ("unreadable to-unit at byte 7", line(Unreadable, ToUnit, At(7))),
             ("late from-unit at byte 3", line(late(20), FromUnit, At(3))),
             ("  late to-unit  one in 90 by 16", line(late(16), ToUnit, OneIn(90))),
-            ("no-xon at xoff 3", Fault::NoXon(At(3))),
-            ("no-xon one in 50", Fault::NoXon(OneIn(50))),
-            ("reset at record 40", Fault::Reset { record: 40 }),
-            ("power-cut at record 1", Fault::PowerCut { record: 1, off: None }),
-            ("power-cut at record 9 for 0.5", Fault::PowerCut { record: 9, off: Some(Duration::from_millis(500)) }),
-            ("unplug to-unit at byte 12", Fault::Unplug { way: ToUnit, byte: 12, out: None }),
-            (
-                "unplug from-unit at byte 12 for 2",
-                Fault::Unplug { way: FromUnit, byte: 12, out: Some(Duration::from_secs(2)) },
-            ),
+            ("no-xon at xoff 3", Fault::Line(LineFault::NoXon(At(3)))),
+            ("no-xon one in 50", Fault::Line(LineFault::NoXon(OneIn(50)))),
+            ("reset at record 40", at_record(40, Reset)),
+            ("power-cut at record 1", at_record(1, PowerCut(None))),
+            ("power-cut at record 9 for 0.5", at_record(9, PowerCut(Some(Duration::from_millis(500))))),
+            ("unplug to-unit at byte 12", unplug(ToUnit, 12, None)),
+            ("unplug from-unit at byte 12 for 2", unplug(FromUnit, 12, Some(Duration::from_secs(2)))),
             ("flash worn-out at word 0xFFFF", Fault::Flash { word: 0xFFFF, defect: Defect::WornOut }),
             ("flash Protected at word 512", Fault::Flash { word: 512, defect: Defect::Protected }),
             ("flash stuck at word 0x0", Fault::Flash { word: 0, defect: Defect::Stuck }),
-            ("latency 16", Fault::Latency(Duration::from_millis(16))),
-            ("queue 256", Fault::Queue(256)),
+            ("latency 16", Fault::Adapter(Setting::Latency(Duration::from_millis(16)))),
+            ("queue 256", Fault::Adapter(Setting::Queue(256))),
         ];
         for (text, fault) in table {
             assert_eq!(read(text), Ok(fault), "{text}");
@@ -374,7 +403,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_words_behind_a_fault_are_read_or_refused_and_what_is_read_is_written_the_same(
+        fn any_words_after_a_fault_are_read_or_refused_and_what_is_read_is_written_the_same(
             name in "lost|late|no-xon|reset|power-cut|unplug|flash stuck|latency|queue",
             rest in "( (to-unit|from-unit|at|byte|record|xoff|word|one|in|by|for|[0-9]{1,3}|0x[0-9a-f]{1,4}|0.25)){0,6}"
         ) {

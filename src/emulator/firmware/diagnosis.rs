@@ -23,7 +23,7 @@ impl Firmware {
             },
         ];
         let row = measurement::row(objects, Source::FieldValue);
-        // A row may begin with the cold junction, which is no channel.
+        // A row may begin with the cold junction, which is not a channel.
         let before = row.readings.len() - usize::from(board.product.measurement.channels);
         let inputs = layout.channels.iter().zip(&row.readings).skip(before);
         let channels = (1u8..).zip(inputs).map(|(number, (name, reading))| ChannelDiagnosis {

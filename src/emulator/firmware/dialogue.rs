@@ -1,4 +1,4 @@
-//! The menu's keys, the questions behind them, and the view of the object dictionary (manuals, section 4.1).
+//! The menu's keys, the questions they lead to, and the view of the object dictionary (manuals, section 4.1).
 //!
 //! One dialogue at a time gets the keys. What is printed meanwhile by itself, rows and pages, is in the parent module.
 
@@ -21,7 +21,7 @@ const PASSWORD: &str = "AXIO-2010";
 #[derive(Debug)]
 pub(super) enum Dialogue {
     Menu,
-    /// The source that was chosen, where the question wants Enter behind its key.
+    /// The source that was chosen, where the question wants Enter after its key.
     StreamSource {
         chosen: Option<Source>,
     },
@@ -37,7 +37,7 @@ pub(super) enum Dialogue {
     },
     /// The object dictionary is shown; scanning and CAN are halted since the moment it was opened.
     View {
-        /// Objects that have been shown behind the block of PDO parameters.
+        /// Objects that have been shown after the block of PDO parameters.
         shown: usize,
         since: Instant,
     },

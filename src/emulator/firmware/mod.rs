@@ -1,7 +1,7 @@
 //! The application: power-up, what it prints by itself, and its side of the network (manuals, chapter 4).
 //!
-//! What it says is worded by [`Dialect`]; who it is stands in the program flash it was started from; what it measures and
-//! is set to lies in its object dictionary ([`Objects`]). Keys come one by one; while the port has more to send than
+//! What it says is worded by [`Dialect`]; what it is comes from the program flash it was started from; what it measures and
+//! its settings are in its object dictionary ([`Objects`]). Keys come one by one; while the port has more to send than
 //! [`BLOCKED_AT`] characters, the program is stuck in printing and keys wait, as many as the receiver can keep. What a key
 //! does is in `dialogue`.
 
@@ -14,7 +14,7 @@ mod view;
 use std::collections::VecDeque;
 
 use super::dialect::{Dialect, Sentence};
-use super::errors::{ActiveErrors, Class, ErrorEvent};
+use super::errors::{ActiveErrors, Class};
 use super::measurement::{self, Measurement};
 use super::memory::StreamSetting;
 use super::network::{Network, NetworkState, NmtCommand};
@@ -23,6 +23,7 @@ use super::uart::{XOFF, XON};
 use super::{Board, Refusal, Reset};
 use crate::canopen::{ObjectAddress, Value};
 use crate::device::dictionary::{Group, Object};
+use crate::device::emergency::Emergency;
 use crate::image::Identity;
 use crate::time::{Duration, Instant};
 use dialogue::Dialogue;
@@ -37,7 +38,7 @@ const KEYS_KEPT: usize = 64;
 /// Characters that may wait to be sent together with a row. What does not fit is dropped whole: the line is behind
 /// (errata E-105, E-119).
 const ROW_BUFFER: usize = 512;
-/// The same with a page of diagnostics: it has room behind any number of rows, and all that waits is less than a tenth of
+/// The same with a page of diagnostics: it has room after any number of rows, and all that waits is less than a tenth of
 /// a second of the line.
 const PAGE_BUFFER: usize = 1_024;
 
@@ -49,7 +50,7 @@ pub struct Firmware {
     started_at: Instant,
     dialogue: Dialogue,
     keys: VecDeque<u8>,
-    /// The last key was CR: an LF behind it belongs to it.
+    /// The last key was CR: an LF after it belongs to it.
     after_return: bool,
     objects: Objects,
     measurement: Measurement,
@@ -125,10 +126,10 @@ impl Firmware {
         let now = board.now;
         if !self.is_viewing() {
             self.network.step(now);
-            if self.measurement.step(now, board.sensors, &mut self.objects, &mut self.errors) {
+            if let Some(raised) = self.measurement.step(now, board.sensors, &mut self.objects, &mut self.errors) {
                 self.row = None;
+                self.react(&raised);
             }
-            self.react();
         }
         if self.row_at.is_some_and(|due| due <= now) {
             let stream = board.parameters.values().stream;
@@ -148,14 +149,12 @@ impl Firmware {
         }
     }
 
-    /// Object 1029h: what an error that has become active does to the node's state.
-    fn react(&mut self) {
-        while let Some(event) = self.errors.poll_event() {
-            if let ErrorEvent::Raised(error) = event {
-                let class = Class::of(error, self.objects.product().measurement.sensors);
-                let reaction = self.objects.integer(0x1029, class.sub_index());
-                self.network.react(reaction);
-            }
+    /// Object 1029h: what errors that have become active do to the node's state.
+    fn react(&mut self, raised: &[Emergency]) {
+        for &error in raised {
+            let class = Class::of(error, self.objects.product().measurement.sensors);
+            let reaction = self.objects.integer(0x1029, class.sub_index());
+            self.network.react(reaction);
         }
     }
 
@@ -235,7 +234,7 @@ impl Firmware {
         self.row_at = stream.on.then(|| self.measurement.first_data_at().max(board.now + stream.period()));
     }
 
-    /// Goes on behind the view, which was opened at a moment. What had not become valid by then is not printed yet: no
+    /// Goes on after the view, which was opened at this moment. What had not become valid by then is not printed yet: no
     /// measured values before the converters have settled (section 1.1; errata B-199, C-15).
     fn resume(&mut self, halted_at: Instant, now: Instant) {
         self.measurement.resume(halted_at, now);

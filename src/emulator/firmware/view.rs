@@ -12,7 +12,7 @@ pub fn pdo_block(product: &'static Product) -> impl Iterator<Item = &'static Obj
     product.dictionary.objects().iter().filter(|object| is_pdo(object))
 }
 
-/// The object at this place of the walk behind the block, `None` behind the last.
+/// The object at this place of the walk that follows the block, `None` after the last.
 pub fn object(product: &'static Product, place: usize) -> Option<&'static Object> {
     product.dictionary.objects().iter().filter(|object| !is_pdo(object)).nth(place)
 }

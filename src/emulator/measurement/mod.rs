@@ -176,10 +176,16 @@ impl Measurement {
         }
     }
 
-    /// Takes the reading that is due. Says whether anything new has been published.
-    pub fn step(&mut self, now: Instant, sensors: &Sensors, objects: &mut Objects, errors: &mut ActiveErrors) -> bool {
+    /// Takes the reading that is due. If anything new has been published, gives the errors that have become active.
+    pub fn step(
+        &mut self,
+        now: Instant,
+        sensors: &Sensors,
+        objects: &mut Objects,
+        errors: &mut ActiveErrors,
+    ) -> Option<Vec<Emergency>> {
         if self.reading_at > now {
-            return false;
+            return None;
         }
         let reading_at = self.reading_at;
         self.reading_at += self.scan.reading_time();
@@ -191,21 +197,22 @@ impl Measurement {
         };
         objects.set(0x5000, 0, Value::Real32(sensors.supply(now) as f32));
         if now < self.first_data_at {
-            return false;
+            return None;
         }
+        let mut raised = Vec::new();
         let all = !std::mem::replace(&mut self.published, true);
         for (number, channel) in (1u8..).zip(&mut self.channels) {
-            // A channel that is switched off says so at once, whoever is being read.
+            // A channel that is switched off says so at once, whichever is being read.
             let off = objects.integer(0x6112, number) == 0;
             if off {
                 channel.reading = Reading::Off;
             }
             if all || off || updated.includes(number) {
-                channel.evaluate(now, number, objects, errors);
+                raised.extend(channel.evaluate(now, number, objects, errors));
             }
         }
         self.average(objects);
-        true
+        Some(raised)
     }
 
     /// Averages of the banks and of all, over the channels that have a temperature (sections 1.3 and 3.4.3 to 3.4.7).
@@ -262,7 +269,14 @@ impl Settings {
 }
 
 impl Channel {
-    fn evaluate(&mut self, now: Instant, number: u8, objects: &mut Objects, errors: &mut ActiveErrors) {
+    /// Publishes what the present reading comes to. Gives the errors that have become active.
+    fn evaluate(
+        &mut self,
+        now: Instant,
+        number: u8,
+        objects: &mut Objects,
+        errors: &mut ActiveErrors,
+    ) -> Vec<Emergency> {
         let (mut raised, mut cleared) = self.watch(now, number, objects);
         let sensor_error = match self.reading {
             Reading::Celsius(_) | Reading::Off => None,
@@ -275,7 +289,7 @@ impl Channel {
             raised.extend(sensor_error);
             cleared.extend(std::mem::replace(&mut self.sensor_error, sensor_error));
         }
-        errors.change(&raised, &cleared, objects);
+        let raised = errors.change(&raised, &cleared, objects);
         let (factor, offset) = (objects.number(0x6126, number), objects.number(0x6127, number));
         let (field_value, process_value) = match self.reading {
             Reading::Celsius(celsius) => (Value::Real32(celsius as f32), scaled(celsius, factor, offset)),
@@ -288,6 +302,7 @@ impl Channel {
         objects.set(0x6100, number, field_value);
         objects.set(0x7130, number, Value::Integer16(process_value));
         objects.set(0x6150, number, Value::Unsigned8(self.status()));
+        raised
     }
 
     /// Compares with the thresholds: only what is exceeded for the reaction delay without a break counts, and what

@@ -189,7 +189,7 @@ impl Rtds {
     }
 
     /// The next channel that is on, or the current source: the sweep is over. Channels that are off are passed over, and
-    /// their wires are read anew when they are on again.
+    /// their wires are read again when they are on again.
     fn following(&mut self, objects: &Objects, number: u8) -> Slot {
         for next in number + 1..=self.channels.len() as u8 {
             if objects.integer(0x6112, next) != 0 {

@@ -1,6 +1,5 @@
 //! What both products make of their inputs, in virtual time, against the acceptance items.
 
-use super::super::errors::ErrorEvent;
 use super::super::knob::{Knob, Lead};
 use super::super::rtd_curve::R0;
 use super::*;
@@ -144,13 +143,14 @@ fn all_thermocouples_are_read_together_and_nothing_is_said_before_its_time() {
     let mut errors = ActiveErrors::default();
     while measurement.deadline() < Instant::from_millis(3_000) {
         let now = measurement.deadline();
-        assert!(!measurement.step(now, &sensors, &mut objects, &mut errors));
+        assert_eq!(measurement.step(now, &sensors, &mut objects, &mut errors), None);
     }
     assert_eq!((objects.get(0x6100, 1), errors.count()), (Value::NOT_A_NUMBER, 0));
     let averages = [1, 2, 3].map(|sub| (objects.get(0x2100, sub), objects.integer(0x2130, sub)));
     assert_eq!(averages, [(Value::NOT_A_NUMBER, -1); 3], "no average of nothing");
     assert_eq!(measurement.deadline(), Instant::from_millis(3_000));
-    assert!(measurement.step(Instant::from_millis(3_000), &sensors, &mut objects, &mut errors));
+    let raised = measurement.step(Instant::from_millis(3_000), &sensors, &mut objects, &mut errors);
+    assert_eq!(raised, Some(vec![Emergency { code: INPUT_OVERLOAD, channel: 3, description: 0x02 }]));
     assert!(objects.number(0x6100, 1) > 20.0 && objects.number(0x6100, 4) > 20.0);
     assert_eq!((objects.integer(0x6150, 3), errors.count()), (0x03, 1));
     assert_eq!(measurement.deadline(), Instant::from_millis(3_200));
@@ -173,7 +173,7 @@ fn process_values_follow_the_formula_and_saturate() {
         bench.write(0x6126, 1, 18.0);
         bench.write(0x6127, 1, 320.0);
         bench.run_ms(1_000);
-        assert!((bench.process_value(1) - 2120).abs() <= 1, "the next value is scaled anew");
+        assert!((bench.process_value(1) - 2120).abs() <= 1, "the next value is scaled with it");
     }
 }
 
@@ -222,14 +222,14 @@ fn an_open_circuit_takes_the_place_of_threshold_errors() {
     bench.celsius(1, 300.0, 400);
     assert_eq!(bench.errors(), [0x4001_F011, 0x2001_F011]);
     bench.turn(Knob::Open(1, None));
-    bench.run_ms(1_800);
+    for _ in 0..9 {
+        bench.run_ms(200);
+        assert_ne!(bench.active.count(), 0, "at no moment is there no error");
+    }
     assert_eq!((bench.status(1), bench.errors()), (0x03, vec![0x0201_F001]));
     bench.turn(Knob::Repair(1));
     bench.run_ms(200);
     assert_eq!((bench.status(1), bench.errors()), (0x41, vec![0x4001_F011, 0x2001_F011]));
-    let events = std::iter::from_fn(|| bench.active.poll_event());
-    let without = events.filter(|event| matches!(event, ErrorEvent::Cleared { last: true, .. })).count();
-    assert_eq!(without, 0, "at no moment is there no error");
 }
 
 // B-073
@@ -292,7 +292,7 @@ fn a_threshold_counts_when_it_was_exceeded_without_a_break_for_the_delay() {
         bench.celsius(1, 130.0, 4_000);
         bench.celsius(1, 124.9, sweep);
         bench.celsius(1, 130.0, 4_000);
-        assert_eq!(bench.status(1), 0x00, "the time began anew");
+        assert_eq!(bench.status(1), 0x00, "the time started over");
         bench.run_ms(1_000 + 2 * sweep);
         assert_eq!(bench.status(1), 0x20);
     }

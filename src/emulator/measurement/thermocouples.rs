@@ -11,7 +11,7 @@ use crate::time::{Duration, Instant};
 pub(super) const SCAN_TIME: Duration = Duration::from_millis(200);
 /// An open circuit is found in the lowest of eight gains, one scan each (errata E-51: at most 1.6 s).
 const SCANS_TO_FIND_OPEN: u8 = 8;
-/// One step of the converter in µV: 24 bits over 2.5 V behind a gain of 32 (a guess that leaves every type its 0.001 °C
+/// One step of the converter in µV: 24 bits over 2.5 V after a gain of 32 (a guess that leaves every type its 0.001 °C
 /// but at the coldest end).
 const STEP_UV: f64 = 2.5e6 / 32.0 / 8_388_608.0;
 /// The largest voltage at that gain, in µV; more is an open circuit (errata E-41).

@@ -112,7 +112,7 @@ impl Flash {
         (first..first + self.map.page_words).map(|address| self.word(address)).collect()
     }
 
-    /// Spoils a word. An address behind the last word is nowhere, and so is the defect.
+    /// Spoils a word. An address beyond the last word is nowhere, and so is the defect.
     pub fn spoil(&mut self, word: u32, defect: Defect) {
         if !self.defects.contains(&(word, defect)) {
             self.defects.push((word, defect));

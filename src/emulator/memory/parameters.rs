@@ -243,15 +243,15 @@ impl Parameters {
 }
 
 /// Reads the list of saved parameters, which is in order and names each once: so what is saved next has room, whatever
-/// was there. Entries that are no parameters of the product are left out: the list may be from another version of its
+/// was there. Entries that are not parameters of the product are left out: the list may be from another version of its
 /// dictionary.
 fn read_saved(product: &Product, bytes: &[u8]) -> Option<Saved> {
     let (count, mut rest) = bytes.split_first_chunk::<2>()?;
     let mut saved = Saved::new();
     let mut last = None;
     for _ in 0..u16::from_le_bytes(*count) {
-        let (head, behind) = rest.split_first_chunk::<4>()?;
-        let (value, behind) = behind.split_at_checked(usize::from(head[3]))?;
+        let (head, after) = rest.split_first_chunk::<4>()?;
+        let (value, after) = after.split_at_checked(usize::from(head[3]))?;
         let at = ObjectAddress::new(u16::from_le_bytes([head[0], head[1]]), head[2]);
         if last.replace(at).is_some_and(|last| last >= at) {
             return None;
@@ -259,7 +259,7 @@ fn read_saved(product: &Product, bytes: &[u8]) -> Option<Saved> {
         let parameter = product.dictionary.entry(at).filter(|entry| is_parameter(at, entry));
         let known = parameter.and_then(|entry| entry.data_type.decode(value));
         saved.extend(known.map(|value| (at, value)));
-        rest = behind;
+        rest = after;
     }
     rest.is_empty().then_some(saved)
 }
@@ -518,7 +518,7 @@ mod tests {
         memory.restore(&mut stores, Some(Group::Application));
         let kept: Vec<ObjectAddress> = memory.values().saved.iter().map(|(at, _)| *at).collect();
         assert_eq!(kept, [at(0x100C, 0), at(0x4030, 1)]);
-        // E-94: saving behind a restore keeps the values that are in use.
+        // E-94: saving after a restore keeps the values that are in use.
         memory.save(&mut stores, None, &objects);
         assert_eq!(memory.objects().read(at(0x6110, 1)), Ok(Value::Unsigned16(2)));
     }

@@ -20,7 +20,7 @@ pub struct Objects {
     values: Vec<(ObjectAddress, Value)>,
 }
 
-/// What the unit has to do behind a write.
+/// What the unit has to do after a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// Nothing.
@@ -111,7 +111,7 @@ impl Objects {
     /// # Panics
     /// If the product has no such entry, or it is a REAL32.
     pub fn integer(&self, index: u16, sub: u8) -> i64 {
-        self.get(index, sub).as_integer().unwrap_or_else(|| panic!("{index:04X}h is no whole number"))
+        self.get(index, sub).as_integer().unwrap_or_else(|| panic!("{index:04X}h is not a whole number"))
     }
 
     /// The firmware reads a number.
@@ -266,7 +266,7 @@ impl Objects {
 
 /// Whether an entry is kept by 1010h: what can be written, but the list of errors and the two commands.
 pub fn is_parameter(at: ObjectAddress, entry: &Entry) -> bool {
-    // The constants follow 3000h and are kept with it, whoever may write them at the moment.
+    // The constants follow 3000h and are kept with it, whether or not they can be written at the moment.
     entry.access == Access::ReadWrite && !matches!(at.index, 0x1003 | 0x1010 | 0x1011) && Group::of(at.index).is_some()
 }
 

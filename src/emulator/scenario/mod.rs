@@ -1,6 +1,6 @@
 //! Scenarios: what happens to a unit, and when, as a file says it.
 //!
-//! A file is TOML with deeds at moments and ramps between moments; `docs/emulator.md` describes it. A [`Scenario`] is
+//! A file is TOML, with deeds at moments and ramps between moments; `docs/emulator.md` describes it. A [`Scenario`] is
 //! what was read; the [`Stage`] plays it.
 
 mod stage;
@@ -23,7 +23,7 @@ use crate::time::Duration;
 pub struct Scenario {
     /// Deeds with their moments, in order.
     deeds: Vec<(Duration, Verb)>,
-    /// After this time it begins anew.
+    /// After this time it starts over.
     repeat: Option<Duration>,
 }
 
@@ -58,20 +58,20 @@ struct RawRamp {
 
 /// Largest file that is read; a scenario of a day with a deed every second has half of it.
 pub const LARGEST_FILE: u64 = 4 << 20;
-/// Longest scenario.
+/// The longest scenario.
 const LONGEST_S: f64 = 7.0 * 86_400.0;
 /// Time between two steps of a ramp: the fastest scan of any unit.
 const RAMP_STEP: Duration = Duration::from_millis(100);
-/// Shortest round of a scenario that repeats: in less no scan notices anything, and the unit would never be done with it.
+/// The shortest round of a scenario that repeats: in less, no scan would notice anything and the unit would never get done.
 const SHORTEST_ROUND: Duration = RAMP_STEP;
-/// Deeds of one scenario at most, the steps of its ramps included.
+/// The most deeds of one scenario, the steps of its ramps included.
 const MOST_DEEDS: usize = 1_000_000;
 
 impl Scenario {
     /// Reads a file for a unit of a product. `None` if the file is for another product.
     ///
     /// # Errors
-    /// If it is none, with everything that is wrong with it.
+    /// If it is not a scenario, with everything that is wrong with it.
     pub fn read(file: &str, text: &str, product: &Product) -> Result<Option<Scenario>, Vec<Complaint>> {
         let mut complaints = Complaints::about(file, text);
         let raw: RawScenario = match toml::from_str(text) {
@@ -82,7 +82,8 @@ impl Scenario {
             match Product::named(named.get_ref()) {
                 None => {
                     let known: Vec<String> = Product::all().iter().map(|known| known.name.to_lowercase()).collect();
-                    let message = format!("'{}' is no product; there is {}", shown(named.get_ref()), known.join(", "));
+                    let message =
+                        format!("'{}' is not a product; there is {}", shown(named.get_ref()), known.join(", "));
                     complaints.add(named.span().start, "product", message);
                     return complaints.or(None);
                 }
@@ -93,7 +94,7 @@ impl Scenario {
         let mut reading = Reading {
             text,
             product,
-            // A file for units of several products may turn what some of them have not.
+            // A file for several products may turn what some of them do not have.
             terminals: raw.product.as_ref().map(|_| Sensors::new(product, 0)),
             complaints,
             deeds: Vec::new(),
@@ -123,6 +124,9 @@ struct Reading<'a> {
 impl Reading<'_> {
     fn moment(&mut self, moment: &RawMoment) {
         let at = self.seconds(&moment.seconds, "at.seconds").unwrap_or_default();
+        if !self.has_room_for(moment.deeds.len(), moment.seconds.span().start, "at") {
+            return;
+        }
         for deed in &moment.deeds {
             match self.act(deed.get_ref()) {
                 Ok(verb) => self.deeds.push((at, verb)),
@@ -140,7 +144,7 @@ impl Reading<'_> {
             return;
         }
         let (start, end) = (*ramp.start.get_ref(), *ramp.end.get_ref());
-        // TOML has words for them, and what is between would be no number either.
+        // TOML has words for infinity and NaN, and what lies between would not be a number either.
         for (raw, key) in [(&ramp.start, "ramp.start"), (&ramp.end, "ramp.end")] {
             if !raw.get_ref().is_finite() {
                 self.complaints.add(raw.span().start, key, format!("{} is not a number like 23.5", raw.get_ref()));
@@ -150,8 +154,7 @@ impl Reading<'_> {
             return;
         }
         let steps = ramp_steps(to - from);
-        if self.deeds.len() + steps as usize >= MOST_DEEDS {
-            self.complaints.add(ramp.from.span().start, "ramp", format!("more than {MOST_DEEDS} steps in all"));
+        if !self.has_room_for(steps as usize + 1, ramp.from.span().start, "ramp") {
             return;
         }
         for step in 0..=steps {
@@ -167,7 +170,16 @@ impl Reading<'_> {
         }
     }
 
-    /// After which time the scenario begins anew.
+    /// Whether there is room for this many more deeds; complains if not.
+    fn has_room_for(&mut self, deeds: usize, place: usize, key: &str) -> bool {
+        let has_room = self.deeds.len() + deeds <= MOST_DEEDS;
+        if !has_room {
+            self.complaints.add(place, key, format!("more than {MOST_DEEDS} deeds in all, steps of ramps included"));
+        }
+        has_room
+    }
+
+    /// After what time the scenario starts over.
     fn round(&mut self, repeat: &Spanned<f64>) -> Option<Duration> {
         let after = self.seconds(repeat, "repeat")?;
         let last = self.deeds.last().map_or(Duration::ZERO, |(at, _)| *at);
@@ -194,8 +206,8 @@ impl Reading<'_> {
         Some(Duration::from_secs_f64(value))
     }
 
-    /// A verb that does something, as a file has nobody to answer; at the terminals, where they are given, something that
-    /// can be done there.
+    /// A verb that does something, as nobody would hear an answer; where the terminals are known, something that can be
+    /// done there.
     fn act(&mut self, line: &str) -> Result<Verb, WordError> {
         match Verb::read(line, self.product)? {
             Verb::Read(_) | Verb::Status => {
@@ -210,11 +222,11 @@ impl Reading<'_> {
     }
 }
 
-/// Where in the file a column of a deed is. Where the deed is not written as it reads (escapes, several lines), where it
-/// begins.
+/// Where in the file a column of a deed is; where the deed begins if it is not written as it reads (escapes, several
+/// lines).
 fn place_of(text: &str, deed: &Spanned<String>, column: usize) -> usize {
     let start = deed.span().start;
-    // Behind the opening quotation mark.
+    // After the opening quotation mark.
     let written = text.get(start + 1..).is_some_and(|rest| rest.starts_with(deed.get_ref().as_str()));
     let before: usize = deed.get_ref().chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
     if written { start + 1 + before } else { start }
@@ -265,7 +277,7 @@ mod tests {
                 "test.toml:6:7: ramp.end: inf is not a number like 23.5",
             ),
             ("[[at]]\nseconds = 1e99\ndo = []", "test.toml:2:11: at.seconds: 1e99 is not 0 to 604800 seconds"),
-            ("product = 'axtc5'", "test.toml:1:11: product: 'axtc5' is no product; there is axtc4co, axrtd8co"),
+            ("product = 'axtc5'", "test.toml:1:11: product: 'axtc5' is not a product; there is axtc4co, axrtd8co"),
             (
                 "repeat = 1\n[[at]]\nseconds = 2\ndo = []\n[[at]]\nseconds = 3\ndo = ['freeze']",
                 "test.toml:1:10: repeat: 1 s is",
@@ -284,7 +296,7 @@ mod tests {
             ),
             (
                 "[[ramp]]\nfrom = 0\nto = 200_000\nwhat = 'supply'\nstart = 1\nend = 2",
-                "test.toml:2:8: ramp: more than 1000000 steps in all",
+                "test.toml:2:8: ramp: more than 1000000 deeds in all, steps of ramps included",
             ),
             ("repeat = 0.000000001", "test.toml:1:10: repeat: 0.000000001 s is less than 0.1 s"),
             // Blanks of two bytes; one written as an escape; a deed on a line of its own.
@@ -293,7 +305,7 @@ mod tests {
             ("[[at]]\nseconds = 1\ndo = ['''\nopen 3 X''']", "test.toml:3:7: at.do: 'X' is not known"),
             ("[[at", "test.toml:1:5: "),
             // Nothing of a file reaches the terminal as a control code.
-            ("product = \"\\u001b[2J\"", "test.toml:1:11: product: '^[[2J' is no product; there is axtc4co"),
+            ("product = \"\\u001b[2J\"", "test.toml:1:11: product: '^[[2J' is not a product; there is axtc4co"),
             ("\"\\u001b[2J\" = 1", "test.toml:1:1: unknown field `^[[2J`, expected one of `product`"),
         ];
         for (text, expected) in table {
@@ -319,5 +331,25 @@ mod tests {
         let for_all = "[[at]]\nseconds = 1\ndo = ['set 8 temperature 20']";
         assert!(Scenario::read("test.toml", for_all, product()).is_ok(), "another product has that input");
         assert_eq!(Scenario::read("test.toml", "product = 'axrtd8co'", product()), Ok(None), "for another product");
+    }
+
+    #[test]
+    fn deeds_at_moments_are_limited_as_those_of_ramps_are() {
+        let text = "[[at]]\nseconds = 1\ndo = ['heal']";
+        let raw: RawScenario = toml::from_str(text).expect("a scenario");
+        let mut reading = Reading {
+            text,
+            product: product(),
+            terminals: None,
+            complaints: Complaints::about("test.toml", text),
+            deeds: vec![(Duration::ZERO, Verb::Heal); MOST_DEEDS - 1],
+        };
+        reading.moment(&raw.at[0]);
+        assert_eq!(reading.deeds.len(), MOST_DEEDS);
+        reading.moment(&raw.at[0]);
+        assert_eq!(reading.deeds.len(), MOST_DEEDS);
+        let complaints = reading.complaints.or(()).expect_err("one more than there may be");
+        let found: Vec<String> = complaints.iter().map(Complaint::to_string).collect();
+        assert_eq!(found, ["test.toml:2:11: at: more than 1000000 deeds in all, steps of ramps included"]);
     }
 }

@@ -25,7 +25,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// A unit to which only happens what is done by hand.
+    /// A unit to which nothing happens but what is done by hand.
     pub fn bare(unit: Unit) -> Self {
         Stage::new(unit, Scenario::default())
     }
@@ -43,8 +43,8 @@ impl Stage {
         }
     }
 
-    /// The same with these faults from the beginning on; `seed` decides what chance decides about them, and about those
-    /// ordered later.
+    /// The same with these faults from the start; `seed` decides what chance decides about them, and about those ordered
+    /// later.
     pub fn with_faults(mut self, seed: u64, faults: &[Fault]) -> Self {
         self.middleman = Middleman::new(seed);
         for &fault in faults {
@@ -63,7 +63,7 @@ impl Stage {
         &mut self.unit
     }
 
-    /// Whether the client has heard XOFF and not yet XON. A unit that starts anew holds nobody.
+    /// Whether the client has heard XOFF and not yet XON. A unit that restarts holds nobody.
     pub fn holds_client(&self) -> bool {
         self.middleman.client_is_held() && self.unit.running() == Running::Loader
     }
@@ -114,10 +114,12 @@ impl Stage {
     }
 
     fn suffer(&mut self, fault: Fault) {
-        if let Fault::Flash { word, defect } = fault {
-            self.unit.spoil_word(word, defect);
+        match fault {
+            Fault::Line(fault) => self.middleman.order_on_line(fault),
+            Fault::Record(fault) => self.middleman.order_at_record(fault),
+            Fault::Flash { word, defect } => self.unit.spoil_word(word, defect),
+            Fault::Adapter(setting) => self.middleman.set(setting),
         }
-        self.middleman.order(fault);
     }
 
     /// What the unit has sent goes on the cable, and what has arrived to the client.
@@ -193,7 +195,7 @@ impl Stage {
                 self.unit.write_object(now, *at, &value.encode()).map_err(refused)?;
             }
             Verb::Read(at) => {
-                let value = self.unit.read_object(*at).map_err(|refusal| format!("{at}: {refusal}"))?;
+                let value = self.unit.read_object(now, *at).map_err(|refusal| format!("{at}: {refusal}"))?;
                 let entry = self.unit.product().dictionary.entry(*at);
                 let meaning = entry.and_then(|entry| entry.meaning(value)).map(|text| format!(" ({text})"));
                 let unit = entry.and_then(|entry| entry.unit.as_deref()).map(|unit| format!(" {unit}"));
@@ -207,8 +209,8 @@ impl Stage {
                 self.middleman.heal();
                 self.unit.repair_flash();
             }
-            Verb::Plug => self.middleman.plug(true),
-            Verb::Unplug => self.middleman.plug(false),
+            Verb::Plug => self.middleman.plug(),
+            Verb::Unplug => self.middleman.unplug(None),
             Verb::Status => return Ok(Some(self.status())),
         }
         Ok(None)
@@ -325,8 +327,8 @@ mod tests {
         stage
     }
 
-    fn celsius(stage: &Stage, channel: u8) -> f64 {
-        stage.unit.read_object(ObjectAddress::new(0x6100, channel)).expect("it runs").as_f64()
+    fn celsius(stage: &mut Stage, now: Instant, channel: u8) -> f64 {
+        stage.unit.read_object(now, ObjectAddress::new(0x6100, channel)).expect("it runs").as_f64()
     }
 
     fn at(millis: u64) -> Instant {
@@ -350,19 +352,20 @@ mod tests {
             "#,
         );
         stage.handle_timeout(at(9_900));
-        assert!(celsius(&stage, 1) < 120.0 && celsius(&stage, 3) > 70.0);
+        assert!(celsius(&mut stage, at(9_900), 1) < 120.0 && celsius(&mut stage, at(9_900), 3) > 70.0);
         stage.handle_timeout(at(12_500));
-        assert!((celsius(&stage, 1) - 250.0).abs() < 0.01);
-        assert!(celsius(&stage, 3).is_nan());
+        assert!((celsius(&mut stage, at(12_500), 1) - 250.0).abs() < 0.01);
+        assert!(celsius(&mut stage, at(12_500), 3).is_nan());
         for (seconds, expected) in [(20u64, 25.0), (50, 85.0), (80, 145.0), (90, 145.0)] {
-            stage.handle_timeout(at(seconds * 1_000 + 300));
-            let found = celsius(&stage, 2);
+            let now = at(seconds * 1_000 + 300);
+            stage.handle_timeout(now);
+            let found = celsius(&mut stage, now, 2);
             assert!((found - expected).abs() < 1.0, "at {seconds} s: {found}");
         }
     }
 
     #[test]
-    fn a_scenario_begins_anew_and_asking_often_changes_nothing() {
+    fn a_scenario_repeats_and_asking_often_changes_nothing() {
         let text = "repeat = 20\n[[at]]\nseconds = 5\ndo = ['set 1 temperature 50']\n[[at]]\nseconds = 15\n\
                     do = ['set 1 temperature 90', 'power cycle 0.5']\n";
         let (mut once, mut often) = (stage(text), stage(text));
@@ -373,8 +376,9 @@ mod tests {
             once.handle_timeout(at(second * 1_000 + 900));
             assert_eq!(once.unit.running(), often.unit.running(), "{second} s");
         }
-        assert!((celsius(&once, 1) - 50.0).abs() < 0.1, "in the fourth round, 5 s after its begin");
-        assert_eq!(celsius(&once, 1), celsius(&often, 1));
+        let found = celsius(&mut once, at(70_900), 1);
+        assert!((found - 50.0).abs() < 0.1, "in the fourth round, 5 s after its start: {found}");
+        assert_eq!(found, celsius(&mut often, at(70_900), 1));
     }
 
     #[test]

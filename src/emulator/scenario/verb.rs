@@ -50,7 +50,7 @@ short N                    short the sensor
 repair N                   make the wires whole again
 freeze, thaw               the converter delivers no new data, or does again
 power on, power off        switch the supply; off loses all but flash and parameters
-power cycle [SECONDS]      off and on again, after 1 second if not said
+power cycle [SECONDS]      off and on again, after 1 second by default
 nmt start|stop|pre-operational|reset|reset-communication
 write INDEX:SUB VALUE      write an entry as the network does, e.g. write 6112:1 0
 read INDEX:SUB             read one
@@ -62,14 +62,14 @@ status                     what the unit does";
 /// What can be set and set free: an input by its number, or something there is one of.
 const TERMINALS: &str = "1, cold-junction, supply, current";
 
-/// How long the supply is off if nothing is said.
+/// How long the supply is off by default.
 const USUAL_CYCLE: Duration = Duration::from_secs(1);
 
 impl Verb {
     /// Reads a line for a unit of a product, in any case of its letters.
     ///
     /// # Errors
-    /// If it is none, with the column.
+    /// If it is not a verb, with the column.
     pub fn read(line: &str, product: &Product) -> Result<Verb, WordError> {
         let mut words = Words::of(line);
         let verb = Verb::parse(&mut words, product)?;
@@ -122,9 +122,10 @@ impl Verb {
                 let at = words.entry(product)?;
                 let data_type = product.dictionary.entry(at).map(|entry| entry.data_type);
                 let (column, word) = words.require("a value", "a number, true, false")?;
-                let value = data_type
-                    .and_then(|data_type| data_type.parse(word))
-                    .ok_or_else(|| WordError { column, message: format!("'{}' is no value of {at}", shown(word)) })?;
+                let value = data_type.and_then(|data_type| data_type.parse(word)).ok_or_else(|| WordError {
+                    column,
+                    message: format!("'{}' is not a value of {at}", shown(word)),
+                })?;
                 Ok(Verb::Write(at, value))
             }
             "read" => words.entry(product).map(Verb::Read),
@@ -174,7 +175,7 @@ impl Words<'_> {
         let (column, word) = self.require("an entry", "index and sub-index, e.g. 6112:1")?;
         let at: ObjectAddress = word.parse().map_err(|_| WordError {
             column,
-            message: format!("'{}' is no entry: write index and sub-index, e.g. 6112:1", shown(word)),
+            message: format!("'{}' is not an entry: write index and sub-index, e.g. 6112:1", shown(word)),
         })?;
         if product.dictionary.entry(at).is_none() {
             return Err(WordError { column, message: format!("an {} has no entry {at}", product.name) });
@@ -186,7 +187,7 @@ impl Words<'_> {
 fn input(column: usize, word: &str) -> Result<u8, WordError> {
     word.parse().ok().filter(|&number| number > 0).ok_or_else(|| WordError {
         column,
-        message: format!("'{}' is no input: write its number, from 1", shown(word)),
+        message: format!("'{}' is not an input: write its number, from 1", shown(word)),
     })
 }
 
@@ -203,6 +204,7 @@ fn lead(column: usize, word: &str) -> Result<Lead, WordError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::emulator::fault::Setting;
     use proptest::prelude::*;
 
     fn read(line: &str) -> Result<Verb, String> {
@@ -240,7 +242,7 @@ mod tests {
             ("write 4000:1 -300", Verb::Write(at(0x4000, 1), Value::Integer16(-300))),
             ("write 1010:1 0x65766173", Verb::Write(at(0x1010, 1), Value::Unsigned32(0x6576_6173))),
             ("read 6100:1", Verb::Read(at(0x6100, 1))),
-            ("fault queue 64", Verb::Fault(Fault::Queue(64))),
+            ("fault queue 64", Verb::Fault(Fault::Adapter(Setting::Queue(64)))),
             ("heal", Verb::Heal),
             ("unplug", Verb::Unplug),
             ("plug", Verb::Plug),
@@ -258,7 +260,7 @@ mod tests {
             ("explode", "column 1: 'explode' is not known; there is: set, process, open"),
             ("open\x1b[2J", "column 1: 'open^[[2J' is not known"),
             ("open", "column 5: an input is missing"),
-            ("open 0", "column 6: '0' is no input: write its number, from 1"),
+            ("open 0", "column 6: '0' is not an input: write its number, from 1"),
             ("open 3 D", "column 8: 'D' is not known; there is: A, B, C, GND"),
             ("set 1", "column 6: a quantity is missing: temperature, resistance, microvolts, lead"),
             ("set 1 pressure 3", "column 7: 'pressure' is not known; there is: temperature"),
@@ -271,15 +273,15 @@ mod tests {
             ("power cycle -1", "column 13: '-1' is not 0 to 86400 seconds"),
             ("nmt go", "column 5: 'go' is not known; there is: start, stop, pre-operational, reset"),
             ("write 6112", "column 11: a value is missing"),
-            ("write 6112:1 x", "column 14: 'x' is no value of 6112:01"),
-            ("write 6112:1 300", "column 14: '300' is no value of 6112:01"),
+            ("write 6112:1 x", "column 14: 'x' is not a value of 6112:01"),
+            ("write 6112:1 300", "column 14: '300' is not a value of 6112:01"),
             ("write 6112:9 1", "column 7: an AXRTD8CO has no entry 6112:09"),
             ("fault", "column 6: a fault is missing: lost, doubled"),
             ("fault queue -1", "column 13: '-1' is not 0 to 4096"),
             ("heal all", "column 6: 'all' is too much"),
-            ("read zzz", "column 6: 'zzz' is no entry: write index and sub-index, e.g. 6112:1"),
-            ("read \x1b[2J", "column 6: '^[[2J' is no entry"),
-            ("write 6112:1 \u{9b}2J", "column 14: '‹9b›2J' is no value of 6112:01"),
+            ("read zzz", "column 6: 'zzz' is not an entry: write index and sub-index, e.g. 6112:1"),
+            ("read \x1b[2J", "column 6: '^[[2J' is not an entry"),
+            ("write 6112:1 \u{9b}2J", "column 14: '‹9b›2J' is not a value of 6112:01"),
         ];
         for (line, complaint) in table {
             let found = read(line).expect_err(line);
@@ -294,7 +296,7 @@ mod tests {
         }
 
         #[test]
-        fn any_words_behind_a_verb_are_read_or_refused(
+        fn any_words_after_a_verb_are_read_or_refused(
             verb in "set|open|power cycle|nmt|write|read|process|fault lost|fault flash", rest in "[ 0-9a-z:.x-]{0,30}"
         ) {
             let _ = read(&format!("{verb} {rest}"));

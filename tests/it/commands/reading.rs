@@ -109,7 +109,7 @@ fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
     assert!(bad.err.contains("cannot read the dump 'u1-nowhere.json'"), "{}", bad.err);
     fs::write(world.path("other.json"), "{\"a\": 1}").expect("written");
     let bad = world.run(&["dictionary", "diff", "other.json", "factory:axtc4co"], b"");
-    let said = "axcon: other.json:1:8: this is no dump: missing field `schema`\n";
+    let said = "axcon: other.json:1:8: this is not a dump: missing field `schema`\n";
     assert!(bad.err.starts_with(said), "what is wrong once, and its place once: {}", bad.err);
     let unasked = world.run(&["dictionary", "dump", "--port", "u1"], b"");
     assert_eq!(unasked.code, Some(2), "{}", unasked.err);

@@ -24,7 +24,8 @@ fn a_unit_from_the_factory_reads_as_its_manual_prints_it() {
         let mut bench = measuring(name);
         let product = Product::named(name).expect("built in");
         for (at, object, entry) in product.dictionary.entries() {
-            let value = bench.unit().read_object(at).unwrap_or_else(|refusal| panic!("{name} {at}: {refusal}"));
+            let now = bench.now;
+            let value = bench.unit().read_object(now, at).unwrap_or_else(|refusal| panic!("{name} {at}: {refusal}"));
             let live = matches!(at.index, 0x1018 | 0x1020 | 0x2000..=0x2100 | 0x2130 | 0x3100 | 0x3130 | 0x5000..=0x5001)
                 || matches!(at.index, 0x6100 | 0x7130);
             if let Some(default) = entry.default.filter(|_| !live) {

@@ -3,6 +3,7 @@
 use axcon::device::LoaderKind;
 use axcon::emulator::memory::{Defect, StartDelay};
 use axcon::emulator::{Area, Running, Setup};
+use axcon::image::{DefectId, check};
 use axcon::rng::Rng;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::version::Version;
@@ -382,6 +383,28 @@ fn addresses_of_a_larger_part_are_folded_and_others_skipped_without_a_word() {
     }
 }
 
+/// What the check of an image says of data outside of the flash is what the loader does with it.
+#[test]
+fn the_check_and_the_loader_agree_on_where_data_goes() {
+    let target = product().target_with(LoaderKind::G1);
+    let high_halves = [0x0001, 0x0003, 0x001F, 0x0020, 0x0021, 0x0100, 0x0200, 0x0220, 0x0300, 0x0400, 0x0600, 0xFFFF];
+    for address in high_halves.map(|high| high << 16 | 0x9000u32) {
+        let mut bench = in_loader();
+        let records = [S0.to_owned(), s3(address, &[1, 2, 3, 4]), S7.to_owned()];
+        let said = upload(&mut bench, &records);
+        let is_folded = bench.unit().flash()[0x12000..0x12004] == [1, 2, 3, 4];
+        let file = records.concat();
+        let report =
+            check(file.as_bytes(), None, std::slice::from_ref(&target), Some("AXTC4CO"), &[]).expect("a slice");
+        let found = report.defects.iter().find(|defect| {
+            matches!(defect.id, DefectId::DataMemory | DefectId::OutOfRange) && defect.message.contains("9000")
+        });
+        let found = found.unwrap_or_else(|| panic!("{address:#x}: {:?}", report.defects));
+        let fate = (found.id == DefectId::DataMemory, found.message.contains("folds that to 0x9000"));
+        assert_eq!(fate, (said.contains("and 0x0002 Data words"), is_folded), "{address:#x}: {said}\n{found:?}");
+    }
+}
+
 #[test]
 fn an_image_with_byte_addresses_is_loaded_with_holes_and_does_not_start() {
     let mut bench = in_loader();
@@ -392,6 +415,14 @@ fn an_image_with_byte_addresses_is_loaded_with_holes_and_does_not_start() {
     let said = upload(&mut bench, &records);
     assert!(said.contains("Application started.") && said.ends_with(PROMPT), "{said}");
     assert_eq!(bench.unit().flash()[32..64], old_program()[32..64], "every second half line is what it was");
+}
+
+#[test]
+fn a_product_name_in_lower_case_starts_as_the_check_accepts_it() {
+    let mut bench = in_loader();
+    let said = upload(&mut bench, &file(&program("axtc4co", Version::new(1, 3, 0), 1500)));
+    assert!(said.contains("axtc4co V1.3.0"), "{said}");
+    assert_eq!(bench.unit().running(), Running::Application);
 }
 
 #[test]

@@ -122,7 +122,8 @@ impl Bench {
 
     /// The network reads an entry.
     fn read(&mut self, entry: &str) -> Result<f64, Refusal> {
-        self.unit().read_object(entry.parse().expect("an entry")).map(Value::as_f64)
+        let now = self.now;
+        self.unit().read_object(now, entry.parse().expect("an entry")).map(Value::as_f64)
     }
 
     /// The network master orders something.

@@ -1,10 +1,10 @@
 //! S-records as the G3 loader reads them: character by character out of its ring, believing the length byte.
 //!
-//! A digit that is none counts as 0, and so do the letters in lower case. Nothing is looked up before it is needed: a
-//! record that ends early is filled with what comes behind it. S0 is read with a four-byte address, so the usual
+//! A character that is not a digit counts as 0, and so does a letter in lower case. Nothing is looked up before it is needed: a
+//! record that ends early is filled with what follows it. S0 is read with a four-byte address, so the usual
 //! `S0030000FC` makes the length of its text 3 - 5, which is 254 in a byte: the next records are taken for text.
-//! The words of a data record are handed out before the check sum is read. Whatever stands behind it is skipped up to
-//! the CR, so a file with LF alone is mute for ever; an LF behind the CR is where the next record should begin.
+//! The words of a data record are handed out before the checksum is read. Whatever follows it is skipped up to
+//! the CR, so a file with LF alone is mute for ever; an LF after the CR is where the next record should begin.
 //!
 //! Public facts (docs/loaders.md), likely but not proven for these units. The types beside S0, S3 and S7 are decided in
 //! errata E-I12.
@@ -103,7 +103,7 @@ pub struct Reader {
     place: Place,
 }
 
-/// Where in a record the next character stands.
+/// Where in a record the next character belongs.
 #[derive(Debug, Default)]
 enum Place {
     #[default]
@@ -129,8 +129,11 @@ struct Body {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
-    Length,
-    /// So many bytes of it are still to come.
+    /// The address that follows has this many bytes.
+    Length {
+        address_bytes: u8,
+    },
+    /// This many bytes of it are still to come.
     Address(u8),
     Data,
     Checksum,
@@ -174,12 +177,11 @@ impl Reader {
                     version: self.version,
                     shape,
                     high_digit: None,
-                    part: Part::Length,
+                    part: Part::Length { address_bytes },
                     sum: 0,
                     address: 0,
                     data: Vec::new(),
-                    // Until the length is known: what it counts beside the data.
-                    data_left: address_bytes,
+                    data_left: 0,
                 });
             }
             Place::Body(body) => {
@@ -207,12 +209,11 @@ impl Reader {
 }
 
 impl Body {
-    /// Takes a byte. Gives what follows, and the record's kind behind its check sum.
+    /// Takes a byte. Gives what follows, and after its checksum the record's kind.
     fn take(&mut self, byte: u8) -> Result<(Read, Option<Kind>), LoadError> {
         self.sum = self.sum.wrapping_add(byte);
         match self.part {
-            Part::Length => {
-                let address_bytes = self.data_left;
+            Part::Length { address_bytes } => {
                 self.data_left = byte.wrapping_sub(address_bytes + CHECKSUM_BYTES);
                 self.part = Part::Address(address_bytes);
             }
@@ -263,7 +264,7 @@ impl Body {
     }
 }
 
-/// Bytes of the check sum, which the length byte counts.
+/// Bytes of the checksum, which the length byte counts.
 const CHECKSUM_BYTES: u8 = 1;
 
 fn words(data: &[u8]) -> Vec<u16> {
@@ -306,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn words_come_before_the_check_sum_and_the_end_behind_the_return() {
+    fn words_come_before_the_check_sum_and_the_end_after_the_return() {
         let text = HEADER.to_owned() + "S309000000803412CDABB8";
         let words = Read::Words { address: 0x80, words: vec![0x1234, 0xABCD] };
         let header = [Read::Text(b'A'), Read::Text(b'B'), Read::End(Kind::Header)];
@@ -345,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_record_is_an_error_of_type() {
+    fn what_is_not_a_record_is_an_error_of_type() {
         for text in ["\n", "\r", "m", "s3", "S4", "S5", "S6", "SA"] {
             assert_eq!(error(text), Some(LoadError::Type), "{text:?}");
         }

@@ -4,7 +4,7 @@
 //! A public fact about the Motorola SDK's loaders for 16-bit parts, likely but not proven for these units. Its
 //! texts are its own, the manual's prompt and the manual's dots (AXTC4CO manual, section 4.1.5).
 //!
-//! Decisions where no fact was at hand, all guesses: both cases of hex digits; an S0 in the middle of a load begins
+//! Decisions where no fact was at hand, all guesses: both cases of hex digits; an S0 in the middle of a load starts
 //! a new one; what comes while an error text leaves is lost without another error; after an error the sender is let
 //! go on (XON) if it was stopped; S7 waits for silence like a full page does; error 7 is a flash that does not come to
 //! an end. What is a guess of one generation is said at its profile.
@@ -17,15 +17,11 @@ use std::collections::VecDeque;
 use super::super::memory::{Flash, StartDelay, Written};
 use super::super::{Board, Reset};
 use super::voice::Voice;
+use crate::image::Destination;
 use crate::time::Instant;
 use profile::Ending;
 pub use profile::{G1, G2, Profile};
 use record::{DataRecord, Decoder, LoadError, Record};
-
-/// Address flag of data memory in CodeWarrior's files.
-const DATA_FLAG: u32 = 0x0200_0000;
-/// High half of data memory addresses as this loader counts them.
-const DATA_HIGH_HALF: u32 = 0x0020;
 
 /// The loader while it runs.
 #[derive(Debug)]
@@ -58,7 +54,7 @@ enum Activity {
 /// What follows when a page is written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Then {
-    /// Goes on with what is parked: the rest of the record that did not fit the page, and the records behind it.
+    /// Goes on with what is parked: the rest of the record that did not fit the page, and the records after it.
     TakeUp(VecDeque<DataRecord>),
     /// S7 has come, with this entry point.
     Finish(u32),
@@ -76,13 +72,6 @@ struct Load {
 struct PageBuffer {
     page: u32,
     words: Vec<u16>,
-}
-
-/// Where a word of the file goes.
-enum Place {
-    Program(u32),
-    Data,
-    Nowhere,
 }
 
 impl Loader {
@@ -108,7 +97,7 @@ impl Loader {
         match &mut self.activity {
             Activity::Writing { overrun, .. } => *overrun = true,
             Activity::Leaving => {}
-            // Nothing is decoded behind S7, but the line is not silent.
+            // Nothing is decoded after S7, but the line is not silent.
             Activity::AwaitingSilence(Then::Finish(_)) => self.heard_at = board.now,
             Activity::Listening | Activity::AwaitingSilence(Then::TakeUp(_)) => {
                 if board.now < self.deaf_until {
@@ -211,10 +200,13 @@ impl Loader {
         let map = board.flash.map();
         for (number, &word) in data.words.iter().enumerate() {
             let address = data.address.wrapping_add(number as u32);
-            match place(address, map.program_words) {
-                Place::Nowhere => {}
-                Place::Data => load.data_words += 1,
-                Place::Program(word_address) => {
+            // An address of a larger part of the family is folded into this one's flash, one that makes no sense is
+            // skipped, both silently.
+            match Destination::of(address.into()) {
+                Destination::Skipped => {}
+                Destination::Data => load.data_words += 1,
+                Destination::Program => {
+                    let word_address = address % map.program_words;
                     let page = word_address / map.page_words;
                     let buffer = load.page.get_or_insert_with(|| PageBuffer { page, words: board.flash.page(page) });
                     if buffer.page != page {
@@ -282,18 +274,5 @@ impl Loader {
         self.deaf_until = board.uart.finished_at();
         self.voice.let_go_on(board);
         self.voice.prompt(board);
-    }
-}
-
-/// Where a word goes: an address of a larger part of the family is folded into this one's flash, an address that
-/// makes no sense is skipped, both without a word.
-fn place(address: u32, program_words: u32) -> Place {
-    let high_half = address >> 16;
-    if address & DATA_FLAG != 0 || high_half == DATA_HIGH_HALF {
-        Place::Data
-    } else if high_half < DATA_HIGH_HALF {
-        Place::Program(address % program_words)
-    } else {
-        Place::Nowhere
     }
 }

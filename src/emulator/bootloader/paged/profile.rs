@@ -42,7 +42,7 @@ pub static G1: Profile = Profile {
 
 /// The loader of the 56F83xx generation. Known are its prompt, its dots, `Application started from address 0x....` and
 /// its error numbers 1 to 7. The rest is a **guess**: that it is the loader before it, grown by a second place to park a
-/// record and stricter with control characters; that it stops its sender behind each record that crosses into another
+/// record and stricter with control characters; that it stops its sender after each record that crosses into another
 /// page, with the pages and the silence of G1; and that it says nothing before its prompt.
 pub static G2: Profile =
     Profile { header: "", parks: 2, silence: G1.silence, ignores: Ignores::LineEnds, ending: Ending::Address };

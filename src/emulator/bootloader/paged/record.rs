@@ -1,6 +1,6 @@
 //! S-records as the loaders with a page buffer take them: one character at a time, judged as early as they can.
 //!
-//! Some control characters are ignored wherever they stand; the profile says which. Hex digits are taken in both cases.
+//! Some control characters are ignored wherever they are; the profile says which. Hex digits are taken in both cases.
 //! What is wrong is one of the loader's own error numbers; the console's reader (`image`) is another one and tells more.
 
 use super::super::super::uart::{XOFF, XON};
@@ -10,7 +10,7 @@ use super::super::super::uart::{XOFF, XON};
 pub enum LoadError {
     /// Characters were lost because the loader did not listen.
     Receive,
-    /// A character that cannot stand here.
+    /// A character that cannot be here.
     Character,
     /// A record of a type it does not take, too short, or before S0.
     Record,
@@ -55,7 +55,7 @@ pub enum Record {
 pub struct DataRecord {
     /// Address of the first word.
     pub address: u32,
-    /// Words, low byte first in the record. An odd last byte is no word and is dropped.
+    /// Words, low byte first in the record. An odd last byte is not a word and is dropped.
     pub words: Vec<u16>,
 }
 
@@ -75,7 +75,7 @@ pub struct Decoder {
     place: Place,
 }
 
-/// Where in a record the next character stands.
+/// Where in a record the next character belongs.
 #[derive(Debug)]
 enum Place {
     Start,
@@ -95,7 +95,7 @@ enum Kind {
     End,
 }
 
-/// Bytes the count byte has to count at least: the check sum, and an address where one is read.
+/// Bytes the count byte has to count at least: the checksum, and an address where one is read.
 const SHORTEST_HEADER: u8 = 1;
 const SHORTEST_WITH_ADDRESS: u8 = 5;
 const ADDRESS_BYTES: usize = 4;
@@ -164,7 +164,7 @@ impl Decoder {
     }
 }
 
-/// Count, content and check sum add up to FFh in their lowest byte.
+/// Count, content and checksum add up to FFh in their lowest byte.
 fn complete(kind: Kind, bytes: &[u8]) -> Result<Record, LoadError> {
     let sum = bytes.iter().fold(0u8, |sum, byte| sum.wrapping_add(*byte));
     if sum != 0xFF {
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_strict_reader_ignores_line_ends_and_flow_control_and_nothing_else() {
+    fn a_strict_reader_ignores_only_line_ends_and_flow_control() {
         let end = Ok(vec![Record::Header, Record::End(0x1_2345)]);
         for text in
             ["S0030000FC\rS7050001234591\r", "S0030000FC\r\nS7050001234591\n", "S003\x130000FC\x11S70500012\n34591"]
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn an_odd_last_byte_is_no_word() {
+    fn an_odd_last_byte_is_not_a_word() {
         let records = decode("S0030000FCS3080000008034120130").map(|records| records[1].clone());
         let words = vec![0x1234];
         assert_eq!(records, Ok(Record::Data(DataRecord { address: 0x80, words })));
