@@ -27,7 +27,7 @@ pub enum Abort {
     TooShort,
     /// The object has no entry with this sub-index.
     NoSuchEntry,
-    /// The value is none of those the entry takes.
+    /// The value is not one the entry takes.
     ValueRange,
     /// The value is above the entry's high limit.
     TooHigh,
@@ -79,7 +79,7 @@ impl Abort {
             Abort::TooLong => "the data is longer than the entry's type",
             Abort::TooShort => "the data is shorter than the entry's type",
             Abort::NoSuchEntry => "the object has no entry with this sub-index",
-            Abort::ValueRange => "the value is none the entry takes",
+            Abort::ValueRange => "the value is not one the entry takes",
             Abort::TooHigh => "the value is above the high limit",
             Abort::TooLow => "the value is below the low limit",
             Abort::CannotStore => "the signature is wrong, nothing was done",

@@ -28,7 +28,7 @@ impl fmt::Display for ObjectAddress {
 
 /// Text that names no entry.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no entry of an object dictionary: write index and sub-index in hexadecimal digits, e.g. 6126:1")]
+#[error("'{0}' is not an entry of an object dictionary: write index and sub-index in hexadecimal digits, e.g. 6126:1")]
 pub struct ObjectAddressError(String);
 
 /// Reads `6126:1`, `6126h:1`, `0x6126:01`; a missing sub-index is 0.

@@ -214,6 +214,14 @@ impl Work for StreamOn {
     fn deadline(&self) -> Option<Instant> {
         self.deadline
     }
+
+    fn awaits(&self, prompt: Prompt) -> bool {
+        match self.stage {
+            OnStage::Toggled => matches!(prompt, Prompt::Source(_) | Prompt::Period),
+            OnStage::Source { .. } => prompt == Prompt::Period,
+            OnStage::Period { .. } | OnStage::Row | OnStage::Left { .. } => false,
+        }
+    }
 }
 
 /// Switches the stream off. Silence alone does not show that it is: a unit without power is silent as well.
@@ -297,6 +305,10 @@ impl Work for StreamOff {
 
     fn deadline(&self) -> Option<Instant> {
         self.deadline
+    }
+
+    fn awaits(&self, prompt: Prompt) -> bool {
+        matches!(prompt, Prompt::Source(_) | Prompt::Period)
     }
 }
 

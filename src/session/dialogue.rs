@@ -1,15 +1,15 @@
-//! Which lines answer a key that was sent: they are no text that nobody understands, even where no single line of them
-//! means anything.
+//! Which lines answer a key that was sent: they do not count as not understood, even where no single line of them means
+//! anything.
 //!
 //! A dialogue is questions, echoes and sentences in words of the unit's own; a page of diagnostics has headings; the view
-//! of the object dictionary has titles and hints. What matters of them their jobs read. Who counts what the console does
-//! not understand wants to know of the rest. Keys tell, whoever has pressed them, so a recording gives the same.
+//! of the object dictionary has titles and hints. Their jobs read what matters in them. The
+//! count of lines not understood is about the rest. Keys tell, typed or sent by a job, so a recording gives the same.
 
 use super::keys::{Key, Typed};
 use crate::time::{Duration, Instant};
 use crate::wire::{MenuKey, diagnostics};
 
-/// How long behind a key, or behind the last page, what comes is its answer: pages come every second, and a unit that
+/// How long what comes after a key, or after the last page, is its answer: pages come every second, and a unit that
 /// computes needs a moment.
 const ANSWER: Duration = Duration::from_secs(3);
 
@@ -74,7 +74,7 @@ impl Dialogue {
         self.asked == Some(Asked::Pages) && at <= self.until
     }
 
-    /// A unit says its name: no page does, so it has started anew and shows none any more.
+    /// A unit says its name: no page does, so it has restarted and shows no more of them.
     pub(super) fn named(&mut self) {
         self.asked = self.asked.filter(|asked| *asked != Asked::Pages);
     }

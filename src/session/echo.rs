@@ -1,9 +1,9 @@
-//! Tells the echo of a password from what the unit says itself on the line behind it.
+//! Tells the echo of a password from what the unit says itself on the line after it.
 //!
-//! Not every unit echoes a line end, or anything: `Password wrong` may stand where the echo would. So what comes is held
-//! against the keys that were sent. It is their echo if it is made of them in their order, in capitals or not, whatever
+//! Not every unit echoes a line end, or anything: `Password wrong` may come where the echo would. So what comes is compared
+//! with the keys that were sent. It is their echo if it is made of them in their order, in capitals or not, whatever
 //! the line has lost, doubled or damaged of it, with what hides them again (backspaces, stars) in between. Everything else
-//! is the unit's own text, a mask that it shows instead of the keys among it, since that is none of them.
+//! is the unit's own text, including a mask that it shows instead of the keys.
 //!
 //! What holds whatever happens:
 //! - Nothing is lost, and all comes out in its order. Bytes that may become an echo are kept back until the next ones
@@ -19,7 +19,7 @@ use crate::wire::{XOFF, XON};
 
 /// Bytes that are kept back at most: a unit may hide what it has echoed behind any number of signs.
 const MOST_KEPT: usize = 64;
-/// As many of the keys make an echo of what stands behind a part of one, as long as keys are missing.
+/// This many of the keys make what follows a part of an echo part of it too, as long as keys are missing.
 const SHORTEST_REST: usize = 2;
 
 /// The keys that may come back, and how far they have.
@@ -30,9 +30,9 @@ pub(super) struct Echo {
     is_beyond: bool,
     /// They are being typed, so each may come back alone; else the echo comes in one piece, before anything else.
     by_hand: bool,
-    /// So many of the keys have come back, those that were lost on the way among them.
+    /// How many of the keys have come back, including those lost on the way.
     back: usize,
-    /// So many bytes of this line are secret.
+    /// How many bytes of this line are secret.
     found: usize,
     /// The unit has said something else since.
     spoken: bool,
@@ -50,11 +50,11 @@ struct Run {
     kept: Vec<(u8, Nature)>,
     /// How many of them are keys, those handed out included.
     matched: usize,
-    /// Behind the last of those among the keys.
+    /// After the last of those among the keys.
     next: usize,
     /// The same, if they are keys that have not come back before.
     due: Option<usize>,
-    /// The last byte is none of the keys: damage in the place of one, if the next byte is the key behind that.
+    /// The last byte is not one of the keys: damage in place of one, if the next byte is the key after that.
     is_doubtful: bool,
     /// The last key.
     last: u8,
@@ -85,7 +85,7 @@ impl Echo {
     pub(super) fn begin(&mut self) {
         self.finish();
         let out = std::mem::take(&mut self.out);
-        // With its room from the beginning: a vector that grows leaves copies behind that nobody wipes.
+        // With its room from the beginning: a vector that grows leaves unwiped copies behind.
         *self = Echo { keys: Zeroizing::new(Vec::with_capacity(LONGEST)), out, ..Echo::default() };
     }
 
@@ -101,7 +101,7 @@ impl Echo {
         }
     }
 
-    /// Enter has been typed behind them: what has not come back is on its way, in one piece.
+    /// Enter has been typed after them: what has not come back is on its way, in one piece.
     pub(super) fn entered(&mut self) {
         (self.by_hand, self.spoken) = (false, false);
     }
@@ -203,7 +203,7 @@ impl Echo {
         self.run.matched += 1;
     }
 
-    /// Where the keys go on behind the first one from `from` on that this byte may be.
+    /// Where the keys go on after the first one from `from` on that this byte may be.
     fn find(&self, from: usize, byte: u8) -> Option<usize> {
         let keys = self.keys.get(from..)?;
         keys.iter().position(|key| key.eq_ignore_ascii_case(&byte)).map(|at| from + at + 1)
@@ -287,7 +287,7 @@ mod tests {
     use crate::record::REDACTED;
     use proptest::prelude::*;
 
-    /// What is left of these pieces of a line. Behind each the line falls silent.
+    /// What is left of these pieces of a line. After each the line falls silent.
     fn redacted(echo: &mut Echo, pieces: &[&[u8]]) -> Vec<u8> {
         let mut all = Vec::new();
         for piece in pieces {
@@ -308,7 +308,7 @@ mod tests {
         echo
     }
 
-    fn behind(password: &str, pieces: &[&str]) -> String {
+    fn after(password: &str, pieces: &[&str]) -> String {
         let pieces: Vec<&[u8]> = pieces.iter().map(|piece| piece.as_bytes()).collect();
         String::from_utf8(redacted(&mut sent(password), &pieces)).expect("ASCII")
     }
@@ -324,12 +324,12 @@ mod tests {
             ("AXIO-2010", "#########"),
             ("AXIO-2010", "\x1b[31mWrong\x1b[0m"),
         ] {
-            assert_eq!(behind(password, &[says]), says, "{password}");
+            assert_eq!(after(password, &[says]), says, "{password}");
         }
     }
 
     #[test]
-    fn an_echo_is_secret_and_what_stands_around_it_is_not() {
+    fn an_echo_is_secret_and_the_text_around_it_is_not() {
         for (pieces, expected) in [
             (&["Pa55-Wort"][..], "*********"),
             (&["Password Pa55-Wort accepted"], "Password ********* accepted"),
@@ -345,11 +345,11 @@ mod tests {
             (&["Pa5~-Wort!"], "*********!"),
             (&["Pa55~~-Wort ok"], "****~~***** ok"),
             (&["Pa55-W~~rt ok"], "******~~** ok"),
-            // It stands still where it is due.
+            // It stops where it is due.
             (&["Pa"], "**"),
             (&["Pa\x1355\x11-Wort"], "**\x13**\x11*****"),
         ] {
-            assert_eq!(behind("Pa55-Wort", pieces), expected, "{pieces:?}");
+            assert_eq!(after("Pa55-Wort", pieces), expected, "{pieces:?}");
         }
     }
 

@@ -15,7 +15,7 @@ use crate::wire::stream::{Row, Source};
 use crate::wire::{MenuKey, Text};
 
 /// What the user wants of the unit. One job runs at a time, and one more may be given while it is being found out who is
-/// there; [`Command::Keys`] and [`Command::Cancel`] are no jobs.
+/// there; [`Command::Keys`] and [`Command::Cancel`] are not jobs.
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Keys for the unit as they are, from the raw terminal or the menu. Refused while a job other than
@@ -38,15 +38,15 @@ pub enum Command {
     RestoreDefaults,
     /// Read the whole object dictionary through V. Scanning and CAN are halted meanwhile (AXTC4CO manual, section 4.1.1).
     ReadDictionary,
-    /// Read pages of diagnostics: so many, or until it is cancelled; then no more come.
+    /// Read this many pages of diagnostics, or until it is cancelled; then no more come.
     Diagnostics {
         /// How many.
         pages: Option<u32>,
     },
-    /// Stop pages of diagnostics that come, whoever has asked for them.
+    /// Stop pages of diagnostics that come, no matter what asked for them.
     DiagnosticsOff,
-    /// In a recording: understand all that goes by, as it goes by. A dictionary that was walked through is told of by
-    /// [`Event::Overheard`], as often as that happened.
+    /// In a recording: understand everything as it goes by. Each walk through the dictionary is reported by
+    /// [`Event::Overheard`].
     Overhear,
     /// Upload new software.
     Load(Box<LoadOrder>),
@@ -66,7 +66,7 @@ pub struct LoadOrder {
     /// The software it ran before, where a journal knows it: a loader does not say.
     pub ran: Option<Version>,
     /// The loader it has, where the user knows better than the product's file. How it really paces its sender shows
-    /// behind the header in any case.
+    /// after the header in any case.
     pub loader: Option<LoaderKind>,
     /// Send long records instead of the file's: fewer characters for the same words.
     pub packed: bool,
@@ -92,7 +92,7 @@ impl LoadOrder {
         }
     }
 
-    /// Where it stands before anything has been done: the unit is being looked at.
+    /// Its progress before anything has been done: the unit is being looked at.
     pub fn at_its_beginning(&self) -> Progress {
         let (records_total, bytes_total) = super::upload::size(self);
         Progress {
@@ -163,18 +163,18 @@ pub enum Refusal {
     /// The password is empty or holds a control character, which would end it early.
     #[error("the password is empty or holds a control character")]
     Password,
-    /// There is somebody to ask.
+    /// There is a unit to ask.
     #[error("only a recording is listened to; a unit is asked")]
     Live,
     /// The session listens to a recording.
     #[error("this is a recording: nothing can be sent to the unit")]
     ReadOnly,
-    /// The unit asks for the password, and a file is none.
+    /// The unit asks for the password, and a file is not one.
     #[error("the unit asks for a password: answer that first, or leave it with Enter")]
     PasswordOpen,
-    /// A key has been typed whose question takes whatever is sent for its answer: with a `Ye` before it the key of another
-    /// job completes the word that restores the defaults.
-    #[error("the question behind the {} that was typed is still open: end it on the terminal with Enter", .0.letter())]
+    /// A key has been typed whose question takes whatever is sent as its answer: after a `Ye` the key of another job
+    /// completes the word that restores the defaults.
+    #[error("the question after the {} that was typed is still open: end it on the terminal with Enter", .0.letter())]
     QuestionOpen(MenuKey),
     /// The unit holds us by XOFF, and too much waits already.
     #[error("the unit does not take what has been typed so far (held by XOFF)")]
@@ -231,8 +231,8 @@ pub enum Event {
         /// Bytes of the file.
         total: usize,
     },
-    /// A file that is sent as it is does not come further: the unit holds it by XOFF, and has for long. Told once for each
-    /// hold. Nothing is given up: the user ends the wait, or the unit does, and then [`Event::FileProgress`] says so.
+    /// A file that is sent as it is makes no progress: the unit has held it by XOFF for long. Reported once for each hold.
+    /// Nothing is given up: the user ends the wait, or the unit does, and then [`Event::FileProgress`] says so.
     FileHeld {
         /// Since when.
         since: Instant,
@@ -252,8 +252,8 @@ pub enum Outcome {
     Identified,
     /// The job has done what it should.
     Done(Job),
-    /// The unit has taken the Yes that restores its defaults, and shows what its menu shows anyway: that it has started
-    /// anew is not to be seen.
+    /// The unit has taken the Yes that restores its defaults, and shows only what its menu shows anyway: a restart was not
+    /// seen.
     DefaultsTaken,
     /// The stream runs as asked; rows have come.
     StreamRuns {
@@ -298,10 +298,10 @@ pub enum Outcome {
 /// What a job has waited for in vain. As text it says, as a sentence without its stop, what did not happen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Awaited {
-    /// The question that offers the stream's sources, behind T.
+    /// The question that offers the stream's sources, after T.
     #[error("the unit did not ask which values its stream is to send")]
     SourceQuestion,
-    /// The question behind that one.
+    /// The question after that one.
     #[error("the unit did not ask for the repetition time")]
     PeriodQuestion,
     /// The first row of a stream that was switched on.
@@ -310,22 +310,22 @@ pub enum Awaited {
     /// A sign that no more rows will come.
     #[error("the unit did not confirm that the stream is off")]
     StreamOff,
-    /// The question behind D.
+    /// The question after D.
     #[error("the unit did not ask for the Yes that restores its defaults")]
     DefaultsQuestion,
     /// The banner of a unit that restores its defaults.
     #[error("the banner after the reset did not come")]
     Banner,
-    /// Anything behind V.
+    /// Anything after V.
     #[error("the unit did not show its object dictionary")]
     Dictionary,
-    /// An entry among what came behind V.
+    /// An entry among what came after V.
     #[error("no entry of the object dictionary came")]
     Entry,
     /// The first page of diagnostics.
     #[error("no page of diagnostics came")]
     Page,
-    /// One more, behind the first ones.
+    /// One more, after the first ones.
     #[error("the next page of diagnostics did not come")]
     NextPage,
     /// A sign that no more pages will come.
@@ -354,7 +354,7 @@ pub enum WalkEnd {
     Stopped,
     /// As far as the user wanted.
     Cancelled,
-    /// The unit started anew in the middle of it.
+    /// The unit restarted in the middle of it.
     Restarted,
     /// Perhaps to its end, but lines of it were not understood, and may be the entries that are missing.
     NotUnderstood {
@@ -370,7 +370,7 @@ pub struct DictionaryReading {
     pub entries: Vec<ReadEntry>,
     /// How far the walk came.
     pub end: WalkEnd,
-    /// Lines of the view with a number in them that nobody understood: neither an entry nor anything else known.
+    /// Lines of the view with a number in them that nobody understood: neither an entry nor otherwise known.
     pub unrecognised_lines: u64,
 }
 
@@ -417,7 +417,7 @@ pub struct Facts {
     pub nmt_state: Option<Known<String>>,
     /// Whether the stream runs, and with what.
     pub stream: Option<Source>,
-    /// Whether pages of diagnostics come, whoever has asked for them, and where the first sign of that lies.
+    /// Whether pages of diagnostics come, no matter what asked for them, and where the first sign of that is.
     pub diagnostics: Option<Span>,
     /// Lines that no recogniser understood and that answer no key: titles of the menu, questions, pages and the view are
     /// none.
@@ -430,6 +430,17 @@ impl Facts {
         let product = self.product.take();
         let unrecognised_lines = self.unrecognised_lines;
         *self = Facts { state: UnitState::Loader, product, unrecognised_lines, ..Facts::default() };
+    }
+
+    /// The unit says which product it is. If that is another one than before, the plug is in another unit: what the one
+    /// before said of itself is not true of it.
+    pub(super) fn name_product(&mut self, product: Known<String>) {
+        let is_other = |before: &Known<String>| !before.value.eq_ignore_ascii_case(&product.value);
+        if self.product.as_ref().is_some_and(is_other) {
+            let Facts { state, unrecognised_lines, diagnostics, .. } = *self;
+            *self = Facts { state, unrecognised_lines, diagnostics, ..Facts::default() };
+        }
+        self.product = Some(product);
     }
 }
 

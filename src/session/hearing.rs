@@ -1,6 +1,6 @@
 //! From bytes to what they mean: the record first, then lines and questions, then messages, then facts.
 //!
-//! What may hold the password is told apart on the way, so that it is in no record, no message and no fact.
+//! What may hold the password is separated on the way, so that it reaches no record, message or fact.
 
 use super::Session;
 use super::event::{Event, Job, Known, Origin, UnitState};
@@ -12,20 +12,23 @@ use crate::record::{Direction, REDACTED};
 use crate::time::{Duration, Instant};
 use crate::wire::{Confidence, Item, LoaderText, MenuKey, Message, NmtState, Prompt, Text};
 
-/// Silence behind a text without a line end that makes a prompt of it: several character times, and more than an
-/// adapter's latency of 16 ms.
+/// Silence after a text without a line end that makes it a prompt: several character times, and more than an adapter's
+/// latency of 16 ms.
 const PROMPT_QUIET: Duration = Duration::from_millis(60);
+
+/// The same after a line that may be a question: a text about it goes on. Less than a job waits after such a line.
+const LINE_QUIET: Duration = Duration::from_millis(250);
 
 /// Bytes of a question for the password at most; what goes on longer is looked at when the unit has fallen silent.
 const LONGEST_PROMPT: usize = 200;
 
-/// How long behind the question for the menu what comes is its answer.
+/// How long what comes after a request for the menu counts as its answer.
 pub(super) const MENU_ANSWER: Duration = Duration::from_millis(1500);
 
-/// How long behind its header a loader prints that it wants a key.
+/// How long after its header a loader may print that it wants a key.
 const LOADER_HEADER: Duration = Duration::from_secs(2);
 
-/// Watches for text without a line end behind which the unit falls silent.
+/// Watches for text without a line end after which the unit falls silent.
 #[derive(Debug, Default)]
 pub(super) struct PromptWatch {
     /// When the text counts as a prompt.
@@ -34,6 +37,8 @@ pub(super) struct PromptWatch {
     seen: u64,
     /// The last text that was understood without its line end.
     heard: Option<Text>,
+    /// The last line, if it may be a question that a job waits for, and when it counts as one.
+    line: Option<(Instant, Text, Prompt)>,
 }
 
 impl PromptWatch {
@@ -42,10 +47,25 @@ impl PromptWatch {
         let same = |heard: &Text| heard.span.start == line.span.start && heard.text.trim() == line.text.trim();
         self.heard.as_ref().is_some_and(same)
     }
+
+    /// Whether this text has been looked at to its end.
+    pub(super) fn has_seen(&self, text: &Text) -> bool {
+        text.span.end <= self.seen
+    }
+
+    /// When the last line counts as a question.
+    pub(super) fn line_due(&self) -> Option<Instant> {
+        self.line.as_ref().map(|(due, ..)| *due)
+    }
+
+    /// Nothing is waited for any more.
+    pub(super) fn forget(&mut self) {
+        (self.due, self.line) = (None, None);
+    }
 }
 
 impl Session {
-    /// Appends to the record; the echo of the password is secret, and the password itself wherever it stands.
+    /// Appends to the record; the echo of the password is secret, and the password itself wherever it appears.
     pub(super) fn append(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -55,7 +75,7 @@ impl Session {
         self.password.wait_for_more(self.now);
     }
 
-    /// What looks like the beginning of the password has stood still for long enough.
+    /// Nothing has followed what looks like the beginning of the password for long enough.
     pub(super) fn hand_out_echo(&mut self) {
         let pieces = self.password.hand_out();
         self.take_in(pieces);
@@ -86,19 +106,23 @@ impl Session {
             }
         }
         let pending = self.framer.pending();
+        if pending.is_some() {
+            self.prompt.line = None;
+        }
         let asks_password = pending.as_ref().is_some_and(|text| {
             text.text.len() <= LONGEST_PROMPT
-                && text.span.end > self.prompt.seen
+                && !self.prompt.has_seen(text)
                 && self.vocabulary.asks_password(&text.text, self.is_behind_load())
         });
         if asks_password {
             self.password.question();
         }
-        self.prompt.due = pending.filter(|text| text.span.end > self.prompt.seen).map(|_| self.now + PROMPT_QUIET);
+        self.prompt.due = pending.filter(|text| !self.prompt.has_seen(text)).map(|_| self.now + PROMPT_QUIET);
     }
 
     /// A line is complete.
     fn line(&mut self, mut text: Text) {
+        self.prompt.line = None;
         if self.recognises {
             self.password.scrub(&mut text.text);
         }
@@ -129,10 +153,35 @@ impl Session {
             text = row;
         }
         let message = self.understand(&text.text);
+        let asks = (message == Message::Text).then(|| self.asked_in_a_line(&text.text)).flatten();
+        self.prompt.line = asks.map(|prompt| (self.now + LINE_QUIET, text.clone(), prompt));
         self.heard(text, message);
     }
 
-    /// Looks at a text without a line end behind which the unit has fallen silent.
+    /// The question that a complete line may be: one that the running job waits for.
+    fn asked_in_a_line(&self, line: &str) -> Option<Prompt> {
+        let running = self.running.as_ref()?;
+        if !line.trim_end().ends_with(['?', ':', '>']) {
+            return None;
+        }
+        let is_password = self.vocabulary.asks_password(line, self.is_behind_load());
+        let prompt = if is_password { Some(Prompt::Password) } else { self.vocabulary.prompt(line) };
+        prompt.filter(|&prompt| running.work.awaits(prompt))
+    }
+
+    /// Looks at what the unit has fallen silent after, if it has for long enough.
+    pub(super) fn look_if_due(&mut self) {
+        if self.prompt.due.is_some_and(|due| due <= self.now) {
+            self.look_at_prompt();
+        }
+        let now = self.now;
+        let Some((_, text, prompt)) = self.prompt.line.take_if(|(due, ..)| *due <= now) else { return };
+        if self.running.as_ref().is_some_and(|running| running.work.awaits(prompt)) {
+            self.signal(Signal::Heard(&text, &Message::Prompt(prompt)));
+        }
+    }
+
+    /// Looks at a text without a line end after which the unit has fallen silent.
     pub(super) fn look_at_prompt(&mut self) {
         self.prompt.due = None;
         let Some(mut text) = self.framer.pending() else { return };
@@ -163,7 +212,7 @@ impl Session {
         }
     }
 
-    fn stream_stopped(&mut self) {
+    pub(super) fn stream_stopped(&mut self) {
         if self.facts.stream.take().is_some() {
             self.events.push_back(Event::FactsChanged);
         }
@@ -195,7 +244,8 @@ impl Session {
                 | Message::Prompt(Prompt::WaitingForFile)
         );
         if starts || matches!(message, Message::MenuKey(_)) {
-            self.keys.question_over();
+            self.question_over();
+            self.password.at_menu();
         }
         if starts && self.transmitter.held_since().is_some() {
             self.transmitter.hold(self.now, false);
@@ -214,7 +264,7 @@ impl Session {
         let span = text.span;
         let before = self.facts.clone();
         let asked = self.menu_asked_at.is_some_and(|at| self.now <= at + MENU_ANSWER);
-        // What comes in a dialogue is no banner, but for those that end with a reset.
+        // What comes in a dialogue is not a banner, except in those that end with a reset.
         let talks = matches!(self.job(), Some(Job::Identify | Job::ReadDictionary | Job::StreamOn | Job::StreamOff));
         let asked = asked || talks;
         let come = self.facts.diagnostics.is_some();
@@ -224,7 +274,7 @@ impl Session {
         self.counted = *message == Message::Text && !is_page && !self.dialogue.owns(self.dated, &text.text);
         let identifies = self.job() == Some(Job::Identify);
         let facts = &mut self.facts;
-        // Who is asked for right now is decided when all of the answer has come.
+        // While the unit is being identified, this is decided when the whole answer is in.
         if facts.state == UnitState::Silent && !identifies {
             facts.state = UnitState::Unknown;
         }
@@ -259,7 +309,7 @@ impl Session {
                     self.toggled.restarted(self.dated);
                 }
                 if let Some(product) = &name.product {
-                    facts.product = Some(Known { value: product.clone(), origin, span });
+                    facts.name_product(Known { value: product.clone(), origin, span });
                 }
                 if let Some(version) = name.version {
                     facts.version = Some(Known { value: version, origin, span });

@@ -1,7 +1,7 @@
 //! Finding out what is at the other end.
 //!
-//! The question is `m`, which a unit may be asked at any time (AXTC4CO manual, section 4.1). It may stand in a dialogue
-//! that swallows the key, so the question is repeated in other words: Enter leaves every prompt, `x` the view of the
+//! The question is `m`, which a unit may be asked at any time (AXTC4CO manual, section 4.1). It may be in a dialogue
+//! that swallows the key, so the question is repeated in other forms: Enter leaves every prompt, `x` the view of the
 //! object dictionary (section 4.1.1). A loader that waits for a file calls the key an error, and so shows itself.
 
 use super::event::{Event, Outcome, UnitState};
@@ -11,9 +11,9 @@ use crate::wire::{LoaderText, Message, Prompt, XON};
 
 /// How long a unit may take to begin its answer: the menu comes at once, an adapter adds some 20 ms.
 const ANSWER: Duration = Duration::from_millis(800);
-/// Silence behind an answer that ends it.
+/// Silence after an answer that ends it.
 const QUIET: Duration = Duration::from_millis(150);
-/// How long an answer may go on: the stream may run on behind the menu.
+/// How long an answer may go on: the stream may continue after the menu.
 const LONGEST_ANSWER: Duration = Duration::from_millis(1500);
 /// How long a unit may have stopped us before it is asked all the same: no page takes that long to write, so its XON has
 /// been lost, or it has lost its power since.
@@ -33,6 +33,8 @@ pub(super) struct Identify {
     menu: u8,
     software: bool,
     loader: bool,
+    /// The unit has said which product it is.
+    named: bool,
     /// Anything came at all.
     alive: bool,
 }
@@ -52,7 +54,10 @@ impl Identify {
     fn note(&mut self, message: &Message) {
         match message {
             Message::MenuKey(key) => self.menu |= 1 << (*key as u32),
-            Message::Software(_) => self.software = true,
+            Message::Software(name) => {
+                self.software = true;
+                self.named |= name.product.is_some();
+            }
             // What else a loader says an application may say as well: "press any key", "restarting".
             Message::Loader(LoaderText::Waiting | LoaderText::Error(_)) | Message::Prompt(Prompt::WaitingForFile) => {
                 self.loader = true;
@@ -82,7 +87,7 @@ impl Work for Identify {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
             Signal::Begin => {
-                // Among noise there is an XOFF sooner or later, and nobody who would take it back.
+                // Noise contains an XOFF sooner or later, and no unit follows it with an XON.
                 if desk.facts.state == UnitState::Unknown && desk.transmitter.held_since().is_some() {
                     desk.transmitter.hold(desk.now, false);
                     desk.events.push_back(Event::Held(false));
@@ -101,7 +106,7 @@ impl Work for Identify {
             Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => {
                 // Not every menu names its unit; but a line may have been lost on its way, so that is asked once more.
-                let is_nameless = self.asked == 1 && !self.loader && desk.facts.product.is_none();
+                let is_nameless = self.asked == 1 && !self.loader && !self.named;
                 if self.is_answered() && !is_nameless || self.asked == QUESTIONS.len() {
                     return self.conclude(desk);
                 }

@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 use super::event::{Event, Facts, Outcome};
 use super::keys::Typed;
 use super::password::PasswordGuard;
-use super::transmitter::Transmitter;
+use super::transmitter::{Sender, Transmitter};
 use crate::endpoint::{Secrecy, Transmit};
 use crate::time::Instant;
-use crate::wire::{Message, Text};
+use crate::wire::{Message, Prompt, Text};
 
 /// What a job is told.
 #[derive(Clone, Copy, Debug)]
@@ -37,14 +37,14 @@ pub(super) struct Desk<'a> {
     pub(super) transmitter: &'a mut Transmitter,
     pub(super) facts: &'a mut Facts,
     pub(super) events: &'a mut VecDeque<Event>,
-    /// Words without a line end behind them, the last thing the unit has printed: perhaps a question. `None` for signs
-    /// alone, like the `>` of a command line.
+    /// Words without a line end, the last thing the unit has printed: perhaps a question. `None` for signs alone, like the
+    /// `>` of a command line.
     pub(super) pending: Option<&'a Text>,
     /// Set when what the unit prints from now on is an answer, and no part of the line before.
     pub(super) cut: bool,
     /// Set when the job has read something from what it was told, and no recogniser had.
     pub(super) understood: bool,
-    /// What it is told of has been counted as a line that nobody understands.
+    /// The line it is told of has been counted as not understood.
     pub(super) counted: bool,
     /// Bytes received so far: text that begins here or later is newer than this moment.
     pub(super) received: u64,
@@ -59,10 +59,10 @@ impl Desk<'_> {
     pub(super) fn send(&mut self, keys: &[u8]) {
         self.cut = true;
         // Only a unit that holds us lets this queue fill, and jobs send a few bytes between two deadlines.
-        self.transmitter.push_text(keys, Secrecy::Open);
+        self.transmitter.push_text(keys, Secrecy::Open, Sender::Job);
     }
 
-    /// Sends a secret and the Enter behind it.
+    /// Sends a secret and Enter.
     pub(super) fn send_secret(&mut self, secret: &[u8]) {
         self.transmitter.push_piece(Transmit { bytes: secret.to_vec(), secrecy: Secrecy::Secret });
         self.transmitter.push_piece(Transmit::open(*b"\r"));
@@ -83,4 +83,10 @@ pub(super) trait Work {
 
     /// When it wants to be looked after.
     fn deadline(&self) -> Option<Instant>;
+
+    /// Whether this is the question it waits for now. Where a unit ends it as a line and falls silent, only that tells it
+    /// from a text about the same.
+    fn awaits(&self, _: Prompt) -> bool {
+        false
+    }
 }

@@ -3,19 +3,26 @@
 
 use crate::wire::MenuKey;
 
-/// Bytes of a piece that somebody may have typed: anything longer is a record of a file, and its letters are no keys.
+/// Bytes of a piece that a user may have typed: anything longer is a record of a file, and its letters are not keys.
 pub(super) const LONGEST_TYPED: usize = 16;
+
+const ESCAPE: u8 = 0x1B;
+
+/// Whether what comes in one piece may be words. A key that sends several characters begins with Escape.
+fn is_text(piece: &[u8]) -> bool {
+    !piece.contains(&ESCAPE)
+}
 
 /// One key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Key {
     /// One of the main menu.
     Menu(MenuKey),
-    /// X leaves the view, behind which the menu is printed.
+    /// X leaves the view; then the menu is printed.
     Leave,
     /// Enter: the end of an answer, and in the view the next object.
     Enter,
-    /// Means nothing to the menu, or stands in an answer.
+    /// Means nothing to the menu, or is part of an answer.
     Other,
 }
 
@@ -43,11 +50,32 @@ impl Typed {
     }
 }
 
-/// Reads what is sent.
+/// A part of what was typed, which is secret or open as a whole.
+pub(super) struct Stroke<'a> {
+    /// The keys.
+    pub(super) keys: &'a [u8],
+    /// The Enter after them, or nothing. It is never secret.
+    pub(super) enter: &'a [u8],
+    /// The last of the keys is an L of the menu, and what follows may be the password.
+    pub(super) opens: Option<MenuKey>,
+}
+
+/// How something was typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TypedBy {
+    /// In one piece: a key, or what was pasted.
+    Hand,
+    /// As the next part of a file.
+    File,
+}
+
+/// Reads what is typed, or what is sent.
 #[derive(Debug, Default)]
 pub(super) struct KeyReader {
-    /// The key, D or L, behind which what is typed is an answer: the `s` of `Yes` is no key.
+    /// The key, D or L, after which what is typed is an answer: the `s` of `Yes` is not a key.
     question: Option<MenuKey>,
+    /// Characters that are not keys have come in the same piece, so an `l` is part of a word.
+    in_word: bool,
 }
 
 impl KeyReader {
@@ -56,14 +84,43 @@ impl KeyReader {
         if bytes.len() > LONGEST_TYPED {
             return Typed::File;
         }
-        Typed::Keys(bytes.iter().map(|&byte| self.key(byte)).collect())
+        self.in_word = false;
+        let is_text = is_text(bytes);
+        Typed::Keys(bytes.iter().map(|&byte| self.key(byte, is_text)).collect())
     }
 
-    fn key(&mut self, byte: u8) -> Key {
-        const ESCAPE: u8 = 0x1B;
+    /// Reads what has been typed, and gives it in parts: Enter ends one, and so does an L of the menu.
+    pub(super) fn strokes<'a>(&mut self, typed: &'a [u8], by: TypedBy) -> Vec<Stroke<'a>> {
+        if by == TypedBy::Hand {
+            self.in_word = false;
+        }
+        let is_text = is_text(typed);
+        let (mut strokes, mut rest) = (Vec::new(), typed);
+        let mut length = 0;
+        for &byte in typed {
+            length += 1;
+            let (enter, opens) = match self.key(byte, is_text) {
+                Key::Enter => (1, None),
+                Key::Menu(MenuKey::Load) => (0, Some(MenuKey::Load)),
+                Key::Menu(_) | Key::Leave | Key::Other => continue,
+            };
+            let (stroke, after) = rest.split_at(length);
+            let (keys, enter) = stroke.split_at(length - enter);
+            strokes.push(Stroke { keys, enter, opens });
+            (rest, length) = (after, 0);
+        }
+        if !rest.is_empty() {
+            strokes.push(Stroke { keys: rest, enter: &[], opens: None });
+        }
+        strokes
+    }
+
+    fn key(&mut self, byte: u8, is_text: bool) -> Key {
         let key = match byte.to_ascii_lowercase() {
-            b'\r' => Key::Enter,
+            // Enter is CR; a script may send the line feeds of its file.
+            b'\r' | b'\n' => Key::Enter,
             _ if self.question.is_some() && byte != ESCAPE => return Key::Other,
+            b'l' if self.in_word => Key::Other,
             b'm' => Key::Menu(MenuKey::Menu),
             b'v' => Key::Menu(MenuKey::View),
             b'd' => Key::Menu(MenuKey::Default),
@@ -77,10 +134,15 @@ impl KeyReader {
             Key::Menu(key @ (MenuKey::Default | MenuKey::Load)) => Some(key),
             _ => None,
         };
+        self.in_word = match key {
+            Key::Enter => false,
+            Key::Other => is_text,
+            Key::Menu(_) | Key::Leave => self.in_word,
+        };
         key
     }
 
-    /// The unit has shown its menu, or has started anew: no question is open any more, whatever would have ended it.
+    /// The unit has shown its menu, or has restarted: no question is open any more, whatever would have ended it.
     pub(super) fn question_over(&mut self) {
         self.question = None;
     }
@@ -107,6 +169,36 @@ mod tests {
         assert_eq!(read(b"s\rs"), [Key::Other, Key::Enter, DIAGNOSTICS]);
         assert_eq!(read(b"lm\x1Bx"), [Key::Menu(MenuKey::Load), Key::Other, Key::Other, Key::Leave]);
         assert_eq!(read(b"tfm"), [Key::Menu(MenuKey::Stream), Key::Other, Key::Menu(MenuKey::Menu)]);
+        assert_eq!(read(b"lA\ns"), [Key::Menu(MenuKey::Load), Key::Other, Key::Enter, DIAGNOSTICS]);
+    }
+
+    #[test]
+    fn an_l_is_a_key_unless_it_is_part_of_a_word() {
+        let opens = |pieces: &[&[u8]], by| {
+            let mut reader = KeyReader::default();
+            pieces.iter().flat_map(|piece| reader.strokes(piece, by)).find_map(|stroke| stroke.opens)
+        };
+        let load = Some(MenuKey::Load);
+        for piece in ["l", "ml", "hello\rl", "\x1B[Al", "t1000\nl"] {
+            assert_eq!(opens(&[piece.as_bytes()], TypedBy::Hand), load, "{piece:?}");
+        }
+        for piece in ["hello", "all", "S1l"] {
+            assert_eq!(opens(&[piece.as_bytes()], TypedBy::Hand), None, "{piece:?}");
+        }
+        // Keys come one at a time; a file goes on.
+        for pieces in [[&b"\x1B[A"[..], b"l"], [b"he", b"l"]] {
+            assert_eq!(opens(&pieces, TypedBy::Hand), load);
+        }
+        assert_eq!(opens(&[b"he", b"llo"], TypedBy::File), None);
+        assert_eq!(opens(&[b"he\r\n", b"l"], TypedBy::File), load);
+    }
+
+    #[test]
+    fn strokes_are_all_that_was_typed() {
+        let mut reader = KeyReader::default();
+        let strokes = reader.strokes(b"ml1\n\rok", TypedBy::Hand);
+        let parts: Vec<_> = strokes.iter().map(|stroke| (stroke.keys, stroke.enter)).collect();
+        assert_eq!(parts, [(&b"ml"[..], &b""[..]), (b"1", b"\n"), (b"", b"\r"), (b"ok", b"")]);
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Our end of the cable: commands in, bytes and events out.
 //!
-//! A session appends every byte to the record first, then makes lines of them, recognises what it can, folds that into
+//! A session appends every byte to the record first, then splits them into lines, recognises what it can, folds that into
 //! [`Facts`], and drives at most one job: a dialogue with the unit that ends in an [`Outcome`]. It knows the unit only
-//! through bytes. Whatever a job does, the lines and rows go out as events as well.
+//! through bytes. Whatever a job does, lines and rows are reported as events too.
 
 mod console;
 mod diagnostics;
@@ -28,24 +28,25 @@ mod upload;
 mod watching;
 
 pub use event::*;
-pub use upload::{LoadReport, Phase, Progress, UnitNow, Verdict};
+pub use upload::{LoadReport, Phase, Progress, Proof, UnitNow, Verdict};
 
 use std::collections::VecDeque;
 
 use crate::device::Product;
 use crate::endpoint::{Arrived, Endpoint, Secrecy, Transmit};
 use crate::record::{Direction, LINK_BACK, LINK_LOST, Record};
+use crate::secret::Secret;
 use crate::time::{Duration, Instant, character_time};
 use crate::wire::stream::Source;
 use crate::wire::{Framer, MenuKey, Message, Text, Vocabulary};
 use dialogue::Dialogue;
 use hearing::PromptWatch;
 use job::{Desk, Signal, Work};
-use keys::{KeyReader, Typed};
+use keys::{KeyReader, LONGEST_TYPED, Typed, TypedBy};
 use pages::Pages;
 use password::PasswordGuard;
 use toggled::Toggled;
-use transmitter::Transmitter;
+use transmitter::{Sender, Transmitter};
 use watching::Saw;
 
 /// A conversation with one unit.
@@ -71,16 +72,19 @@ pub struct Session {
     recognises: bool,
     /// When the menu was asked for last.
     menu_asked_at: Option<Instant>,
-    /// Which lines answer a key.
+    /// What is typed, read as soon as it is: it may have to wait before it leaves.
+    typing: KeyReader,
+    /// What leaves, typed or sent by a job.
     keys: KeyReader,
+    /// Which lines answer a key.
     dialogue: Dialogue,
     /// A loader has printed who it is, and nothing but text since.
     loader_headed_at: Option<Instant>,
     /// Whether the stream is still on.
     toggled: Toggled,
-    /// Pages of diagnostics, whoever has asked for them.
+    /// Pages of diagnostics, no matter what asked for them.
     pages: Pages,
-    /// The line at hand was counted as one that nobody understands.
+    /// The current line was counted as not understood.
     counted: bool,
     /// What the stream was asked to send, or was last seen to.
     source: Option<Source>,
@@ -90,6 +94,16 @@ pub struct Session {
 struct Running {
     job: Job,
     work: Box<dyn Work + Send>,
+    /// Number of the first piece it queues, once it has begun.
+    first_piece: u64,
+}
+
+/// When a job may begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Turn {
+    Now,
+    /// When it is known who is there.
+    Next,
 }
 
 impl Session {
@@ -118,6 +132,7 @@ impl Session {
             passive: false,
             recognises: true,
             menu_asked_at: None,
+            typing: KeyReader::default(),
             keys: KeyReader::default(),
             dialogue: Dialogue::default(),
             loader_headed_at: None,
@@ -137,8 +152,8 @@ impl Session {
         Session { recognises: false, ..Session::new(baud) }
     }
 
-    /// A conversation that has been: it is told what both ends said ([`Session::handle_sent`]), sends nothing, and jobs
-    /// read what they can from what they hear, up to [`Session::recording_over`].
+    /// A conversation from a recording: it is fed what both ends said ([`Session::handle_sent`]) and sends nothing; jobs
+    /// read what they can from what they hear, until [`Session::recording_over`].
     ///
     /// # Panics
     /// If `baud` is 0.
@@ -149,15 +164,20 @@ impl Session {
     /// Takes a command, or says why not.
     ///
     /// # Errors
-    /// If another job runs or the command makes no sense; nothing has been sent then.
+    /// If another job runs or the command makes no sense; nothing has been sent then, and nothing has changed.
     pub fn command(&mut self, now: Instant, command: Command) -> Result<(), Refusal> {
         self.now = self.now.max(now);
+        let source = match &command {
+            Command::StreamOn { source, .. } => Some(*source),
+            _ => None,
+        };
+        let password = match &command {
+            Command::Load(order) => order.password.clone(),
+            _ => None,
+        };
         let (job, work): (Job, Box<dyn Work + Send>) = match command {
             Command::Cancel => {
-                if let Some(queued) = self.queued.take() {
-                    self.events.push_back(Event::Finished(Outcome::Cancelled(queued.job)));
-                }
-                self.signal(Signal::Cancel);
+                self.cancel();
                 return Ok(());
             }
             Command::ReadDictionary if self.passive => (Job::ReadDictionary, Box::<overheard::Dictionary>::default()),
@@ -166,18 +186,7 @@ impl Session {
             }
             Command::Overhear if self.passive => (Job::Overhear, Box::new(overheard::Everything::new())),
             Command::Overhear => return Err(Refusal::Live),
-            Command::Keys(_)
-            | Command::SendFile(_)
-            | Command::Identify
-            | Command::StreamOn { .. }
-            | Command::StreamOff
-            | Command::DiagnosticsOff
-            | Command::RestoreDefaults
-            | Command::Load(_)
-                if self.passive =>
-            {
-                return Err(Refusal::ReadOnly);
-            }
+            _ if self.passive => return Err(Refusal::ReadOnly),
             Command::Keys(keys) => return self.keys(&keys),
             Command::SendFile(bytes) => {
                 self.may_send_file()?;
@@ -188,7 +197,6 @@ impl Session {
                 if !(Duration::from_millis(1)..=Duration::from_secs(60)).contains(&period) {
                     return Err(Refusal::Period(period));
                 }
-                self.source = Some(source);
                 (Job::StreamOn, Box::new(console::StreamOn::new(source, period)))
             }
             Command::StreamOff => (Job::StreamOff, Box::new(console::StreamOff::default())),
@@ -197,38 +205,56 @@ impl Session {
             Command::Diagnostics { pages } => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::new(pages))),
             Command::DiagnosticsOff => (Job::Diagnostics, Box::new(diagnostics::Diagnostics::off())),
             Command::Load(order) => {
-                if let Some(password) = &order.password {
-                    let password = password.reveal();
-                    if password.is_empty() || password.iter().any(u8::is_ascii_control) {
-                        return Err(Refusal::Password);
-                    }
-                    self.password.look_for(password);
+                let password = order.password.as_ref().map(Secret::reveal);
+                if password.is_some_and(|bytes| bytes.is_empty() || bytes.iter().any(u8::is_ascii_control)) {
+                    return Err(Refusal::Password);
                 }
                 (Job::Load, Box::new(upload::Upload::new(*order)))
             }
         };
-        let next = Running { job, work };
-        let question = self.keys.question().filter(|_| job != Job::SendFile);
+        let turn = self.admit(job)?;
+        self.source = source.or(self.source);
+        if let Some(password) = password {
+            self.password.look_for(password.reveal());
+        }
+        let next = Running { job, work, first_piece: 0 };
+        match turn {
+            Turn::Now => self.begin(next),
+            Turn::Next => self.queued = Some(next),
+        }
+        Ok(())
+    }
+
+    /// When this job may begin, if it may.
+    fn admit(&self, job: Job) -> Result<Turn, Refusal> {
+        let question = self.typing.question().filter(|_| job != Job::SendFile);
         match (&self.running, question) {
-            (None, None) => {
-                self.running = Some(next);
-                self.signal(Signal::Begin);
-                Ok(())
-            }
-            // Asking who is there takes a moment and changes nothing: whoever is quicker waits for it unawares.
+            (None, None) => Ok(Turn::Now),
+            // Asking who is there takes a moment and changes nothing: a user who is quicker waits for it unawares.
             (Some(Running { job: Job::Identify, .. }), None) if self.queued.is_none() && job != Job::Identify => {
-                self.queued = Some(next);
-                Ok(())
+                Ok(Turn::Next)
             }
             (None | Some(Running { job: Job::Identify, .. }), Some(key)) => Err(Refusal::QuestionOpen(key)),
             (Some(running), _) => Err(Refusal::Busy(running.job)),
         }
     }
 
+    fn begin(&mut self, next: Running) {
+        self.running = Some(Running { first_piece: self.transmitter.next_number(), ..next });
+        self.signal(Signal::Begin);
+    }
+
+    fn cancel(&mut self) {
+        if let Some(queued) = self.queued.take() {
+            self.events.push_back(Event::Finished(Outcome::Cancelled(queued.job)));
+        }
+        self.signal(Signal::Cancel);
+    }
+
     /// The key, D or L, that was typed by hand and whose question has not been answered yet: what is sent next belongs to
     /// the answer.
     pub fn open_question(&self) -> Option<MenuKey> {
-        self.keys.question().filter(|_| self.running.is_none())
+        self.typing.question().filter(|_| self.running.is_none())
     }
 
     /// The port is gone: the running job ends with what that means, and nothing more is sent.
@@ -237,21 +263,23 @@ impl Session {
         self.transmitter.clear();
         self.signal(Signal::LinkLost);
         self.watch(Saw::LinkLost);
+        self.toggled = Toggled::default();
         self.transmitter.clear();
         self.cut_line();
     }
 
-    /// The port is back, the unit behind it perhaps another state: it does not stop us until it says so, and waits for
-    /// no password that we know of.
+    /// The port is back, the unit behind it perhaps in another state: it does not stop us until it says so, and a password
+    /// that it was waiting for it may still be waiting for.
     pub fn link_back(&mut self, now: Instant) {
         self.now = self.now.max(now);
         self.transmitter.hold(now, false);
         self.password.cut_off();
-        self.keys.question_over();
+        self.question_over();
+        self.stream_stopped();
         self.cut_line();
     }
 
-    /// Forgets who is there: what was known may be true of another unit only.
+    /// Forgets who is there: what was known may be about another unit.
     pub fn forget_unit(&mut self) {
         self.facts = Facts { unrecognised_lines: self.facts.unrecognised_lines, ..Facts::default() };
         self.source = None;
@@ -264,17 +292,15 @@ impl Session {
         self.record.push(self.now, Direction::ToUnit, Secrecy::Open, bytes);
         let typed = self.note_typed(bytes);
         self.signal(Signal::Typed(&typed));
-        self.cut_line();
     }
 
-    /// In a recording: a remark. Whoever recorded has noted there that the link was lost, and that it was back.
+    /// In a recording: a remark. The recorder notes there that the link was lost, and that it was back.
     pub fn handle_mark(&mut self, now: Instant, text: &str) {
         self.pass_to(now);
         if text == LINK_LOST {
             self.link_lost(now);
             // It says again what it says, once it is back; until then nobody knows.
-            (self.facts.stream, self.toggled) = (None, Toggled::default());
-            self.events.push_back(Event::FactsChanged);
+            self.stream_stopped();
         } else if text.starts_with(LINK_BACK) {
             self.link_back(now);
         }
@@ -340,31 +366,36 @@ impl Session {
     }
 
     fn keys(&mut self, keys: &[u8]) -> Result<(), Refusal> {
-        // What waits for the question who is there to end would send its keys behind these, and into what they open.
+        // A job that waits for the identification to end would send its keys after these, and into what they open.
         let busy = self.running.as_ref().filter(|running| running.job != Job::Identify).or(self.queued.as_ref());
         if let Some(busy) = busy {
             return Err(Refusal::Busy(busy.job));
         }
-        self.type_in(keys)
+        self.type_in(keys, TypedBy::Hand)?;
+        // The next question who is there begins with Enter, which would be the answer.
+        if self.typing.question().is_some() && self.job() == Some(Job::Identify) {
+            self.signal(Signal::Cancel);
+        }
+        Ok(())
     }
 
     /// Queues keys; what is typed where the password is asked for is secret.
-    fn type_in(&mut self, keys: &[u8]) -> Result<(), Refusal> {
+    fn type_in(&mut self, keys: &[u8], by: TypedBy) -> Result<(), Refusal> {
         // All of them or none: what is refused has not been sent.
         if !self.transmitter.has_room(keys.len()) {
             return Err(Refusal::Held);
         }
-        for stroke in password::strokes(keys) {
+        for stroke in self.typing.strokes(keys, by) {
             let secrecy = self.password.secrecy_of(&stroke);
-            self.transmitter.push_text(stroke.keys, secrecy);
-            self.transmitter.push_text(stroke.enter, Secrecy::Open);
+            self.transmitter.push_text(stroke.keys, secrecy, Sender::User);
+            self.transmitter.push_text(stroke.enter, Secrecy::Open, Sender::User);
             self.password.typed(&stroke);
         }
         Ok(())
     }
 
-    /// Takes the beginning of a backlog whose rest comes before anything that is due: see
-    /// [`handle_backlog`](Endpoint::handle_backlog), which takes the rest. So a key need not wait for all of a flood.
+    /// Takes the first part of a backlog; the rest follows, before anything that is due, through
+    /// [`handle_backlog`](Endpoint::handle_backlog). So a key does not have to wait for a whole flood.
     pub fn begin_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
         self.now = self.now.max(now);
         for piece in backlog {
@@ -379,8 +410,12 @@ impl Session {
         self.dated = self.now;
     }
 
-    /// What is printed soon may answer what has been sent: the menu that was asked for is no banner.
+    /// What is printed soon may answer what has been sent: the menu that was asked for is not a banner.
     fn note_typed(&mut self, sent: &[u8]) -> Typed {
+        if sent.len() <= LONGEST_TYPED {
+            self.look_if_due();
+            self.cut_answered();
+        }
         let typed = self.keys.read(sent);
         self.menu_asked_at = typed.asks_menu().then_some(self.now);
         self.dialogue.sent(self.now, &typed);
@@ -390,14 +425,14 @@ impl Session {
         typed
     }
 
-    /// Words without a line end behind them, the last thing the unit has printed.
+    /// Words without a line end, the last thing the unit has printed.
     fn pending(&self) -> Option<Text> {
         let mut text = self.framer.pending().filter(|text| text.text.contains(char::is_alphanumeric))?;
         self.password.scrub(&mut text.text);
         Some(text)
     }
 
-    /// What a job, or whoever listens beside it, can see and do at this moment.
+    /// What a job, or a listener beside it, can see and do at this moment.
     fn desk<'a>(&'a mut self, pending: Option<&'a Text>) -> Desk<'a> {
         Desk {
             now: self.now,
@@ -420,6 +455,7 @@ impl Session {
         let lost = matches!(signal, Signal::LinkLost);
         let before = self.facts.clone();
         let pending = self.pending();
+        let last_words = self.transmitter.next_number();
         let mut desk = self.desk(pending.as_ref());
         let outcome = running.work.handle(signal, &mut desk);
         let Desk { cut, typed, understood, .. } = desk;
@@ -431,27 +467,48 @@ impl Session {
             self.events.push_back(Event::FactsChanged);
         }
         // A job types no more than the queue has room for.
-        let _ = self.type_in(&typed);
+        let _ = self.type_in(&typed, TypedBy::File);
+        if cut {
+            self.cut_answered();
+        }
         match outcome {
             Some(outcome) => {
-                // A job has left its own questions; beside this one somebody may have typed.
+                self.transmitter.withdraw_job(running.first_piece, last_words);
+                // A job leaves its own questions; during this one the user may have typed.
                 if running.job != Job::Identify {
                     self.keys.question_over();
                 }
                 self.events.push_back(Event::Finished(outcome));
-                self.running = self.queued.take();
-                self.signal(if lost { Signal::LinkLost } else { Signal::Begin });
+                match self.queued.take() {
+                    Some(next) if lost => {
+                        self.running = Some(next);
+                        self.signal(Signal::LinkLost);
+                    }
+                    Some(next) => self.begin(next),
+                    None => {}
+                }
             }
             None => self.running = Some(running),
         }
-        if cut {
+    }
+
+    /// No question is open any more, typed or from a job.
+    fn question_over(&mut self) {
+        self.typing.question_over();
+        self.keys.question_over();
+    }
+
+    /// Something is sent: what the unit prints from now on is an answer, and not part of the text it has fallen silent
+    /// after. A line in the middle of which it is goes on.
+    fn cut_answered(&mut self) {
+        if self.framer.pending().is_none_or(|text| self.prompt.has_seen(&text)) {
             self.cut_line();
         }
     }
 
-    /// What the unit has printed without a line end is over: it stays text, and nobody is told.
+    /// Drops what the unit has printed without a line end: it stays in the record, and produces no event.
     fn cut_line(&mut self) {
-        self.prompt.due = None;
+        self.prompt.forget();
         self.framer.cut(|_| {});
     }
 }
@@ -475,9 +532,7 @@ impl Endpoint for Session {
         if self.password.due().is_some_and(|due| due <= self.now) {
             self.hand_out_echo();
         }
-        if self.prompt.due.is_some_and(|due| due <= self.now) {
-            self.look_at_prompt();
-        }
+        self.look_if_due();
         self.look_at_stream();
         self.watch(Saw::Tick);
         self.signal(Signal::Tick);
@@ -491,12 +546,11 @@ impl Endpoint for Session {
         if transmit.secrecy == Secrecy::Open {
             let typed = self.note_typed(&transmit.bytes);
             self.watch(Saw::Typed(&typed));
-            // Its next question begins with Enter, which would be the answer.
-            if self.keys.question().is_some() && self.job() == Some(Job::Identify) {
-                self.signal(Signal::Cancel);
-            }
+        } else {
+            self.look_if_due();
+            self.cut_answered();
         }
-        // The record keeps the order of time: nothing that is taken in behind this is dated before it.
+        // The record is in order of time: nothing received after this is dated before it.
         self.dated = self.now;
         self.record.push(self.now, Direction::ToUnit, transmit.secrecy, &transmit.bytes);
         Some(transmit)
@@ -506,6 +560,7 @@ impl Endpoint for Session {
         let job = self.running.as_ref().and_then(|running| running.work.deadline());
         let ours = [
             self.prompt.due,
+            self.prompt.line_due(),
             self.password.due(),
             self.toggled.due(),
             self.watching_due(),

@@ -2,10 +2,10 @@
 //!
 //! It knows the password from three sides, and none of them needs the others:
 //! - *The question.* As long as the unit asks for the password, what is typed is secret. The session hears the question
-//!   and its end; rows of the stream that go on meanwhile are no end.
-//! - *The keys.* Behind an L of the menu what follows up to Enter may be the password, even if the unit asks for it in
-//!   words that nobody knows; and a password that has been begun is one up to its Enter, whatever becomes of the question.
-//! - *The answers.* Behind a secret that was typed or sent comes its echo, up to the end of the line: the [`Echo`] tells
+//!   and its end; rows of the stream that go on meanwhile do not end it.
+//! - *The keys.* After an L of the menu what follows up to Enter may be the password, even if the unit asks for it in
+//!   unknown words; and a password that has been begun goes on up to its Enter, whatever becomes of the question.
+//! - *The answers.* After a secret that was typed or sent comes its echo, up to the end of the line: the [`Echo`] tells
 //!   it from what the unit says itself. Wherever else the unit repeats it, the [`Redactor`] finds it.
 //!
 //! What holds whatever happens:
@@ -16,6 +16,7 @@
 use zeroize::Zeroizing;
 
 use super::echo::Echo;
+use super::keys::{KeyReader, Stroke, TypedBy};
 use super::redactor::{LONGEST, Piece, Redactor};
 use crate::endpoint::Secrecy;
 use crate::time::{Duration, Instant};
@@ -26,8 +27,7 @@ const ECHO_QUIET: Duration = Duration::from_millis(30);
 /// What is secret in a conversation with a unit.
 #[derive(Default)]
 pub(super) struct PasswordGuard {
-    /// The unit asks for the password.
-    asked: bool,
+    asked: Asked,
     /// A password has been typed or sent, and the unit may echo it until its line ends.
     echoes: bool,
     echo: Echo,
@@ -37,17 +37,26 @@ pub(super) struct PasswordGuard {
     due: Option<Instant>,
 }
 
+/// Whether the unit asks for the password.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Asked {
+    #[default]
+    No,
+    Yes,
+    /// It did, or a password was being typed, when the link was lost. A replugged adapter resets no unit, so it may still
+    /// be asking: until Enter, or until it says something else.
+    Perhaps,
+}
+
 /// What has been typed by hand since the last Enter.
 #[derive(Default)]
 enum Typed {
-    /// Nothing but what can be keys of the menu; an `l` among them would have been the last.
+    /// Nothing that may be a password.
     #[default]
-    MenuKeys,
-    /// Words of some kind: an `l` in them is no key.
-    Text,
+    Open,
     /// What may be a password: it goes on up to Enter.
     Secret(TypedSecret),
-    /// Nothing behind an L and its Enter. The Enter may have come before the question, as from a script that sends
+    /// Nothing after an L and its Enter. The Enter may have come before the question, as from a script that sends
     /// everything at once: the next line may be the password still.
     Nothing,
 }
@@ -55,23 +64,6 @@ enum Typed {
 /// Whether these can be keys of the menu, or of the view.
 fn are_menu_keys(keys: &[u8]) -> bool {
     keys.iter().all(|key| b"mvdtslx".contains(&key.to_ascii_lowercase()))
-}
-
-/// A part of what was typed, which is secret or open as a whole.
-pub(super) struct Stroke<'a> {
-    /// The keys.
-    pub(super) keys: &'a [u8],
-    /// The Enter behind them, or nothing. It is never secret.
-    pub(super) enter: &'a [u8],
-}
-
-/// What was typed in parts: Enter ends a password, and behind an L begins what may be one.
-pub(super) fn strokes(typed: &[u8]) -> impl Iterator<Item = Stroke<'_>> {
-    // Enter is CR; a script may send the line feeds of its file.
-    typed.split_inclusive(|key| matches!(key, b'\r' | b'\n' | b'l' | b'L')).map(|part| {
-        let (keys, enter) = part.split_at(part.len() - usize::from(part.ends_with(b"\r") || part.ends_with(b"\n")));
-        Stroke { keys, enter }
-    })
 }
 
 impl PasswordGuard {
@@ -82,27 +74,48 @@ impl PasswordGuard {
 
     /// The unit asks for the password.
     pub(super) fn question(&mut self) {
-        self.asked = true;
+        self.asked = Asked::Yes;
     }
 
     /// It has gone on to something else.
     pub(super) fn question_over(&mut self) {
-        self.asked = false;
+        let is_answered_perhaps = self.asked == Asked::Perhaps && matches!(self.typed, Typed::Secret(_));
+        if !is_answered_perhaps {
+            self.asked = Asked::No;
+        }
     }
 
-    /// Whether it asks.
+    /// It shows its menu, or has started: it cannot be asking any more. What was typed in doubt were keys.
+    pub(super) fn at_menu(&mut self) {
+        if self.asked != Asked::Perhaps {
+            return;
+        }
+        self.asked = Asked::No;
+        if let Typed::Secret(secret) = std::mem::take(&mut self.typed) {
+            self.echoes = false;
+            for stroke in KeyReader::default().strokes(&secret.kept, TypedBy::Hand) {
+                self.typed(&stroke);
+            }
+        }
+    }
+
+    /// Whether it asks, or may.
     pub(super) fn is_asked(&self) -> bool {
-        self.asked
+        self.asked != Asked::No
     }
 
     /// Whether a password is in the air: the unit asks, or may be echoing one.
     pub(super) fn is_open(&self) -> bool {
-        self.asked || self.echoes
+        self.is_asked() || self.echoes
     }
 
-    /// The conversation was cut off: nothing that was under way in it goes on. What is looked for stays.
+    /// The link was lost. What had been typed of a password is not part of the next one, but the unit may still be asking
+    /// for it. What is looked for stays.
     pub(super) fn cut_off(&mut self) {
-        (self.asked, self.echoes, self.typed) = (false, false, Typed::MenuKeys);
+        if self.is_asked() || matches!(self.typed, Typed::Secret(_)) {
+            self.asked = Asked::Perhaps;
+        }
+        (self.echoes, self.typed) = (false, Typed::Open);
     }
 
     /// What the next keys are, typed by hand or of a file that is sent as if typed.
@@ -111,7 +124,7 @@ impl PasswordGuard {
             _ if self.is_open() => true,
             Typed::Secret(_) => true,
             Typed::Nothing => !are_menu_keys(stroke.keys),
-            Typed::MenuKeys | Typed::Text => false,
+            Typed::Open => false,
         };
         if is_secret { Secrecy::Secret } else { Secrecy::Open }
     }
@@ -123,13 +136,13 @@ impl PasswordGuard {
             Typed::Secret(secret) => Typed::Secret(secret),
             _ if is_secret => Typed::Secret(TypedSecret::new()),
             Typed::Nothing if stroke.keys.is_empty() => return self.typed = Typed::Nothing,
-            Typed::Nothing => Typed::MenuKeys,
+            Typed::Nothing => Typed::Open,
             other => other,
         };
         self.typed = match typed {
             Typed::Secret(mut secret) => {
                 if !stroke.keys.is_empty() {
-                    // What is typed behind a password whose echo has not ended may come back with it.
+                    // What is typed after a password whose echo has not ended may come back with it.
                     if !self.echoes && secret.is_empty() {
                         self.echo.begin();
                     }
@@ -143,17 +156,18 @@ impl PasswordGuard {
                 }
                 Typed::Secret(secret)
             }
-            // An `l` in a word is no key.
-            Typed::MenuKeys if are_menu_keys(stroke.keys) => match stroke.keys.last() {
-                Some(b'l' | b'L') => Typed::Secret(TypedSecret::new()),
-                Some(_) | None => Typed::MenuKeys,
+            Typed::Open | Typed::Nothing => match stroke.opens {
+                Some(_) => Typed::Secret(TypedSecret::new()),
+                None => Typed::Open,
             },
-            Typed::MenuKeys | Typed::Text | Typed::Nothing => Typed::Text,
         };
         if !stroke.enter.is_empty() {
+            if self.asked == Asked::Perhaps {
+                self.asked = Asked::No;
+            }
             self.typed = match &self.typed {
                 Typed::Secret(secret) if secret.is_empty() => Typed::Nothing,
-                _ => Typed::MenuKeys,
+                _ => Typed::Open,
             };
         }
     }
@@ -188,7 +202,7 @@ impl PasswordGuard {
         self.redact(pieces)
     }
 
-    /// What is no echo may hold the password all the same, or another one.
+    /// What is not an echo may hold the password all the same, or another one.
     fn redact(&mut self, pieces: Vec<Piece>) -> Vec<Piece> {
         let mut redacted = Vec::new();
         for (bytes, secrecy) in pieces {
@@ -212,7 +226,7 @@ impl PasswordGuard {
         self.due
     }
 
-    /// What looked like the beginning of the password has stood still for long enough.
+    /// Nothing has followed what looked like the beginning of the password for long enough.
     pub(super) fn hand_out(&mut self) -> Vec<Piece> {
         self.due = None;
         let pieces = self.echo.flush();
@@ -230,7 +244,7 @@ impl PasswordGuard {
 /// What has been typed of a password by hand, as the unit has it: with what was taken back taken back.
 ///
 /// It keeps as much as is ever compared. Of the rest it only counts the keys, so that taking back works; they are as
-/// secret as the others, and no memory grows by somebody who leans on a key where the unit asks.
+/// secret as the others, and leaning on a key at the question does not grow the memory.
 struct TypedSecret {
     kept: Zeroizing<Vec<u8>>,
     /// How many more have been typed.
@@ -239,7 +253,7 @@ struct TypedSecret {
 
 impl TypedSecret {
     fn new() -> Self {
-        // With its room from the beginning: a vector that grows leaves copies behind that nobody wipes.
+        // With its room from the beginning: a vector that grows leaves unwiped copies behind.
         TypedSecret { kept: Zeroizing::new(Vec::with_capacity(LONGEST)), beyond: 0 }
     }
 
@@ -268,8 +282,12 @@ mod tests {
 
     /// Types it, and gives what of it is secret as stars.
     fn type_in(guard: &mut PasswordGuard, typed: &str) -> String {
+        type_with(&mut KeyReader::default(), guard, typed)
+    }
+
+    fn type_with(reader: &mut KeyReader, guard: &mut PasswordGuard, typed: &str) -> String {
         let mut shown = String::new();
-        for stroke in strokes(typed.as_bytes()) {
+        for stroke in reader.strokes(typed.as_bytes(), TypedBy::Hand) {
             let open = guard.secrecy_of(&stroke) == Secrecy::Open;
             shown.extend(stroke.keys.iter().map(|&key| char::from(if open { key } else { REDACTED })));
             shown.extend(stroke.enter.iter().map(|_| '/'));
@@ -297,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_an_l_of_the_menu_all_is_secret_up_to_enter_and_an_l_in_a_word_is_none() {
+    fn after_an_l_of_the_menu_all_is_secret_up_to_enter_and_an_l_in_a_word_is_not_a_key() {
         for (typed, expected) in [
             ("mlAXIO-2010\rm", "ml*********/*"),
             ("L\rm", "L/m"),
@@ -316,7 +334,8 @@ mod tests {
         }
         // One key at a time is the same.
         let mut guard = PasswordGuard::default();
-        let shown: String = "mlAX\r".chars().map(|key| type_in(&mut guard, &key.to_string())).collect();
+        let mut reader = KeyReader::default();
+        let shown: String = "mlAX\r".chars().map(|key| type_with(&mut reader, &mut guard, &key.to_string())).collect();
         assert_eq!(shown, "ml**/");
         assert!(guard.is_open(), "it may be echoed");
         assert_eq!(hear(&mut guard, "AX\r\nV"), "**\r\nV");
@@ -392,8 +411,53 @@ mod tests {
         let mut guard = PasswordGuard::default();
         type_in(&mut guard, "lAXI");
         guard.cut_off();
-        assert!(!guard.is_open());
-        assert_eq!(type_in(&mut guard, "mlAXIO-2010\r"), "ml*********/");
+        assert_eq!(type_in(&mut guard, "AXIO-2010\r"), "*********/");
         assert_eq!(hear(&mut guard, "\r\nAXIO-2010"), "\r\n*********", "and not AXIAXIO-2010");
+        // Nothing was under way.
+        let mut guard = PasswordGuard::default();
+        type_in(&mut guard, "m");
+        guard.cut_off();
+        assert!(!guard.is_open());
+        assert_eq!(type_in(&mut guard, "ml"), "ml");
+    }
+
+    #[test]
+    fn a_question_that_was_open_when_the_link_was_lost_may_be_so_still() {
+        let lost = |typed: &str| {
+            let mut guard = PasswordGuard::default();
+            guard.question();
+            type_in(&mut guard, typed);
+            guard.cut_off();
+            guard
+        };
+        for typed in ["", "AXI", "AXIO-2010\r"] {
+            let mut guard = lost(typed);
+            assert!(guard.is_open(), "{typed:?}");
+            // Enter answers it, whatever it was.
+            assert_eq!(type_in(&mut guard, "O-2010\r"), "******/", "{typed:?}");
+            assert_eq!(hear(&mut guard, "\r\n"), "\r\n");
+            assert!(!guard.is_open(), "{typed:?}");
+            assert_eq!(type_in(&mut guard, "m"), "m");
+        }
+        // It says something else before anything is typed.
+        let mut guard = lost("");
+        guard.question_over();
+        assert_eq!(type_in(&mut guard, "ml"), "ml");
+        // A line in the middle of what is typed may have nothing to do with it.
+        let mut guard = lost("");
+        assert_eq!(type_in(&mut guard, "AXIO"), "****");
+        guard.question_over();
+        assert_eq!(type_in(&mut guard, "-2010\r"), "*****/");
+        // Its menu shows that what was typed were keys.
+        let mut guard = lost("");
+        assert_eq!(type_in(&mut guard, "m"), "*");
+        guard.at_menu();
+        assert!(!guard.is_open());
+        assert_eq!(type_in(&mut guard, "lAXIO-2010\r"), "l*********/");
+        assert_eq!(hear(&mut guard, "\r\nAXIO-2010"), "\r\n*********", "and not mlAXIO-2010");
+        let mut guard = lost("");
+        assert_eq!(type_in(&mut guard, "ml"), "**");
+        guard.at_menu();
+        assert_eq!(type_in(&mut guard, "AXIO-2010\r"), "*********/", "the L was one of the menu");
     }
 }

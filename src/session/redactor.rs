@@ -1,9 +1,10 @@
 //! Keeps the password out of the record wherever the unit repeats it.
 //!
-//! Its echo on the line where it was typed is found in whatever form it comes (`echo.rs`). This is for the rest: a unit that says `wrong password: ...` on the next line. Bytes that may be the beginning of the password are kept back until the
-//! next ones tell, for a moment at most: they are handed out when the line has been silent, or when flow control stands
-//! among them, which cannot wait. The password is looked for across either, so no more of it than its first three
-//! characters can be seen.
+//! Its echo on the line where it was typed is found in whatever form it comes (`echo.rs`). This is for the rest: a unit
+//! that says `wrong password: ...` on the next line, in capitals or not. Bytes that may be the beginning of the password
+//! are kept back until the next ones tell, for a moment at most: they are handed out once the line falls silent, or
+//! when flow control comes among them, which cannot wait. The password is looked for across either, so no more of it than
+//! its first three characters can be seen.
 
 use zeroize::Zeroizing;
 
@@ -20,10 +21,10 @@ pub(super) const LONGEST: usize = 128;
 #[derive(Default)]
 pub(super) struct Redactor {
     secret: Zeroizing<Vec<u8>>,
-    /// Length of the longest part of the secret that is both its beginning and the end of its first so many bytes.
+    /// Length of the longest part of the secret that is both its beginning and the end of its first bytes, by their number.
     fallback: Vec<usize>,
-    /// How many of the secret's first bytes have come last.
-    matched: usize,
+    /// The secret's first bytes that have come last, as they came.
+    matched: Zeroizing<Vec<u8>>,
     /// How many of these have been handed out.
     told: usize,
     /// What was kept back for the secret that was looked for before, and has not been handed out.
@@ -38,19 +39,20 @@ impl Redactor {
     /// was looked for before.
     pub(super) fn look_for(&mut self, secret: &[u8]) {
         let secret = &secret[..secret.len().min(LONGEST)];
-        if secret.len() < SHORTEST || secret == self.secret.as_slice() {
+        if secret.len() < SHORTEST || secret.eq_ignore_ascii_case(&self.secret) {
             return;
         }
         let left = Pieces(self.flush());
-        *self = Redactor { left, ..Redactor::default() };
-        self.secret = Zeroizing::new(secret.to_vec());
+        // With its room from the beginning: a vector that grows leaves unwiped copies behind.
+        let matched = Zeroizing::new(Vec::with_capacity(secret.len()));
+        *self = Redactor { left, matched, secret: Zeroizing::new(secret.to_vec()), ..Redactor::default() };
         self.fallback = vec![0; secret.len()];
         let mut length = 0;
         for at in 1..secret.len() {
-            while length > 0 && secret[at] != secret[length] {
+            while length > 0 && !secret[at].eq_ignore_ascii_case(&secret[length]) {
                 length = self.fallback[length - 1];
             }
-            length += usize::from(secret[at] == secret[length]);
+            length += usize::from(secret[at].eq_ignore_ascii_case(&secret[length]));
             self.fallback[at] = length;
         }
     }
@@ -68,29 +70,34 @@ impl Redactor {
                 pieces.push(&[byte], Secrecy::Open);
                 continue;
             }
-            while self.matched > 0 && self.secret[self.matched] != byte {
-                let shorter = self.fallback[self.matched - 1];
-                let passed = self.matched - shorter;
-                pieces.push(&self.secret[self.told.min(passed)..passed], Secrecy::Open);
+            while !self.matched.is_empty() && !self.goes_on_with(byte) {
+                let passed = self.matched.len() - self.fallback[self.matched.len() - 1];
+                pieces.push(&self.matched[self.told.min(passed)..passed], Secrecy::Open);
                 self.told = self.told.saturating_sub(passed);
-                self.matched = shorter;
+                self.matched.drain(..passed);
             }
-            if self.secret[self.matched] != byte {
+            if !self.goes_on_with(byte) {
                 pieces.push(&[byte], Secrecy::Open);
                 continue;
             }
-            self.matched += 1;
-            if self.matched == self.secret.len() {
-                pieces.push(&self.secret[self.told..], Secrecy::Secret);
-                (self.matched, self.told) = (0, 0);
+            self.matched.push(byte);
+            if self.matched.len() == self.secret.len() {
+                pieces.push(&self.matched[self.told..], Secrecy::Secret);
+                self.matched.clear();
+                self.told = 0;
             }
         }
         pieces.0
     }
 
+    /// Whether this is the secret's next byte.
+    fn goes_on_with(&self, byte: u8) -> bool {
+        self.secret.get(self.matched.len()).is_some_and(|next| next.eq_ignore_ascii_case(&byte))
+    }
+
     /// Whether bytes are kept back.
     pub(super) fn keeps_back(&self) -> bool {
-        self.matched > self.told || !self.left.0.is_empty()
+        self.matched.len() > self.told || !self.left.0.is_empty()
     }
 
     /// What was kept back: no more will come soon. If it does all the same, it is known as the rest.
@@ -101,18 +108,27 @@ impl Redactor {
     }
 
     fn tell(&mut self, pieces: &mut Pieces) {
-        let secrecy = if self.matched < SHORTEST { Secrecy::Open } else { Secrecy::Secret };
-        pieces.push(&self.secret[self.told..self.matched], secrecy);
-        self.told = self.matched;
+        let secrecy = if self.matched.len() < SHORTEST { Secrecy::Open } else { Secrecy::Secret };
+        pieces.push(&self.matched[self.told..], secrecy);
+        self.told = self.matched.len();
     }
 
     /// Replaces the secret in a text.
     pub(super) fn scrub(&self, text: &mut String) {
-        if let Ok(secret) = std::str::from_utf8(&self.secret)
-            && !secret.is_empty()
-            && text.contains(secret)
-        {
-            *text = text.replace(secret, &char::from(REDACTED).to_string().repeat(secret.chars().count()));
+        let length = self.secret.len();
+        if length == 0 || text.len() < length {
+            return;
+        }
+        let mut at = 0;
+        while let Some(part) = text.as_bytes().get(at..at + length) {
+            let is_secret = part.eq_ignore_ascii_case(&self.secret);
+            if is_secret && let Some(part) = text.get(at..at + length) {
+                let stars = char::from(REDACTED).to_string().repeat(part.chars().count());
+                text.replace_range(at..at + length, &stars);
+                at += stars.len();
+            } else {
+                at += 1;
+            }
         }
     }
 }
@@ -144,7 +160,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What is left of these chunks. Behind an empty one the line falls silent.
+    /// What is left of these chunks. After an empty one the line falls silent.
     fn redacted(secret: &[u8], chunks: &[&[u8]]) -> Vec<u8> {
         let mut redactor = Redactor::default();
         redactor.look_for(secret);
@@ -160,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_secret_is_found_in_pieces_and_behind_its_own_beginning() {
+    fn the_secret_is_found_in_pieces_and_after_its_own_beginning() {
         let said = |chunks: &[&str]| {
             let chunks: Vec<&[u8]> = chunks.iter().map(|chunk| chunk.as_bytes()).collect();
             String::from_utf8(redacted(b"ABABC", &chunks)).expect("ASCII")
@@ -169,6 +185,8 @@ mod tests {
         assert_eq!(said(&["ABABABC"]), "AB*****");
         assert_eq!(said(&["ABAB", "D"]), "ABABD");
         assert_eq!(said(&["ABA"]), "ABA");
+        assert_eq!(said(&["wrong: aBab", "c!", "ab"]), "wrong: *****!ab");
+        assert_eq!(said(&["abABabc", "aBaBd"]), "ab*****aBaBd", "what is not the secret comes as it came");
         assert_eq!(String::from_utf8(redacted(b"AB", &[b"CAB"])), Ok("CAB".into()), "too short to be looked for");
     }
 
@@ -181,7 +199,7 @@ mod tests {
         assert_eq!(said(&["wrong: AXIO-\x13\x1120\x1310\x11\r\n"]), "wrong: *****\x13\x11**\x13**\x11\r\n");
         assert_eq!(said(&["A\x13X\x11IO-2010"]), "A\x13X\x11*******", "its first characters could be anything");
         assert_eq!(said(&["AXIO-", "", "20", "", "10"]), "*********");
-        assert_eq!(said(&["AX", "", "TC4CO"]), "AXTC4CO", "the beginning of a name is none of a secret");
+        assert_eq!(said(&["AX", "", "TC4CO"]), "AXTC4CO", "the beginning of a name, not of a secret");
         assert_eq!(said(&["AXIO-", "", "AXIO-2010"]), "**************");
     }
 
@@ -233,13 +251,20 @@ mod tests {
         let mut text = "no such password: AXIO-2010".to_owned();
         redactor.scrub(&mut text);
         assert_eq!(text, "no such password: *********");
+        let mut text = "\u{e4}\u{f6} axio-2010: AXIO-2010AXIO-201".to_owned();
+        redactor.scrub(&mut text);
+        assert_eq!(text, "\u{e4}\u{f6} *********: *********AXIO-201");
+        redactor.look_for("Gr\u{fc}n4".as_bytes());
+        let mut text = "GR\u{fc}N4".to_owned();
+        redactor.scrub(&mut text);
+        assert_eq!(text, "*****");
     }
 
     proptest! {
         #[test]
         fn nothing_is_lost_and_the_secret_never_comes_through(
             secret in "[ab]{4,6}",
-            text in "[abc\x11\x13]{0,60}",
+            text in "[abcAB\x11\x13]{0,60}",
             cuts in prop::collection::vec(0usize..60, 0..6),
         ) {
             // A place that is cut twice is one at which the line falls silent.
@@ -250,7 +275,7 @@ mod tests {
             let found = redacted(secret.as_bytes(), &chunks);
             prop_assert_eq!(found.len(), text.len());
             let shown: Vec<u8> = found.iter().copied().filter(|byte| !matches!(*byte, XON | XOFF)).collect();
-            prop_assert!(!shown.windows(secret.len()).any(|window| window == secret.as_bytes()));
+            prop_assert!(!shown.windows(secret.len()).any(|part| part.eq_ignore_ascii_case(secret.as_bytes())));
             for (was, is) in text.bytes().zip(&found) {
                 prop_assert!(was == *is || *is == REDACTED);
             }

@@ -177,6 +177,10 @@ impl Work for RestoreDefaults {
     fn deadline(&self) -> Option<Instant> {
         self.deadline
     }
+
+    fn awaits(&self, prompt: Prompt) -> bool {
+        self.stage == Stage::Asked && prompt == Prompt::ConfirmDefaults
+    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
-//! Whether a stream that was on still is: behind a T, whoever has pressed it, by hand or in a recording, and behind a
-//! restart.
+//! Whether a stream that was on still is: after a T, typed, sent by a job or in a recording, and after a restart.
 //!
-//! The key only toggles (AXTC4CO manual, section 4.1.3), and nothing a unit prints is known to say which way. Behind it a
+//! The key only toggles (AXTC4CO manual, section 4.1.3), and nothing a unit prints is known to say which way. After it a
 //! question says that the stream was off and is being set; rows that go on, that the key was lost; neither of them, that
-//! the stream has stopped. A unit that starts anew goes on with a stream that is stored, so rows that do not come back say
+//! the stream has stopped. A unit that restarts goes on with a stream that is stored, so rows that do not come back say
 //! the same.
 
 use super::console::{ANSWER, FIRST_VALUES, NO_QUESTION, ROWS_ON_THEIR_WAY};
@@ -25,14 +24,14 @@ pub(super) struct Toggled {
 
 #[derive(Clone, Copy, Debug)]
 struct Wait {
-    behind: Behind,
+    after: After,
     since: Instant,
     /// When the stream counts as stopped, should nothing show otherwise.
     due: Instant,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Behind {
+enum After {
     Key,
     Restart,
 }
@@ -42,14 +41,14 @@ impl Toggled {
     pub(super) fn sent(&mut self, now: Instant, typed: &Typed) {
         if typed.keys().contains(&Key::Menu(MenuKey::Stream)) {
             let due = now + ANSWER.max(self.apart * 2);
-            self.wait = Some(Wait { behind: Behind::Key, since: now, due });
+            self.wait = Some(Wait { after: After::Key, since: now, due });
         }
     }
 
-    /// A unit whose stream was on has started anew.
+    /// A unit whose stream was on has restarted.
     pub(super) fn restarted(&mut self, now: Instant) {
         let due = now + FIRST_VALUES + self.apart * 2;
-        self.wait = Some(Wait { behind: Behind::Restart, since: now, due });
+        self.wait = Some(Wait { after: After::Restart, since: now, due });
     }
 
     /// The unit has printed something. Says whether that shows that the stream has stopped.
@@ -60,16 +59,16 @@ impl Toggled {
             self.last_row = Some(at);
         }
         let Some(wait) = &mut self.wait else { return false };
-        match (wait.behind, message) {
-            (Behind::Key, Message::Row(_)) if at < wait.since + ROWS_ON_THEIR_WAY => {}
+        match (wait.after, message) {
+            (After::Key, Message::Row(_)) if at < wait.since + ROWS_ON_THEIR_WAY => {}
             (_, Message::Row(_)) => self.wait = None,
-            (Behind::Key, Message::Prompt(Prompt::Source(_) | Prompt::Period)) => {
+            (After::Key, Message::Prompt(Prompt::Source(_) | Prompt::Period)) => {
                 self.wait = None;
                 return true;
             }
-            (Behind::Key, _) => wait.due = wait.due.min(at + NO_QUESTION),
+            (After::Key, _) => wait.due = wait.due.min(at + NO_QUESTION),
             // A banner and a menu say nothing of the stream.
-            (Behind::Restart, _) => {}
+            (After::Restart, _) => {}
         }
         false
     }
@@ -133,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn words_behind_the_key_shorten_the_wait_and_never_lengthen_it() {
+    fn words_after_the_key_shorten_the_wait_and_never_lengthen_it() {
         let mut toggled = toggled();
         assert!(!toggled.heard(at(1_600), &Message::Text));
         assert_eq!(toggled.due(), Some(at(2_000)));
@@ -142,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_a_restart_only_rows_say_that_a_stream_is_on() {
+    fn after_a_restart_only_rows_say_that_a_stream_is_on() {
         let mut toggled = toggled();
         toggled.restarted(at(5_000));
         let due = at(5_000) + FIRST_VALUES + Duration::from_secs(2);

@@ -18,11 +18,32 @@ const PIECE: usize = 64;
 /// Bytes that may wait while the unit holds us.
 const LIMIT: usize = 64 << 10;
 
+/// What a queued piece comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sender {
+    /// The user has typed it, or sends it as a file.
+    User,
+    /// A job: of no use once that has ended.
+    Job,
+}
+
+/// A piece that waits.
+#[derive(Debug)]
+struct Waiting {
+    piece: Transmit,
+    sender: Sender,
+    number: u64,
+}
+
 /// The way out.
 #[derive(Debug)]
 pub(super) struct Transmitter {
-    waiting: VecDeque<Transmit>,
+    waiting: VecDeque<Waiting>,
     waiting_bytes: usize,
+    /// Number of the next piece to be queued.
+    next: u64,
+    /// Number of the last piece of a job that has been let go.
+    let_go: Option<u64>,
     held_since: Option<Instant>,
     character_time: Duration,
     /// When everything let go so far must have left the line.
@@ -35,32 +56,63 @@ impl Transmitter {
         Transmitter {
             waiting: VecDeque::new(),
             waiting_bytes: 0,
+            next: 0,
+            let_go: None,
             held_since: None,
             character_time,
             free_at: Instant::ZERO,
         }
     }
 
-    /// Whether so many bytes may be queued.
+    /// Whether this many bytes may be queued.
     pub(super) fn has_room(&self, bytes: usize) -> bool {
         self.waiting_bytes + bytes <= LIMIT
     }
 
-    /// Queues typed text. Gives `false`, and takes nothing, if too much waits already.
-    pub(super) fn push_text(&mut self, bytes: &[u8], secrecy: Secrecy) -> bool {
+    /// Queues text. Gives `false`, and takes nothing, if too much waits already.
+    pub(super) fn push_text(&mut self, bytes: &[u8], secrecy: Secrecy, sender: Sender) -> bool {
         if !self.has_room(bytes.len()) {
             return false;
         }
         for piece in bytes.chunks(PIECE) {
-            self.push_piece(Transmit { bytes: piece.to_vec(), secrecy });
+            self.push(Transmit { bytes: piece.to_vec(), secrecy }, sender);
         }
         true
     }
 
-    /// Queues one piece that is let go whole.
+    /// Queues one piece of a job that is let go whole.
     pub(super) fn push_piece(&mut self, piece: Transmit) {
+        self.push(piece, Sender::Job);
+    }
+
+    fn push(&mut self, piece: Transmit, sender: Sender) {
         self.waiting_bytes += piece.bytes.len();
-        self.waiting.push_back(piece);
+        self.waiting.push_back(Waiting { piece, sender, number: self.next });
+        self.next += 1;
+    }
+
+    /// Number of the next piece to be queued.
+    pub(super) fn next_number(&self) -> u64 {
+        self.next
+    }
+
+    /// A job has ended whose first piece was `begun` and whose last words begin with piece `last`. If earlier pieces of it
+    /// still wait, nobody listens for their answers any more, so they are withdrawn; and if none has left, there is nothing
+    /// its last words could end.
+    pub(super) fn withdraw_job(&mut self, begun: u64, last: u64) {
+        let is_late = |waiting: &Waiting| waiting.sender == Sender::Job && waiting.number < last;
+        if !self.waiting.iter().any(is_late) {
+            return;
+        }
+        let has_spoken = self.let_go.is_some_and(|number| number >= begun);
+        self.waiting.retain(|waiting| waiting.sender == Sender::User || has_spoken && waiting.number >= last);
+        self.waiting_bytes = self.waiting.iter().map(|waiting| waiting.piece.bytes.len()).sum();
+    }
+
+    /// Whether a secret of a job waits.
+    pub(super) fn keeps_secret(&self) -> bool {
+        let is_secret = |waiting: &Waiting| waiting.piece.secrecy == Secrecy::Secret;
+        self.waiting.iter().any(|waiting| waiting.sender == Sender::Job && is_secret(waiting))
     }
 
     /// The unit has sent XOFF (`true`) or XON.
@@ -77,7 +129,10 @@ impl Transmitter {
         if self.held_since.is_some() || self.ready_at() > now {
             return None;
         }
-        let piece = self.waiting.pop_front()?;
+        let Waiting { piece, sender, number } = self.waiting.pop_front()?;
+        if sender == Sender::Job {
+            self.let_go = Some(number);
+        }
         self.waiting_bytes -= piece.bytes.len();
         self.free_at = self.free_at.max(now) + self.time_for(piece.bytes.len());
         Some(piece)
@@ -148,7 +203,7 @@ mod tests {
     #[test]
     fn nothing_goes_while_the_unit_holds_us() {
         let mut line = line();
-        line.push_text(b"m", Secrecy::Open);
+        line.push_text(b"m", Secrecy::Open, Sender::User);
         line.hold(Instant::from_millis(3), true);
         line.hold(Instant::from_millis(5), true);
         assert_eq!((line.poll(Instant::from_millis(9)), line.poll_timeout()), (None, None));
@@ -160,7 +215,48 @@ mod tests {
     #[test]
     fn a_queue_that_nobody_empties_has_a_limit() {
         let mut line = line();
-        assert!(line.push_text(&[b'x'; LIMIT], Secrecy::Open));
-        assert!(!line.push_text(b"y", Secrecy::Open));
+        assert!(line.push_text(&[b'x'; LIMIT], Secrecy::Open, Sender::User));
+        assert!(!line.push_text(b"y", Secrecy::Open, Sender::User));
+    }
+
+    /// What leaves, should the unit let it.
+    fn rest(line: &mut Transmitter) -> String {
+        line.hold(Instant::ZERO, false);
+        let mut rest = Vec::new();
+        while let Some(due) = line.poll_timeout() {
+            rest.extend(line.poll(due).into_iter().flat_map(|piece| piece.bytes));
+        }
+        assert_eq!(line.waiting(), 0);
+        String::from_utf8(rest).expect("keys")
+    }
+
+    #[test]
+    fn what_a_job_could_not_send_in_its_time_is_withdrawn_and_what_was_typed_is_not() {
+        // Nothing of it has left, so nothing is to be ended either.
+        let mut line = line();
+        line.hold(Instant::ZERO, true);
+        line.push_text(b"x", Secrecy::Open, Sender::User);
+        let begun = line.next_number();
+        line.push_text(b"t", Secrecy::Open, Sender::Job);
+        let last = line.next_number();
+        line.push_text(b"\r", Secrecy::Open, Sender::Job);
+        line.withdraw_job(begun, last);
+        assert_eq!(line.waiting(), 1);
+        assert_eq!(rest(&mut line), "x");
+        // The question after its first key is open: the answer is withdrawn, and the question left.
+        let begun = line.next_number();
+        line.push_text(b"t", Secrecy::Open, Sender::Job);
+        assert!(line.poll(Instant::from_millis(1_000_000)).is_some());
+        line.hold(Instant::ZERO, true);
+        line.push_text(b"f", Secrecy::Open, Sender::Job);
+        let last = line.next_number();
+        line.push_text(b"\r", Secrecy::Open, Sender::Job);
+        line.withdraw_job(begun, last);
+        assert_eq!(rest(&mut line), "\r");
+        // On a line that takes everything the last words leave.
+        let begun = line.next_number();
+        line.push_text(b"\r", Secrecy::Open, Sender::Job);
+        line.withdraw_job(begun, begun);
+        assert_eq!(rest(&mut line), "\r");
     }
 }

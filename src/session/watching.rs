@@ -72,7 +72,7 @@ impl Session {
             self.events.push_back(Event::Page { at: page.at, lines: page.lines });
         }
         if cut {
-            self.cut_line();
+            self.cut_answered();
         }
     }
 }

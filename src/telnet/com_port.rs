@@ -15,7 +15,7 @@ pub enum Refusal {
     /// There is telnet, but no serial port to set up.
     #[error("the server speaks telnet, but refuses RFC 2217 (COM-PORT-OPTION)")]
     NoComPort,
-    /// Telnet without eight-bit data adds a NUL behind every CR.
+    /// Telnet without eight-bit data adds a NUL after every CR.
     #[error("the server refuses to pass all bytes unchanged (telnet BINARY)")]
     NoBinary,
     /// Another line rate, in baud.
@@ -35,7 +35,7 @@ pub enum Refusal {
         answer: u8,
     },
     /// A command that has no end.
-    #[error("the server says something that is no telnet")]
+    #[error("the server says something that is not telnet")]
     Nonsense,
 }
 
@@ -192,7 +192,7 @@ impl Client {
         self.replies.extend([IAC, SE]);
     }
 
-    /// An answer, or what the server says of itself. What has another length than it should is no answer.
+    /// An answer, or what the server says of itself. What has the wrong length is not an answer.
     fn answer(&mut self, command: u8, value: &[u8]) {
         // Before the option is agreed on nothing was asked, so nothing is answered.
         if !matches!(self.awaited, None | Some(Awaited::Baud)) {

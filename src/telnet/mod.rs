@@ -1,8 +1,8 @@
 //! Serial ports behind a telnet connection: the part that is only bytes.
 //!
 //! Telnet is RFC 854, its negotiation RFC 855 and 1143, eight-bit data RFC 856, the remote serial port RFC 2217. Nothing
-//! here has a socket or a clock: bytes in, and the unit's bytes, replies and the state of the negotiation out. Who waits
-//! how long for the server, and what is told the user, is the owner's (`host::socket`).
+//! here has a socket or a clock: bytes in, and the unit's bytes, replies and the state of the negotiation out. How
+//! long to wait for the server, and what to tell the user, is up to the owner (`host::socket`).
 
 mod com_port;
 mod decoder;

@@ -23,7 +23,7 @@ pub(super) enum Change {
     Refused(Side, u8),
 }
 
-/// Where one option stands on one side.
+/// The state of one option on one side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Standing {
     #[default]

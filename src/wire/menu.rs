@@ -1,6 +1,6 @@
 //! Banner and main menu (AXTC4CO manual, section 4.1).
 //!
-//! Stable are the keys, the subjects behind them, the product name and a version of three numbers. Wording and layout
+//! Stable are the keys, the subjects after them, the product name and a version of three numbers. Wording and layout
 //! are unknown, so a line is taken for what its words and numbers say, in any order.
 
 use super::words::Words;
@@ -51,11 +51,11 @@ pub struct SoftwareName {
 /// How surely a version is that of the application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Confidence {
-    /// It stands alone.
+    /// It is alone.
     Bare,
     /// The line calls it software, firmware or application.
     Named,
-    /// It stands beside the product name.
+    /// It is beside the product name.
     WithProduct,
 }
 
@@ -70,7 +70,7 @@ pub(super) fn key(line: &str, words: &Words) -> Option<MenuKey> {
         ('m', &["menu"], MenuKey::Menu),
     ];
     let first = words.iter().take(3).find(|word| word.len() == 1)?.chars().next()?;
-    // A sentence about the subject is no entry: the key leads the line, or is the last of a short one.
+    // A sentence about the subject is not an entry: the key leads the line, or is the last of a short one.
     let leads = line.trim_start().trim_start_matches(|c: char| !c.is_alphanumeric()).to_lowercase();
     let alone = |c: char| leads.strip_prefix(c).is_some_and(|rest| !rest.starts_with(char::is_alphanumeric));
     let subject_words = Words::joined(line);
@@ -115,7 +115,7 @@ pub(super) fn software(words: &Words, products: &[&str]) -> Option<SoftwareName>
     Some(SoftwareName { product, version: found.map(|(_, version)| version), confidence })
 }
 
-/// What a version is that of.
+/// What a version belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Subject {
     /// The application.
@@ -126,7 +126,7 @@ enum Subject {
     Other,
 }
 
-/// What the version at this place in a line is that of: what was named last before it, or first behind it.
+/// What the version at this place in a line belongs to: what was named last before it, or first after it.
 fn subject(words: &Words, version_at: usize, product: Option<&str>) -> Option<Subject> {
     let own = ["software", "firmware", "application", "program", "fw", "sw"];
     let other = ["hardware", "hw", "loader", "bootloader", "boot", "protocol", "profile", "manual", "board"];
@@ -144,12 +144,12 @@ fn subject(words: &Words, version_at: usize, product: Option<&str>) -> Option<Su
         }
     };
     let before = || words.iter().take(version_at).filter_map(of).last();
-    let behind = || words.iter().skip(version_at + 1).find_map(of);
-    // "V1.0.0 boot loader, V1.2.0 application": where a version comes first, each is that of what stands behind it.
+    let after = || words.iter().skip(version_at + 1).find_map(of);
+    // "V1.0.0 boot loader, V1.2.0 application": where a version comes first, each belongs to what follows it.
     let leads = words
         .iter()
         .find_map(|word| if word.parse::<Version>().is_ok() { Some(true) } else { of(word).map(|_| false) });
-    if leads == Some(true) { behind().or_else(before) } else { before().or_else(behind) }
+    if leads == Some(true) { after().or_else(before) } else { before().or_else(after) }
 }
 
 /// Whether the unit says no to what was typed.
@@ -168,17 +168,17 @@ pub(super) fn is_refusal(words: &Words) -> bool {
             || word.starts_with("preop")
     };
     list.iter().enumerate().any(|(at, word)| {
-        let behind = list[at + 1..].iter().take(REFUSAL_REACH);
+        let after = list[at + 1..].iter().take(REFUSAL_REACH);
         let before = list[..at].iter().rev().take(REFUSAL_REACH);
         match *word {
-            "not" => behind.into_iter().any(|word| denies(word)),
-            "only" => behind.chain(before).any(|word| denies(word)),
+            "not" => after.into_iter().any(|word| denies(word)),
+            "only" => after.chain(before).any(|word| denies(word)),
             _ => false,
         }
     })
 }
 
-/// Words behind "not", and on either side of "only", within which it is said what is not so.
+/// Words after "not", and on either side of "only", that say what is not so.
 const REFUSAL_REACH: usize = 3;
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What a unit asks for.
 //!
 //! Prompts are known by what they offer, never by their place in a dialogue (their wording is lost with the manual's
-//! figures). What cannot be told is no prompt: the session then leaves the dialogue instead of guessing.
+//! figures). What cannot be told is not a prompt: the session then leaves the dialogue instead of guessing.
 
 use super::words::Words;
 
@@ -59,7 +59,7 @@ pub(super) fn recognise(text: &str, words: &Words) -> Option<Prompt> {
     None
 }
 
-/// Whether a question behind an L asks for the password in other words: `Code:`, `PW>`. It has to look like a question, and
+/// Whether a question after an L asks for the password in other words: `Code:`, `PW>`. It has to look like a question, and
 /// to be about nothing else: a key to be pressed, an error's code.
 pub(super) fn asks_password_behind_load(text: &str) -> bool {
     if !text.trim_end().ends_with([':', '>']) {
@@ -82,10 +82,10 @@ const ABOUT_SOMETHING_ELSE: [&str; 12] =
     ["any", "press", "hit", "strike", "error", "product", "vendor", "order", "wrong", "invalid", "yes", "sure"];
 
 /// Which keys a question for the source offers: `(F)ield value or (P)rocess value`, `1=FV 6100h, 2=PV`,
-/// `field value <F> / process value <P>`, `F/P`. Both keys stand in the same place to their names.
+/// `field value <F> / process value <P>`, `F/P`. Both keys are in the same place relative to their names.
 fn source_keys(text: &str) -> Option<SourceKeys> {
     let lower: Vec<char> = text.to_lowercase().chars().collect();
-    let offered = [bracketed, before, behind].into_iter().find_map(|place: Place| {
+    let offered = [bracketed, before, after].into_iter().find_map(|place: Place| {
         let field_value = offered_key(&lower, &["field", "fv"], place)?;
         let process_value = offered_key(&lower, &["process", "pv"], place)?;
         (field_value != process_value).then_some(SourceKeys { field_value, process_value })
@@ -118,8 +118,8 @@ fn before(text: &[char], name: &[char]) -> Option<char> {
     (stands_alone(text, key) && gap.iter().any(|&c| "=-:)]>.".contains(c))).then(|| text[key])
 }
 
-/// `FV=1`, `field value (1)`, `Field value: f`: in brackets, or behind a sign, before anything else is listed.
-fn behind(text: &[char], name: &[char]) -> Option<char> {
+/// `FV=1`, `field value (1)`, `Field value: f`: in brackets, or after a sign, before the next entry.
+fn after(text: &[char], name: &[char]) -> Option<char> {
     let end = text.windows(name.len()).position(|window| window == name)? + name.len();
     let sign = end + text[end..].iter().position(|c| "=(:[<".contains(*c))? + 1;
     let key = sign + text[sign..].iter().position(|c| c.is_alphanumeric())?;
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_an_l_a_password_may_have_other_names() {
+    fn after_an_l_a_password_may_have_other_names() {
         for text in [
             "Please enter the access code you have received from us (case sensitive): ",
             "Code: ",

@@ -3,15 +3,15 @@
 
 use axcon::endpoint::Endpoint;
 use axcon::session::{
-    Awaited, Command, Event, FileEnd, Job, LoadReport, Outcome, Phase, Refusal, Session, UnitNow, UnitState, Verdict,
-    WalkEnd,
+    Awaited, Command, Event, FileEnd, Job, LoadOrder, LoadReport, Outcome, Phase, Proof, Refusal, Session, UnitNow,
+    UnitState, Verdict, WalkEnd,
 };
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
 use axcon::wire::MenuKey;
 use axcon::wire::stream::Source;
 
-use crate::support::bench::{image_of, order, small_image};
+use crate::support::bench::{image_of, nameless_image, order, small_image};
 
 /// A session, what it has sent, and what the other end says to that.
 struct Alone {
@@ -321,13 +321,16 @@ fn a_file_goes_as_fast_as_the_line_and_not_to_a_unit_that_does_not_take_what_was
     assert_eq!(alone.session.may_send_file(), Ok(()), "nothing waits");
     alone.session.command(alone.now, Command::Keys(b"m".to_vec())).expect("it waits");
     assert_eq!(alone.session.command(alone.now, Command::SendFile(b"x".to_vec())), Err(Refusal::Held));
-    // A cable that comes back has no hold, no question, and nothing of what waited.
+    // A cable that comes back has no hold, and nothing of what waited; but the unit may still be asking.
     alone.session.handle_bytes(alone.now, b"\x11Password: ");
     assert!(alone.session.password_open());
     alone.session.link_lost(alone.now);
     assert_eq!(alone.session.waiting(), 0);
     alone.session.link_back(alone.now);
-    assert!(!alone.session.password_open() && alone.session.held_since().is_none());
+    assert!(alone.session.password_open() && alone.session.held_since().is_none());
+    assert_eq!(alone.session.command(alone.now, Command::SendFile(b"x".to_vec())), Err(Refusal::PasswordOpen));
+    alone.session.command(alone.now, Command::Keys(b"\r".to_vec())).expect("it is free");
+    assert_eq!(alone.session.may_send_file(), Ok(()));
 }
 
 #[test]
@@ -488,6 +491,14 @@ fn end_of_an_upload(
     behind: &[(u64, &'static str)],
     asked: &[(&'static str, u64, &'static str)],
 ) -> (LoadReport, u64, String) {
+    end_of_an_upload_of(order(image_of("AXTC4CO", "1.2.0", 320)), behind, asked)
+}
+
+fn end_of_an_upload_of(
+    order: LoadOrder,
+    behind: &[(u64, &'static str)],
+    asked: &[(&'static str, u64, &'static str)],
+) -> (LoadReport, u64, String) {
     const WAITS: &str = "\r\nWaiting for application S-Record.\r\n";
     const HERE: &str = "AXTC4CO V1.1.0\r\nV - View Object Dictionary\r\nD - Default Object Dictionary\r\n\
                         T - Toggle Stream\r\nS - Diagnostics\r\nL - Load New Software\r\n";
@@ -497,7 +508,7 @@ fn end_of_an_upload(
     );
     script.extend(asked);
     let mut alone = Alone::with(&script);
-    let (outcome, time) = alone.ask(Command::Load(Box::new(order(image_of("AXTC4CO", "1.2.0", 320)))));
+    let (outcome, time) = alone.ask(Command::Load(Box::new(order)));
     let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
     let end = alone.sent.iter().position(|(_, text)| text.starts_with("S7")).unwrap_or_else(|| panic!("{report:?}"));
     let (at, _) = alone.sent[end];
@@ -643,4 +654,264 @@ fn nothing_answers_a_question_that_a_hand_has_opened_while_the_unit_was_asked_wh
     alone.session.command(begun, Command::StreamOff).expect("it waits");
     let refused = alone.session.command(begun, Command::Keys(b"d".to_vec()));
     assert_eq!(refused, Err(Refusal::Busy(Job::StreamOff)));
+}
+
+/// Types this, and lets all of it leave.
+fn type_in(session: &mut Session, now: &mut Instant, keys: &str) -> String {
+    session.command(*now, Command::Keys(keys.as_bytes().to_vec())).expect("no job runs");
+    let mut sent = Vec::new();
+    for _ in 0..20 {
+        *now += Duration::from_millis(5);
+        session.handle_timeout(*now);
+        while let Some(piece) = session.poll_transmit() {
+            sent.extend(piece.bytes);
+        }
+    }
+    String::from_utf8(sent).expect("keys")
+}
+
+/// All that is recorded, in both directions.
+fn recorded(session: &Session) -> String {
+    let bytes: Vec<u8> = session.record().entries().flat_map(|entry| entry.bytes.clone()).collect();
+    String::from_utf8(bytes).expect("text")
+}
+
+#[test]
+fn a_password_that_is_typed_after_the_adapter_was_out_is_recorded_nowhere() {
+    for (before, after) in [("", "AXIO-2010\r"), ("AXIO-", "2010\r")] {
+        let mut session = Session::new(115_200);
+        let mut now = Instant::from_millis(1);
+        session.handle_bytes(now, b"\r\nPassword: ");
+        type_in(&mut session, &mut now, before);
+        session.link_lost(now);
+        now += Duration::from_secs(3);
+        session.link_back(now);
+        assert!(session.password_open());
+        assert_eq!(type_in(&mut session, &mut now, after), after);
+        let recorded = recorded(&session);
+        assert!(!recorded.contains("AXIO") && !recorded.contains("2010"), "{recorded:?}");
+        // That was the answer.
+        session.handle_bytes(now, b"\r\n");
+        assert!(!session.password_open());
+        assert_eq!(type_in(&mut session, &mut now, "m"), "m");
+        assert!(self::recorded(&session).ends_with('m'));
+    }
+}
+
+#[test]
+fn a_unit_that_restarts_again_and_again_is_not_waited_for_without_end() {
+    let waits: Vec<_> = (1..60).map(|number| (number * 2_000, "Waiting for application S-Record.\r\n")).collect();
+    let (report, time, _) = end_of_an_upload(&waits, &[]);
+    assert_eq!((report.verdict, report.unit, time), (Verdict::Failed, UnitNow::Loader, 30_000), "{report:?}");
+    let banners: Vec<_> = (1..600).map(|number| (number * 200, "AXTC4CO V1.2.0\r\n")).collect();
+    let (report, time, _) = end_of_an_upload(&banners, &[]);
+    assert_eq!((report.verdict, time), (Verdict::Done, 30_000), "{report:?}");
+}
+
+#[test]
+fn of_an_image_without_identity_nobody_says_that_it_is_what_the_unit_runs() {
+    let (report, _, _) = end_of_an_upload_of(order(nameless_image("AXTC4CO")), &[(100, "AXTC4CO V1.1.0\r\n")], &[]);
+    assert_eq!((report.verdict, report.proof), (Verdict::Done, Proof::Missing), "{report:?}");
+    assert!(report.what.contains("cannot be told"), "{}", report.what);
+    assert!(report.advice().starts_with("compare"), "{}", report.advice());
+    let (report, _, _) = end_of_an_upload(&[(100, "AXTC4CO V1.2.0\r\n")], &[]);
+    assert_eq!((report.proof, report.what.as_str()), (Proof::Banner, "the unit runs AXTC4CO V1.2.0"));
+}
+
+/// A menu that does not say whose it is.
+const NAMELESS_MENU: &str = "V - View Object Dictionary\r\nD - Default Object Dictionary\r\nT - Toggle Stream\r\n\
+                             S - Diagnostics\r\nL - Load New Software\r\n";
+
+#[test]
+fn a_name_that_was_heard_before_the_upload_may_be_that_of_another_unit() {
+    let load = |menu: &'static str, product: Option<&str>| {
+        let mut alone = Alone::with(&[("\u{11}m", 3, menu), ("~m", 3, menu), ("l", 5, "Not allowed\r\n")]);
+        alone.session.handle_bytes(alone.now, b"AXTC4CO V1.1.0\r\n");
+        let product = product.map(str::to_owned);
+        let order = LoadOrder { product, ..order(image_of("AXTC4CO", "1.2.0", 320)) };
+        let (outcome, _) = alone.ask(Command::Load(Box::new(order)));
+        let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+        (*report, alone)
+    };
+    let (report, alone) = load(NAMELESS_MENU, None);
+    assert_eq!((report.verdict, report.product), (Verdict::Refused, None), "{}", report.what);
+    assert!(report.what.contains("does not say which product"), "{}", report.what);
+    assert!(alone.log().ends_with(":~m") && alone.session.facts().product.is_none(), "{}", alone.log());
+    // Somebody says it, or the unit itself does.
+    let (report, _) = load(NAMELESS_MENU, Some("AXTC4CO"));
+    assert_eq!(report.verdict, Verdict::UnitRefused, "{}", report.what);
+    let (report, _) = load("AXTC4CO\r\nV - View\r\nD - Default\r\nL - Load\r\n", None);
+    assert_eq!(report.verdict, Verdict::UnitRefused, "{}", report.what);
+    let (report, _) = load(MENU, None);
+    assert_eq!((report.verdict, report.product.as_deref()), (Verdict::Refused, Some("AXRTD8CO")), "{}", report.what);
+}
+
+#[test]
+fn what_one_unit_has_said_of_itself_is_not_true_of_another() {
+    let mut session = Session::new(115_200);
+    session.handle_bytes(
+        Instant::from_millis(1),
+        b"AXTC4CO V1.1.0\r\nNode-ID: 5\r\n  23.500;  24.125;Disabled;OpenCct ; -12.750\r\n",
+    );
+    let before = session.facts().clone();
+    assert!(before.version.is_some() && before.node_id.is_some() && before.stream.is_some(), "{before:?}");
+    session.handle_bytes(Instant::from_millis(9_000), b"Welcome to AXTC4CO\r\n");
+    assert_eq!(session.facts().version, before.version);
+    session.handle_bytes(Instant::from_millis(9_100), b"Welcome to AXRTD8CO\r\n");
+    let facts = session.facts();
+    assert_eq!(facts.product.as_ref().map(|known| known.value.as_str()), Some("AXRTD8CO"));
+    assert_eq!((&facts.version, &facts.node_id, facts.stream), (&None, &None, None));
+    assert_eq!(facts.state, UnitState::Application);
+}
+
+#[test]
+fn keys_that_still_wait_have_opened_their_question_all_the_same() {
+    let mut session = Session::new(115_200);
+    let now = Instant::from_millis(1);
+    session.handle_bytes(now, b"\x13");
+    session.command(now, Command::Keys(b"dYe".to_vec())).expect("it is free");
+    assert_eq!((session.waiting(), session.open_question()), (3, Some(MenuKey::Default)));
+    let refused = session.command(now, Command::Diagnostics { pages: Some(1) });
+    assert_eq!(refused, Err(Refusal::QuestionOpen(MenuKey::Default)));
+    // The question who is there ends before it can send the Enter that would be the answer.
+    let mut session = Session::new(115_200);
+    session.handle_bytes(now, b"\x13");
+    session.command(now, Command::Identify).expect("it is free");
+    session.command(now, Command::Keys(b"d".to_vec())).expect("only who is there is asked");
+    assert_eq!(session.job(), None);
+}
+
+#[test]
+fn what_a_job_could_not_send_in_its_time_is_not_sent_later() {
+    for (command, typed) in [(Command::Diagnostics { pages: Some(1) }, "x"), (on(), ""), (Command::StreamOff, "")] {
+        let name = format!("{command:?}");
+        let mut alone = Alone::with(&[]);
+        alone.session.handle_bytes(alone.now, b"AXTC4CO V1.1.0\r\n\x13");
+        if !typed.is_empty() {
+            alone.session.command(alone.now, Command::Keys(typed.as_bytes().to_vec())).expect("it is free");
+        }
+        let (outcome, _) = alone.ask(command);
+        assert!(matches!(outcome, Outcome::NoAnswer { .. }), "{name}: {outcome:?}");
+        assert_eq!(alone.log(), "", "{name}");
+        alone.now += Duration::from_secs(600);
+        alone.session.handle_bytes(alone.now, b"\x11");
+        alone.take_sent(alone.now);
+        assert_eq!(alone.log(), if typed.is_empty() { "" } else { "0:x" }, "{name}");
+    }
+    // A password that could not leave was not sent.
+    let (report, mut alone) = upload_behind(&[("l", 5, "Password: \x13")]);
+    assert_eq!((report.verdict, report.password_sent), (Verdict::UnitRefused, false), "{report:?}");
+    assert!(!report.what.contains("did not accept") && password_at(&alone).is_none(), "{report:?}");
+    alone.session.handle_bytes(alone.now, b"\x11");
+    alone.take_sent(alone.now);
+    assert!(alone.log().ends_with(":l"), "{}", alone.log());
+}
+
+#[test]
+fn a_note_before_the_question_is_not_a_refusal_and_a_refusal_is_left_with_enter() {
+    for asks in
+        ["Note: a wrong password is refused.\r\nPassword: ", "Note: a wrong password is refused.\r\nPassword:\r\n"]
+    {
+        let (report, alone) = upload_behind(&[("l", 5, asks)]);
+        assert!(report.password_sent && password_at(&alone).is_some_and(|at| at < 300), "{asks:?}: {}", alone.log());
+    }
+    let (report, alone) = upload_behind(&[("l", 5, "Not allowed in operational state\r\n")]);
+    assert_eq!((report.verdict, report.password_sent), (Verdict::UnitRefused, false), "{report:?}");
+    assert_eq!(report.what, "the unit refuses to load new software");
+    let pressed = alone.sent.iter().find(|(_, text)| text == "l").expect("L").0;
+    assert_eq!(alone.sent.last(), Some(&(pressed + 505, "~".to_owned())), "{}", alone.log());
+}
+
+#[test]
+fn a_question_on_a_line_of_its_own_is_answered_when_nothing_follows() {
+    let (report, alone) = upload_behind(&[("l", 5, "Enter password:\r\n")]);
+    assert!(report.password_sent && password_at(&alone) == Some(255), "{}", alone.log());
+    let lines = [
+        ("t", 5, "Field value (F) or process value (P)?\r\n"),
+        ("f", 5, "Repetition rate in ms (1..60000):\r\n"),
+        ("200~", 5, "OK\r\n"),
+        ("", 200, ROW),
+    ];
+    let mut alone = Alone::with(&lines);
+    assert_eq!(alone.ask(on()).0, Outcome::StreamRuns { was_on: false }, "{}", alone.log());
+    assert!(alone.log().starts_with("0:t 255:f 510:200~"), "{}", alone.log());
+    let mut alone = Alone::with(&lines[..1]);
+    assert_eq!(alone.ask(Command::StreamOff).0, Outcome::Done(Job::StreamOff));
+    assert_eq!(alone.log(), "0:t 255:~", "the question is left");
+    let mut alone = Alone::with(&[("d", 5, "Restore the defaults? Enter Yes:\r\n"), ("Yes~", 50, MENU)]);
+    alone.ask(Command::RestoreDefaults);
+    assert!(alone.log().starts_with("0:d 255:Yes~"), "{}", alone.log());
+    // Something follows.
+    let (report, alone) = upload_behind(&[("l", 5, "About the password:\r\n"), ("", 200, "Ask your dealer\r\n")]);
+    assert!(!report.password_sent, "{}", alone.log());
+}
+
+#[test]
+fn behind_an_l_between_other_keys_all_is_secret_and_a_line_feed_ends_it() {
+    let mut session = Session::new(115_200);
+    let mut now = Instant::from_millis(1);
+    for keys in ["\x1b[A", "l"] {
+        type_in(&mut session, &mut now, keys);
+    }
+    session.handle_bytes(now, b"Enter access: ");
+    type_in(&mut session, &mut now, "AXIO-2010\r");
+    assert!(!recorded(&session).contains("AXIO"), "{:?}", recorded(&session));
+    let mut session = Session::new(115_200);
+    type_in(&mut session, &mut now, "l\nAXIO\n");
+    assert_eq!(session.open_question(), None);
+    session.command(now, Command::Diagnostics { pages: Some(1) }).expect("it is free");
+}
+
+#[test]
+fn a_command_that_is_refused_has_changed_nothing() {
+    let mut session = Session::new(115_200);
+    let now = Instant::from_millis(1);
+    session.command(now, Command::StreamOff).expect("it is free");
+    let load = Command::Load(Box::new(order(small_image("AXTC4CO", "1.2.0"))));
+    assert_eq!(session.command(now, load), Err(Refusal::Busy(Job::StreamOff)));
+    session.handle_bytes(now, b"AXIO-2010\r\n");
+    assert!(recorded(&session).contains("AXIO-2010"), "nobody has said that this is a password");
+    // A row without a number is one of the source that was asked for.
+    let process = Command::StreamOn { source: Source::ProcessValue, period: Duration::from_millis(200) };
+    assert_eq!(session.command(now, process), Err(Refusal::Busy(Job::StreamOff)));
+    while session.poll_event().is_some() {}
+    session.handle_bytes(now, b"Disabled;Disabled;Disabled;Disabled; -12.750\r\n");
+    session.handle_bytes(now, b"Disabled;Disabled;Disabled;Disabled;OpenCct \r\n");
+    assert_eq!(session.facts().stream, Some(Source::FieldValue));
+}
+
+#[test]
+fn a_key_in_the_middle_of_a_row_leaves_the_row_live_and_in_a_recording() {
+    let (begin, end) = ROW.split_at(16);
+    let heard = |session: &mut Session| {
+        let mut heard = Vec::new();
+        while let Some(event) = session.poll_event() {
+            match event {
+                Event::Row { span, .. } => heard.push(format!("row {}", span.start)),
+                Event::Heard { message, .. } => heard.push(format!("{message:?}")),
+                _ => {}
+            }
+        }
+        heard
+    };
+    let [at_once, later] = [10, 200].map(Instant::from_millis);
+    let question = "F - field value, P - process value: ";
+    for (begin, end, key_at, expected) in [
+        (begin, end, at_once, 1),
+        // The question has been heard, and is not part of what answers it.
+        (question, ROW, later, 2),
+    ] {
+        let mut live = Session::new(115_200);
+        live.handle_bytes(Instant::from_millis(5), begin.as_bytes());
+        live.handle_timeout(key_at);
+        live.command(key_at, Command::Keys(b"m".to_vec())).expect("it is free");
+        assert!(live.poll_transmit().is_some());
+        live.handle_bytes(later, end.as_bytes());
+        let mut replay = Session::of_recording(115_200);
+        replay.handle_bytes(Instant::from_millis(5), begin.as_bytes());
+        replay.handle_sent(key_at, b"m");
+        replay.handle_bytes(later, end.as_bytes());
+        let live = heard(&mut live);
+        assert_eq!((live.len(), &live), (expected, &heard(&mut replay)), "{begin:?}");
+    }
 }

@@ -379,6 +379,17 @@ fn words_among_the_records_are_heard_out_and_many_of_them_are_no_loaders() {
     assert_eq!((report.what.as_str(), upload.counts()), ("what answers does not talk as a loader does", [1, 4, 0]));
     assert_eq!(upload.others(), "\\r", "whatever it has opened is left");
     assert_eq!(lines(5).report.verdict, Verdict::Done);
+    // Those of a pass that was too fast do not count in the next one.
+    let mut round = 0;
+    let upload = Upload::to("AXTC4CO", move |number, text| {
+        round += usize::from(number == 0);
+        match (round, number) {
+            (1, 6..=8) | (2, 6) => vec![(100, "Unbekannter Befehl\r\n")],
+            (1, 9) => vec![(500, "Error # 0005\r\nRestarting.\r\n"), (300_000, WAITS)],
+            _ => with_pages(number, text),
+        }
+    });
+    assert_eq!((upload.report.verdict, upload.counts()[0]), (Verdict::Done, 2), "{:?}", upload.report);
 }
 
 #[test]
@@ -408,6 +419,13 @@ fn a_complaint_in_any_words_stops_the_sender_within_one_record_and_is_quoted() {
     let report = &upload.report;
     assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
     assert!(report.what.contains("reason 6") && upload.counts()[1] <= 6, "{report:?}");
+    // Even if what it says comes in pieces that are not lines.
+    let upload = Upload::to("AXTC4CO", move |number, _| match number {
+        5 => vec![(0, "\r\nTransfer aborted: reason 6\r\nWaiting for application S-Re"), (10_000, "cord.\r\n")],
+        _ => Vec::new(),
+    });
+    let report = &upload.report;
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
 }
 
 #[test]

@@ -146,7 +146,7 @@ fn upload_over(
     }
     let noted = journal.note.as_ref().map(|note| note.product.clone());
     let said = facts.product.as_ref().map(|known| known.value.clone());
-    let believed = said.or(args.product.map(|product| product.name.clone())).or_else(|| noted.clone());
+    let believed = said.clone().or(args.product.map(|product| product.name.clone())).or_else(|| noted.clone());
     let ran = believed.and_then(|product| journal.ran(&product));
     let talks = matches!(facts.state, UnitState::Loader | UnitState::Application);
     if talks && facts.version.is_none() && ran.is_none() && image.identity().is_some() {
@@ -165,7 +165,7 @@ fn upload_over(
     }
     let password = consent(talk, password.as_ref(), &facts, global, output)?;
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
-    let product = args.product.map(|product| product.name.clone()).or(noted);
+    let product = args.product.map(|product| product.name.clone()).or(said).or(noted);
     // Whom nobody but the note has told of the product has to learn how a wrong note is corrected.
     let doubt = journal.note.as_ref().filter(|_| args.product.is_none() && facts.product.is_none()).map(doubt);
     let note = journal.compose(&facts, product.as_deref(), name, talk);

@@ -284,12 +284,14 @@ pub fn phase_name(phase: Phase) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::Proof;
     use crate::time::Duration;
 
     #[test]
     fn whoever_has_to_say_which_product_it_is_is_told_how() {
         let report = LoadReport {
             verdict: Verdict::Refused,
+            proof: Proof::Banner,
             phase: Phase::Check,
             unit: UnitNow::Application,
             found_in_loader: false,

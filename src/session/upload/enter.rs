@@ -4,7 +4,7 @@ use super::super::event::{Facts, Outcome, UnitState};
 use super::super::identify::Identify;
 use super::super::job::{Desk, Signal, Work};
 use super::telling::quoted;
-use super::{FILLER, Stage, Transfer, Unheard, UnitNow, Upload, Verdict, shows_application};
+use super::{Answer, Attempt, FILLER, Stage, Transfer, Unheard, UnitNow, Upload, Verdict, shows_application};
 use crate::device::{Product, longest_erase};
 use crate::image::Software;
 use crate::time::{Duration, Instant};
@@ -15,30 +15,36 @@ const PASSWORD_PROMPT: Duration = Duration::from_millis(2500);
 /// How long the rest of a question may take that has no sign at its end: a slow unit prints it in pieces, and what is typed
 /// among them may be lost.
 const REST_OF_THE_QUESTION: Duration = Duration::from_millis(500);
+/// How long the question may take after something that sounds like a refusal: "A wrong password is refused."
+const QUESTION_AFTER_A_NOTE: Duration = Duration::from_millis(500);
 /// How long a reset into the loader may take, or the refusal of a password.
 const LOADER_PROMPT: Duration = Duration::from_secs(8);
-/// Silence behind the loader's prompt before the first record: whatever else it prints should be out.
+/// Silence after the loader's prompt before the first record: whatever else it prints should be out.
 const SETTLE: Duration = Duration::from_millis(80);
-/// How long it may go on printing behind its prompt, before what talks there is taken to be something else.
+/// How long it may go on printing after its prompt before it is taken for something else.
 const LONGEST_SETTLE: Duration = Duration::from_secs(3);
 /// How long a loader that was found waiting may take to call what we asked it an error.
 const CLEAR_LINE: Duration = Duration::from_millis(300);
-/// How long behind the password a loader that wants a key may take to ask for it, before it gets one unasked. Less than
+/// How long after the password a loader that wants a key may take to ask for it, before it gets one unasked. Less than
 /// the 10 s for which it wants one (errata E-I12).
 const UNASKED_KEY: Duration = Duration::from_millis(3000);
-/// The same behind its header.
-const UNASKED_KEY_BEHIND_HEADER: Duration = Duration::from_millis(1000);
+/// The same after its header.
+const UNASKED_KEY_AFTER_HEADER: Duration = Duration::from_millis(1000);
 /// Keys it gets at most: the reset may take longer than expected, and the line may lose one.
 const MOST_KEYS: u32 = 3;
-/// How long a loader may take behind the longest erasing until it says something.
-const BEHIND_THE_ERASE: Duration = Duration::from_secs(4);
+/// How long a loader may take after the longest erasing until it says something.
+const AFTER_THE_ERASE: Duration = Duration::from_secs(4);
 
 impl Upload {
     /// Decides, once it is known who is there, whether the image may be sent.
     pub(super) fn checked(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let facts: Facts = desk.facts.clone();
         self.version_before = facts.version.as_ref().map(|known| known.value);
-        let said = facts.product.as_ref().map(|known| known.value.clone());
+        // What an application said before may be true of another unit, since nothing shows that a plug was moved. A loader
+        // does not name its product: it is still the one that was known when it was entered.
+        let is_loader = facts.state == UnitState::Loader;
+        let said = facts.product.as_ref().filter(|known| is_loader || known.span.start >= self.asked_from);
+        let said = said.map(|known| known.value.clone());
         match facts.state {
             UnitState::Silent if self.may_come_back(desk) => {
                 let mut identify = Identify::default();
@@ -68,6 +74,7 @@ impl Upload {
             return self.end(desk, Verdict::Refused, unit, what);
         }
         let Some(product) = said.or(ordered) else {
+            desk.facts.product = None;
             let what = "the unit does not say which product it is";
             return self.end(desk, Verdict::Refused, unit, what);
         };
@@ -95,9 +102,9 @@ impl Upload {
             self.deadline = Some(desk.now + CLEAR_LINE);
         } else {
             desk.send(b"l");
-            // What was heard before is no answer to it.
+            // What was heard before is not an answer to it.
             self.heard.clear();
-            self.stage = Stage::AskedForLoader { asked: false };
+            self.stage = Stage::AskedForLoader(Answer::None);
             self.deadline = Some(desk.now + PASSWORD_PROMPT);
         }
         self.report_progress(desk);
@@ -116,28 +123,30 @@ impl Upload {
                 if text.text.trim_end().ends_with(|end: char| !end.is_alphanumeric()) {
                     return self.send_password(desk);
                 }
-                self.stage = Stage::AskedForLoader { asked: true };
+                self.stage = Stage::AskedForLoader(Answer::Question);
                 self.deadline = Some(desk.now + REST_OF_THE_QUESTION);
             }
             Message::Prompt(Prompt::AnyKey) | Message::Loader(LoaderText::AnyKey) => self.send_key(desk),
             Message::Loader(LoaderText::Header) if password_sent && self.asks_for_key() => {
-                self.unheard = Some((desk.now + UNASKED_KEY_BEHIND_HEADER, Unheard::Key));
+                self.unheard = Some((desk.now + UNASKED_KEY_AFTER_HEADER, Unheard::Key));
             }
             Message::Refusal | Message::MenuKey(_) | Message::Prompt(Prompt::Password) if password_sent => {
                 let what = "the unit did not accept the password";
-                if matches!(message, Message::Prompt(_)) {
+                // It may ask once more.
+                if !matches!(message, Message::MenuKey(_)) {
                     desk.leave_dialogue();
                 }
                 return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
             }
             Message::Prompt(_) if !password_sent => {
                 desk.leave_dialogue();
-                let what = "the unit asks something else than the password";
+                let what = "the unit asks for something other than the password";
                 return self.end(desk, Verdict::NoAnswer, UnitNow::Application, what);
             }
             Message::Refusal => {
-                let what = "the unit refuses to load new software";
-                return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+                let soon = desk.now + QUESTION_AFTER_A_NOTE;
+                self.stage = Stage::AskedForLoader(Answer::Refusal);
+                self.deadline = Some(self.deadline.map_or(soon, |deadline| deadline.min(soon)));
             }
             _ => {}
         }
@@ -159,7 +168,13 @@ impl Upload {
         None
     }
 
-    /// The unit has not asked for the password in its time, or in words that nobody knows.
+    /// The unit has said something that sounds like a refusal, and no question has followed.
+    pub(super) fn refused(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        desk.leave_dialogue();
+        self.end(desk, Verdict::UnitRefused, UnitNow::Application, "the unit refuses to load new software")
+    }
+
+    /// The unit has not asked for the password in its time, or in unknown words.
     pub(super) fn not_asked(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         if let Some(question) = desk.pending {
             self.heard = quoted(question);
@@ -181,12 +196,13 @@ impl Upload {
         if self.cancelled {
             return self.end(desk, Verdict::Interrupted, UnitNow::Loader, "cancelled; nothing has been sent");
         }
+        self.attempt = Attempt::default();
         self.stage = Stage::Settle { until: desk.now + LONGEST_SETTLE };
         self.deadline = Some(desk.now + SETTLE);
         None
     }
 
-    /// More is printed behind the prompt: the silence begins anew.
+    /// More is printed after the prompt: the silence starts over.
     pub(super) fn settling(&mut self, message: &Message, until: Instant, desk: &mut Desk<'_>) -> Option<Outcome> {
         if shows_application(message) || matches!(message, Message::Prompt(Prompt::Password)) {
             let what = "the unit left its loader before the file was sent";
@@ -206,13 +222,18 @@ impl Upload {
         if self.keys_sent < MOST_KEYS {
             self.keys_sent += 1;
             desk.send(b"\r");
-            self.unheard = Some((desk.now + UNASKED_KEY_BEHIND_HEADER, Unheard::Key));
+            self.unheard = Some((desk.now + UNASKED_KEY_AFTER_HEADER, Unheard::Key));
         }
     }
 
     /// The loader has not asked for the file in time: who is there is asked once more.
     pub(super) fn ask_who(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.unheard = None;
+        if desk.transmitter.keeps_secret() {
+            // Withdrawn as the job ends.
+            let what = "the unit asks for its password, but does not take it (held by XOFF)";
+            return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+        }
         let mut identify = Identify::default();
         let outcome = identify.handle(Signal::Begin, desk);
         self.deadline = identify.deadline();
@@ -235,19 +256,19 @@ impl Upload {
     }
 
     /// Whether the silent unit may be a loader: one that has lost its place in a record of an upload before this one, and
-    /// takes every question for the rest of it, or one that erases its flash and listens to nobody. That somebody says
-    /// which product it is speaks for it.
+    /// takes every question for the rest of it, or one that erases its flash and does not listen. It is more likely if the
+    /// product is known.
     fn may_come_back(&mut self, desk: &mut Desk<'_>) -> bool {
         let Some(product) = self.order.product.as_deref().and_then(Product::named) else { return false };
         if self.patience.is_none() {
-            self.patience = Some(desk.now + longest_erase(&product.flash) + BEHIND_THE_ERASE);
+            self.patience = Some(desk.now + longest_erase(&product.flash) + AFTER_THE_ERASE);
             self.fill_up(desk);
         }
         self.patience.is_some_and(|until| desk.now < until)
     }
 
     pub(super) fn fill_up(&mut self, desk: &mut Desk<'_>) {
-        self.filled = true;
+        self.attempt.filled = true;
         desk.send(&FILLER);
     }
 

@@ -1,7 +1,7 @@
-//! Uploading new software: find out who is there, enter the loader, send, and believe only the new banner.
+//! Uploading new software: find out who is there, enter the loader, send, and trust only the new banner.
 //!
 //! The rules, each of which has broken a real upload somewhere:
-//! - no record leaves before the loader's own prompt, and none behind the first text that says otherwise: a record
+//! - no record leaves before the loader's own prompt, and none after the first text that says otherwise: a record
 //!   begins with `S` and may contain `D`, which are keys of the menu;
 //! - text from before a reset proves nothing about after it: each stage reads what is newer than its mark;
 //! - "loaded" proves only that the end record arrived; product and version in the new banner have to be the image's;
@@ -16,7 +16,7 @@ mod transfer;
 mod under_way;
 mod verify;
 
-pub use report::{LoadReport, Phase, Progress, UnitNow, Verdict};
+pub use report::{LoadReport, Phase, Progress, Proof, UnitNow, Verdict};
 pub(super) use telling::size;
 
 use super::event::{LoadOrder, Outcome, UnitState};
@@ -25,7 +25,7 @@ use super::job::{Desk, Signal, Work};
 use crate::image::DefectId;
 use crate::time::Instant;
 use crate::version::Version;
-use crate::wire::Message;
+use crate::wire::{Message, Prompt};
 use transfer::Transfer;
 use verify::After;
 
@@ -44,7 +44,7 @@ pub(super) struct Upload {
     deadline: Option<Instant>,
     /// What is to be sent if nothing is heard until then.
     unheard: Option<(Instant, Unheard)>,
-    /// The password has left.
+    /// The password has been queued.
     password_sent: bool,
     /// Keys a loader that wants one has got.
     keys_sent: u32,
@@ -54,23 +54,17 @@ pub(super) struct Upload {
     asked_in_loader: Option<Instant>,
     /// The unit was waiting in its loader when it was found.
     found_in_loader: bool,
-    /// Lines of words nobody knows since the loader has acknowledged anything, and the records sent before the first.
-    strange: usize,
-    strange_from: usize,
-    /// Letters of a text without a line end that stands behind the records, and until when something that may talk is
-    /// heard out before the next record goes.
-    talk: String,
-    talks_until: Option<Instant>,
-    /// The loader has been brought out of a record once.
-    filled: bool,
+    attempt: Attempt,
     /// How long a silent unit is asked again and again.
     patience: Option<Instant>,
+    /// What the unit says from this offset on answers the question who is there.
+    asked_from: u64,
     /// Text that begins before this offset is history.
     mark: u64,
     /// The last text heard in this job that was not a row of the stream.
     heard: String,
     cancelled: bool,
-    /// When a hold is told of again.
+    /// When a hold is reported again.
     hold_due: Option<Instant>,
     after: After,
     progress: Option<Progress>,
@@ -78,12 +72,24 @@ pub(super) struct Upload {
     first_data: Option<(Instant, usize)>,
 }
 
+/// What is kept of one pass through the file; the next one starts from scratch.
+#[derive(Debug, Default)]
+struct Attempt {
+    /// Lines of unknown words since the loader has acknowledged anything, and the records sent before the first.
+    strange: usize,
+    strange_from: usize,
+    /// Letters of a text without a line end among the records, and until when something that may be talking is heard out
+    /// before the next record goes.
+    talk: String,
+    talks_until: Option<Instant>,
+    /// The loader has been brought out of a record once.
+    filled: bool,
+}
+
 enum Stage {
     Check(Identify),
-    /// L is out. `asked`: the unit asks for the password, and may still be printing its question.
-    AskedForLoader {
-        asked: bool,
-    },
+    /// L is out.
+    AskedForLoader(Answer),
     /// The password is out.
     PasswordSent,
     /// No loader has asked for the file: who is there is asked.
@@ -93,11 +99,13 @@ enum Stage {
         until: Instant,
     },
     Transfer,
-    /// The end record is out.
-    Finish,
+    /// The end record is out; the unit has to have come back by then.
+    Finish {
+        until: Instant,
+    },
     /// The unit runs but has not said its version: it is asked.
     AskVersion(Identify),
-    /// The loader, or somebody, has said that it is over; whether the loader waits again decides what the unit is now.
+    /// The loader, or something else, has said that it is over; whether the loader waits again decides what the unit is now.
     Failing {
         what: String,
         unit: UnitNow,
@@ -105,6 +113,17 @@ enum Stage {
         /// What happens as soon as the loader waits for a file again, if anything does.
         then: Option<Again>,
     },
+}
+
+/// What a unit has answered to L.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Answer {
+    /// Nothing that is understood.
+    None,
+    /// Something that sounds like a refusal, and may be a note before the question.
+    Refusal,
+    /// The question for the password, which it may still be printing.
+    Question,
 }
 
 /// Why everything is sent once more.
@@ -140,12 +159,9 @@ impl Upload {
             misfit: None,
             found_in_loader: false,
             asked_in_loader: None,
-            strange: 0,
-            strange_from: 0,
-            talk: String::new(),
-            talks_until: None,
-            filled: false,
+            attempt: Attempt::default(),
             patience: None,
+            asked_from: 0,
             mark: 0,
             heard: String::new(),
             cancelled: false,
@@ -162,7 +178,7 @@ impl Upload {
                 let unit = self.as_found(desk);
                 self.end(desk, Verdict::Interrupted, unit, "cancelled before anything was changed")
             }
-            Stage::AskedForLoader { .. } => {
+            Stage::AskedForLoader(_) => {
                 desk.leave_dialogue();
                 let what = "cancelled before anything was changed";
                 self.end(desk, Verdict::Interrupted, UnitNow::Application, what)
@@ -179,8 +195,8 @@ impl Upload {
                 desk.transmitter.clear();
                 self.end(desk, Verdict::Interrupted, UnitNow::Loader, "cancelled in the middle of the file")
             }
-            Stage::Finish | Stage::AskVersion(_) => {
-                let what = "cancelled behind the end of the file, before the unit came back";
+            Stage::Finish { .. } | Stage::AskVersion(_) => {
+                let what = "cancelled after the end of the file, before the unit came back";
                 self.end(desk, Verdict::Interrupted, UnitNow::Unknown, what)
             }
             Stage::Failing { then: Some(_), .. } => {
@@ -203,17 +219,15 @@ impl Upload {
     fn link_lost(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let (unit, what) = match self.stage {
             Stage::Check(_) => (self.as_found(desk), "the connection was lost before anything was changed"),
-            Stage::AskedForLoader { .. } => {
-                (UnitNow::Application, "the connection was lost before anything was changed")
-            }
+            Stage::AskedForLoader(_) => (UnitNow::Application, "the connection was lost before anything was changed"),
             Stage::PasswordSent | Stage::AskWho(_) => {
                 (UnitNow::Unknown, "the connection was lost while the unit reset into its loader")
             }
             Stage::Settle { .. } => (UnitNow::Loader, "the connection was lost before the file was sent"),
             Stage::Transfer => (UnitNow::Loader, "the connection was lost in the middle of the file"),
             Stage::Failing { .. } => (UnitNow::Loader, "the upload failed, then the connection was lost"),
-            Stage::Finish | Stage::AskVersion(_) => {
-                (UnitNow::Unknown, "the connection was lost behind the end of the file, before the unit came back")
+            Stage::Finish { .. } | Stage::AskVersion(_) => {
+                (UnitNow::Unknown, "the connection was lost after the end of the file, before the unit came back")
             }
         };
         self.end(desk, Verdict::Failed, unit, what)
@@ -236,8 +250,9 @@ impl Upload {
                 self.deadline = identify.deadline();
                 outcome.and_then(|_| self.checked(desk))
             }
-            Stage::AskedForLoader { asked: true } if due => self.send_password(desk),
-            Stage::AskedForLoader { asked: false } if due => self.not_asked(desk),
+            Stage::AskedForLoader(Answer::Question) if due => self.send_password(desk),
+            Stage::AskedForLoader(Answer::Refusal) if due => self.refused(desk),
+            Stage::AskedForLoader(Answer::None) if due => self.not_asked(desk),
             Stage::PasswordSent if due => self.ask_who(desk),
             Stage::AskWho(identify) => {
                 let outcome = identify.handle(Signal::Tick, desk);
@@ -251,7 +266,7 @@ impl Upload {
                 self.transfer(desk)
             }
             Stage::Transfer => self.transfer(desk),
-            Stage::Finish if due => self.judge(desk),
+            Stage::Finish { .. } if due => self.judge(desk),
             Stage::AskVersion(identify) => {
                 let outcome = identify.handle(Signal::Tick, desk);
                 self.deadline = identify.deadline();
@@ -276,6 +291,7 @@ impl Work for Upload {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
             Signal::Begin => {
+                self.asked_from = desk.received;
                 if let Stage::Check(identify) = &mut self.stage {
                     identify.handle(Signal::Begin, desk);
                     self.deadline = identify.deadline();
@@ -288,7 +304,7 @@ impl Work for Upload {
                 if let (Stage::Transfer, Some(transfer)) = (&self.stage, &mut self.transfer) {
                     transfer.hold(desk.now, held);
                     if !held {
-                        self.strange = 0;
+                        self.attempt.strange = 0;
                     }
                 }
                 self.report_progress(desk);
@@ -312,13 +328,13 @@ impl Work for Upload {
                         }
                         None
                     }
-                    Stage::AskedForLoader { .. } | Stage::PasswordSent if is_news => self.entering(text, message, desk),
+                    Stage::AskedForLoader(_) | Stage::PasswordSent if is_news => self.entering(text, message, desk),
                     &mut Stage::Settle { until } => self.settling(message, until, desk),
                     Stage::Transfer if is_news => {
                         self.transferring(text, message, desk);
                         None
                     }
-                    Stage::Finish if is_news => {
+                    Stage::Finish { .. } if is_news => {
                         self.finishing(message, text.span.end, desk);
                         None
                     }
@@ -331,6 +347,10 @@ impl Work for Upload {
 
     fn deadline(&self) -> Option<Instant> {
         [self.deadline, self.unheard.map(|(due, _)| due), self.hold_due].into_iter().flatten().min()
+    }
+
+    fn awaits(&self, prompt: Prompt) -> bool {
+        matches!(self.stage, Stage::AskedForLoader(_)) && prompt == Prompt::Password
     }
 }
 

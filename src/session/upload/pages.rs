@@ -10,7 +10,7 @@ use std::ops::RangeInclusive;
 /// Sizes a page may have, in words: those of the parts of this kind, and some to spare on either side.
 const SIZES: [u32; 6] = [64, 128, 256, 512, 1024, 2048];
 
-/// Holds that a size has to explain before it is believed.
+/// Holds that a size has to explain before it is assumed.
 const PROOF: u32 = 2;
 
 /// What is known of the pages.
@@ -18,7 +18,7 @@ const PROOF: u32 = 2;
 pub(super) enum Pages {
     /// So many words each.
     Words(u32),
-    /// Nobody knows: any of these, by what was seen so far, and so many holds were seen.
+    /// Nobody knows: any of these, by what was seen so far, and this many holds were seen.
     Watched { possible: Vec<u32>, holds: u32 },
     /// It stops nobody, whatever its pages are.
     Unheld,
@@ -30,8 +30,8 @@ impl Pages {
         Pages::Watched { possible: SIZES.to_vec(), holds: 0 }
     }
 
-    /// Whether the loader may stop us behind a record of these words, which follow those that end with `before`.
-    /// Pages are believed to have `believed` words.
+    /// Whether the loader may stop us after a record of these words, which follow those that end with `before`.
+    /// Pages are assumed to have `believed` words.
     pub(super) fn may_hold(&self, believed: u32, before: Option<u32>, words: &RangeInclusive<u32>) -> bool {
         match self {
             Pages::Words(size) => crosses(*size, before, words),
@@ -40,7 +40,7 @@ impl Pages {
         }
     }
 
-    /// The loader has stopped us behind a record that was alone on its way, or has not.
+    /// The loader has stopped us after a record that was alone on its way, or has not.
     pub(super) fn seen(&mut self, before: Option<u32>, words: &RangeInclusive<u32>, held: bool) {
         let Pages::Watched { possible, holds } = self else { return };
         possible.retain(|&size| crosses(size, before, words) == held);
@@ -55,7 +55,7 @@ impl Pages {
     }
 }
 
-/// Whether, with pages of so many words, data goes on in another page than the data before it ended in.
+/// Whether, with pages of this many words, data goes on in another page than the data before it ended in.
 fn crosses(size: u32, before: Option<u32>, words: &RangeInclusive<u32>) -> bool {
     let page = |word: u32| word / size.max(1);
     page(*words.start()) != page(*words.end()) || before.is_some_and(|before| page(before) != page(*words.start()))

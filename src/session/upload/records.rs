@@ -1,4 +1,4 @@
-//! The records of an upload, built anew from the image: upper case, CR behind each (the newer loaders take nothing
+//! The records of an upload, rebuilt from the image: upper case, CR after each (the newer loaders take nothing
 //! else), a four-byte header address, whole words, no count records.
 
 use std::ops::RangeInclusive;
@@ -40,7 +40,7 @@ pub(super) enum Size {
     Packed(usize),
 }
 
-/// What ends a record. The newer loaders take nothing else: LF behind it is an error, LF alone mutes them
+/// What ends a record. The newer loaders take nothing else: LF after it is an error, LF alone mutes them
 /// (docs/loaders.md).
 pub(super) const LINE_END: &[u8] = b"\r";
 
@@ -159,7 +159,7 @@ mod tests {
             assert_eq!(records[1].text, b"S30900000000112233FF91\r");
             assert_eq!(records[1].words, Some(0..=1));
         }
-        // What follows behind half a word is a record of its own.
+        // What follows after half a word is a record of its own.
         let records = build(&self::image(&[(0, 3), (2, 4)]), Size::Packed(LONGEST), LINE_END);
         let words: Vec<_> = records.iter().filter_map(|record| record.words.clone()).collect();
         assert_eq!(words, [0..=1, 2..=3]);

@@ -1,13 +1,13 @@
-//! What an upload says of itself: where it stands, and how it has ended, with what is to be done then.
+//! What an upload reports: how far it is, how it ended, and what to do next.
 //!
-//! The words of a report are for whoever has to act on it and cannot see the unit; the evidence for them is gathered in
+//! The words of a report are for a user who has to act on it and cannot see the unit; the evidence for them is gathered in
 //! `telling.rs`. Nothing here decides anything.
 
 use crate::image::DefectId;
 use crate::time::Duration;
 use crate::version::Version;
 
-/// Where an upload stands.
+/// How far an upload is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// What is being done.
@@ -24,7 +24,7 @@ pub struct Progress {
     pub address: u32,
     /// Time since the first record left.
     pub elapsed: Duration,
-    /// Time since the unit had taken the first data: behind the header a loader may erase for ten seconds, which says
+    /// Time since the unit had taken the first data: after the header a loader may erase for ten seconds, which says
     /// nothing of how fast it takes data.
     pub moving: Duration,
     /// Characters it has taken since then.
@@ -74,6 +74,8 @@ pub enum Phase {
 pub struct LoadReport {
     /// The verdict.
     pub verdict: Verdict,
+    /// What a success rests on.
+    pub proof: Proof,
     /// How far it came.
     pub phase: Phase,
     /// What is at the other end now.
@@ -102,14 +104,17 @@ pub struct LoadReport {
     pub heard: String,
     /// What speaks against the image for this unit, if that is why it was refused; it can be allowed by this name.
     pub misfit: Option<DefectId>,
-    /// What the loader has shown to be otherwise than believed, in one sentence.
+    /// Where the loader has shown an assumption to be wrong, in one sentence.
     pub remark: Option<String>,
 }
 
 impl LoadReport {
-    /// What whoever started it should do now, by what is true of the unit; to follow other words.
+    /// What the user should do now, by what is true of the unit; to follow other words.
     pub fn advice(&self) -> &'static str {
         match (self.verdict, self.unit) {
+            (Verdict::Done, _) if self.proof == Proof::Missing => {
+                "compare what the unit says it runs with what you meant to send: the file itself does not say what it is"
+            }
             (Verdict::Done, _) => "nothing: the unit runs what was sent",
             (Verdict::WrongApplication, _) => {
                 "do not put the unit into service: compare its version with the file's and send the right one; if it \
@@ -163,16 +168,26 @@ impl LoadReport {
     }
 }
 
+/// What shows that the unit runs what was sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Proof {
+    /// Its new banner, which has to name product and version of the image.
+    Banner,
+    /// Nothing can: the image has no identity that a banner could be compared with.
+    Missing,
+}
+
 /// Verdict on an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The unit runs the image: its new banner says so.
+    /// The unit runs the image: its new banner says so. For an image that does not say what it is, the banner says what the
+    /// unit runs, and nothing more is known.
     Done,
     /// Refused before anything was changed: wrong product, or product unknown.
     Refused,
     /// The unit refused: wrong password, or it did not leave the menu.
     UnitRefused,
-    /// Nobody answered, or asked in words that are not understood; nothing was sent but the question.
+    /// No answer, or a question in words that are not understood; only the request was sent.
     NoAnswer,
     /// The upload failed.
     Failed,
@@ -189,7 +204,7 @@ pub enum UnitNow {
     Application,
     /// It waits in its loader for a file.
     Loader,
-    /// Nobody can say.
+    /// It is not known.
     Unknown,
 }
 
@@ -200,6 +215,7 @@ mod tests {
     fn report(verdict: Verdict, unit: UnitNow, records: usize) -> LoadReport {
         LoadReport {
             verdict,
+            proof: Proof::Banner,
             phase: Phase::Transfer,
             unit,
             product: Some("AXTC4CO".into()),
@@ -229,6 +245,10 @@ mod tests {
     #[test]
     fn each_end_of_an_upload_has_advice_that_fits_it() {
         let advice = |report: LoadReport| report.advice().split([':', ';']).next().unwrap_or_default().to_owned();
+        let done = || report(Verdict::Done, UnitNow::Application, 3074);
+        assert_eq!(advice(done()), "nothing");
+        let unproven = LoadReport { proof: Proof::Missing, ..done() };
+        assert!(unproven.advice().starts_with("compare what the unit says"), "{}", unproven.advice());
         let refused = || report(Verdict::Refused, UnitNow::Application, 0);
         assert_eq!(
             advice(LoadReport { product: None, ..refused() }),

@@ -1,20 +1,20 @@
-//! What is told of an upload: its size beforehand, where it stands, and how it has ended.
+//! What is reported of an upload: its size beforehand, how far it is, and how it ended.
 
 use super::super::event::{Event, LoadOrder, Outcome};
 use super::super::job::Desk;
-use super::{LoadReport, Phase, Progress, Stage, UnitNow, Upload, Verdict, records, transfer};
+use super::{LoadReport, Phase, Progress, Proof, Stage, UnitNow, Upload, Verdict, records, transfer};
 use crate::device::{LoaderKind, Pacing, Product};
 use crate::time::Duration;
 use crate::wire::{Message, Text, visible};
 use transfer::Transfer;
 
-/// How often a hold is told of while it lasts.
+/// How often a hold is reported while it lasts.
 const HOLD_TOLD: Duration = Duration::from_secs(1);
 /// Characters of a quotation.
 const QUOTED: usize = 160;
 
-/// Records and characters that an order sends to the loader it is believed to meet: the one the user has named, else that
-/// of the product, which is the image's as long as nobody has said another.
+/// Records and characters that an order sends to the loader it is expected to meet: the one the user has named, else that
+/// of the product, which is the image's unless another one is named.
 pub(in crate::session) fn size(order: &LoadOrder) -> (usize, usize) {
     let image_for = || order.image.identity().map(|identity| identity.product.as_str());
     let product = order.product.as_deref().or_else(image_for).and_then(Product::named);
@@ -39,7 +39,7 @@ impl Upload {
         if records > 1 {
             self.first_data.get_or_insert((desk.now, bytes));
         } else {
-            self.first_data = None; // It begins, perhaps anew.
+            self.first_data = None; // It begins, perhaps again.
         }
         let (first, before) = self.first_data.unwrap_or((desk.now, bytes));
         let progress = Progress {
@@ -55,9 +55,9 @@ impl Upload {
             held: desk.transmitter.held_since().map(|since| desk.now.since(since)),
             again: transfer.is_again(),
         };
-        let stands = |at: &Progress| (at.phase, at.records, at.records_total, at.again, at.held.is_some());
+        let place = |at: &Progress| (at.phase, at.records, at.records_total, at.again, at.held.is_some());
         let moved = self.progress.is_none_or(|before| {
-            stands(&before) != stands(&progress)
+            place(&before) != place(&progress)
                 || progress.held.zip(before.held).is_some_and(|(now, before)| now >= before + HOLD_TOLD)
         });
         if moved {
@@ -70,13 +70,13 @@ impl Upload {
     pub(super) fn phase(&self) -> Phase {
         match self.stage {
             Stage::Check(_) => Phase::Check,
-            Stage::AskedForLoader { .. } | Stage::PasswordSent | Stage::AskWho(_) | Stage::Settle { .. } => {
+            Stage::AskedForLoader(_) | Stage::PasswordSent | Stage::AskWho(_) | Stage::Settle { .. } => {
                 Phase::EnterLoader
             }
             Stage::Transfer if self.transfer.as_ref().is_some_and(Transfer::is_erasing) => Phase::Erase,
             Stage::Transfer => Phase::Transfer,
             Stage::Failing { phase, .. } => phase,
-            Stage::Finish => Phase::Finish,
+            Stage::Finish { .. } => Phase::Finish,
             Stage::AskVersion(_) => Phase::Verify,
         }
     }
@@ -93,10 +93,11 @@ impl Upload {
         let records_total = transfer.map_or(0, |transfer| transfer.total().0);
         Some(Outcome::Loaded(Box::new(LoadReport {
             verdict,
+            proof: if self.order.image.identity().is_some() { Proof::Banner } else { Proof::Missing },
             phase: if verdict == Verdict::Done { Phase::Verify } else { self.phase() },
             unit,
             found_in_loader: self.found_in_loader,
-            password_sent: self.password_sent,
+            password_sent: self.password_sent && !desk.transmitter.keeps_secret(),
             product: self.product.clone(),
             // A loader does not say; a journal may know.
             version_before: self.version_before.or(self.order.ran),

@@ -5,24 +5,24 @@ use super::super::flaw::Flaw;
 use super::super::job::Desk;
 use super::telling::quoted;
 use super::transfer::Stall;
-use super::verify::NEW_BANNER;
+use super::verify::{LONGEST_RETURN, NEW_BANNER};
 use super::{Again, Stage, Unheard, UnitNow, Upload, Verdict, records, shows_application};
 use crate::time::{Duration, Instant};
 use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text, complains};
 
 /// How long the loader may take after an error to say that it waits again.
 const RESTART: Duration = Duration::from_secs(2);
-/// Lines of words nobody knows that a loader may print between two acknowledgements: it may have something to say of its
-/// erasing. A menu that takes records for keys says one or two behind each.
+/// Lines of unknown words that a loader may print between two acknowledgements: it may have something to say of its
+/// erasing. A menu that takes records for keys says one or two after each.
 const MOST_STRANGE: usize = 3;
-/// Records to such a line behind which they are a loader's own way to show its progress: it has one for each page.
+/// Records per such line from which on they are a loader's own way to show its progress: one for each page.
 const RECORDS_TO_A_PAGE: usize = 4;
-/// How long words are given to become something that is known: text whose line end the line has lost is looked at when it
-/// has stood still for 60 ms, an adapter of 20 ms on the way.
+/// How long words are given to become something that is known: text whose line end was lost is looked at after 60 ms of
+/// silence, with an adapter of 20 ms on the way.
 const HEARD_OUT: Duration = Duration::from_millis(100);
 /// How long an application that shows itself there may take for the rest of its banner.
 const BANNER_REST: Duration = Duration::from_millis(300);
-/// How long a loader with a ring may be silent behind the end record, before it is taken to wait for the rest of it.
+/// How long a loader with a ring may be silent after the end record, before it is taken to wait for the rest of it.
 const END_UNHEARD: Duration = Duration::from_millis(1500);
 /// How late a loader that was found waiting may answer what it was asked before the first record, on a busy computer.
 const LATE_ANSWER: Duration = Duration::from_secs(2);
@@ -47,16 +47,16 @@ impl Upload {
             _ if self.order.flaw == Some(Flaw::SendsBehindErrors) => None,
             Message::Text if !complains(&text.text) => {
                 let sent = self.transfer.as_ref().map_or(0, |transfer| transfer.reached().sent);
-                if self.strange == 0 {
-                    self.strange_from = sent;
+                if self.attempt.strange == 0 {
+                    self.attempt.strange_from = sent;
                 }
                 if has_a_word(&text.text) {
-                    self.strange += 1;
-                    self.talks_until = Some(desk.now + HEARD_OUT);
+                    self.attempt.strange += 1;
+                    self.attempt.talks_until = Some(desk.now + HEARD_OUT);
                 }
-                let pages = (sent - self.strange_from.min(sent)) / RECORDS_TO_A_PAGE;
+                let pages = (sent - self.attempt.strange_from.min(sent)) / RECORDS_TO_A_PAGE;
                 let what = "what answers does not talk as a loader does".to_owned();
-                (self.strange > MOST_STRANGE.max(pages)).then_some((what, UnitNow::Unknown))
+                (self.attempt.strange > MOST_STRANGE.max(pages)).then_some((what, UnitNow::Unknown))
             }
             Message::Text | Message::Refusal => {
                 Some((format!("the loader complains: \"{}\"", quoted(text)), UnitNow::Unknown))
@@ -102,16 +102,17 @@ impl Upload {
     }
 
     /// Until when no record goes, because something talks. A loader that takes records makes marks; words may be the
-    /// first ones of a unit that has started anew, whose keys the records would be.
+    /// first ones of a unit that has restarted, whose keys the records would be.
     pub(super) fn hears_out(&mut self, desk: &Desk<'_>) -> Option<Instant> {
         let words = desk.pending.map_or("", |text| &text.text);
         let talks = has_a_word(words) || desk.pending.is_some_and(|text| self.is_complaint(text));
         let letters = if talks { words.chars().filter(char::is_ascii_alphabetic).collect() } else { String::new() };
-        if self.talk != letters {
-            self.talks_until = (!letters.is_empty()).then_some(desk.now + HEARD_OUT).or(self.talks_until);
-            self.talk = letters;
+        if self.attempt.talk != letters {
+            self.attempt.talks_until =
+                (!letters.is_empty()).then_some(desk.now + HEARD_OUT).or(self.attempt.talks_until);
+            self.attempt.talk = letters;
         }
-        self.talks_until.filter(|&until| desk.now < until && self.order.flaw != Some(Flaw::SendsBehindErrors))
+        self.attempt.talks_until.filter(|&until| desk.now < until && self.order.flaw != Some(Flaw::SendsBehindErrors))
     }
 
     /// Whether a text without a line end says that something is wrong. The line end may be lost, or a question follow.
@@ -136,7 +137,7 @@ impl Upload {
             Ok(false) => self.deadline = transfer.deadline(),
             Ok(true) => {
                 self.mark = desk.received;
-                self.stage = Stage::Finish;
+                self.stage = Stage::Finish { until: desk.now + LONGEST_RETURN };
                 self.deadline = Some(desk.now + NEW_BANNER);
                 let ends = transfer.may_wait_in_a_record();
                 self.unheard = ends.then_some((desk.now + END_UNHEARD, Unheard::Filler));
@@ -165,7 +166,7 @@ impl Upload {
         let Message::Loader(LoaderText::Error(error)) = message else { return None };
         let transfer = self.transfer.as_ref()?;
         let is_too_fast = match error {
-            // Characters that came while it was deaf are no overrun, and may have been damaged on the line as well.
+            // Characters that came while it was deaf are not an overrun, and may have been damaged on the line as well.
             LoaderError::Number(number) => *number == OVERRUN || *number == DAMAGED && transfer.is_surprised(),
             LoaderError::Status(_) => false,
         };
@@ -176,7 +177,7 @@ impl Upload {
         (desk.now < asked_at + LATE_ANSWER && transfer.has_hardly_begun()).then_some(Again::AsBefore)
     }
 
-    /// Nothing is sent any more; what comes behind `mark` says what the unit is now.
+    /// Nothing is sent any more; what comes after `mark` says what the unit is now.
     pub(super) fn fail(&mut self, desk: &Desk<'_>, mark: u64, what: String, unit: UnitNow, then: Option<Again>) {
         self.mark = mark;
         self.stage = Stage::Failing { what, unit, phase: self.phase(), then };
@@ -195,7 +196,7 @@ impl Upload {
         self.end(desk, Verdict::Failed, unit, what)
     }
 
-    /// Something was heard behind a failure: the loader may wait for a file again.
+    /// Something was heard after a failure: the loader may wait for a file again.
     pub(super) fn failing(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
         let Stage::Failing { what, phase, then, .. } = &self.stage else { return None };
         match message {
@@ -216,7 +217,7 @@ impl Upload {
                 let what = what.clone();
                 self.after.note(message);
                 self.stage = Stage::Failing { what, unit: UnitNow::Application, phase: *phase, then: None };
-                // Which software it runs stands on a line of its own, before or behind.
+                // Which software it runs is on a line of its own, before or after.
                 if self.after.is_complete() {
                     return self.failed(desk);
                 }
@@ -232,14 +233,14 @@ impl Upload {
     pub(super) fn listen(&mut self, message: &Message, desk: &mut Desk<'_>) {
         match self.stage {
             _ if matches!(message, Message::Loader(LoaderText::Progress)) => {}
-            Stage::Finish | Stage::Failing { .. } => {
+            Stage::Finish { .. } | Stage::Failing { .. } => {
                 self.unheard = None;
-                if std::mem::take(&mut self.filled) {
+                if std::mem::take(&mut self.attempt.filled) {
                     desk.transmitter.clear();
                 }
             }
             Stage::Check(_)
-            | Stage::AskedForLoader { .. }
+            | Stage::AskedForLoader(_)
             | Stage::PasswordSent
             | Stage::AskWho(_)
             | Stage::Settle { .. }

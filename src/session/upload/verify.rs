@@ -1,21 +1,23 @@
-//! Behind the end record: what comes back has to say that it is what was sent.
+//! After the end record: what comes back has to say that it is what was sent.
 
 use super::super::event::Outcome;
 use super::super::flaw::Flaw;
 use super::super::identify::Identify;
 use super::super::job::{Desk, Signal, Work};
 use super::{Phase, Stage, UnitNow, Upload, Verdict};
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::{Confidence, LoaderText, Message, Prompt};
 
 /// From the end record to the new banner: the last page, the reset, the first start.
 pub(super) const NEW_BANNER: Duration = Duration::from_secs(20);
-/// A loader that prompts again behind the end record may still hand over to the application after a start delay.
+/// A loader that prompts again after the end record may still hand over to the application after a start delay.
 const SECOND_PROMPT: Duration = Duration::from_secs(3);
-/// Silence behind product and version that ends the banner.
+/// All of that at most, whatever is said meanwhile: a unit that restarts again and again is not waited for.
+pub(super) const LONGEST_RETURN: Duration = Duration::from_secs(30);
+/// Silence after product and version that ends the banner.
 const BANNER_QUIET: Duration = Duration::from_millis(300);
-/// Silence behind a menu, or rows, without a version before the unit is asked.
+/// Silence after a menu, or rows, without a version before the unit is asked.
 const ASK_VERSION: Duration = Duration::from_millis(1000);
 
 /// What has been heard since the end record.
@@ -58,7 +60,7 @@ impl After {
 }
 
 impl Upload {
-    /// Something was heard behind the end record. It ends at `end` in the record.
+    /// Something was heard after the end record. It ends at `end` in the record.
     pub(super) fn finishing(&mut self, message: &Message, end: u64, desk: &mut Desk<'_>) {
         if self.order.flaw == Some(Flaw::BelievesTheLoader)
             && matches!(message, Message::Loader(LoaderText::Loaded | LoaderText::Started))
@@ -66,7 +68,7 @@ impl Upload {
         {
             self.after.product = Some(identity.product.clone());
             self.after.version = Some((Confidence::WithProduct, identity.version));
-            self.deadline = Some(desk.now);
+            self.wait_until(desk.now);
         }
         match message {
             Message::Loader(LoaderText::Error(error)) => {
@@ -77,7 +79,7 @@ impl Upload {
             Message::Loader(LoaderText::Waiting | LoaderText::AnyKey)
             | Message::Prompt(Prompt::WaitingForFile | Prompt::AnyKey) => {
                 self.after = After { loader_waits: true, ..After::default() };
-                self.deadline = Some(desk.now + SECOND_PROMPT);
+                self.wait_until(desk.now + SECOND_PROMPT);
             }
             Message::Loader(LoaderText::Loaded) => {
                 if let Some(transfer) = &mut self.transfer {
@@ -86,15 +88,24 @@ impl Upload {
             }
             _ if self.after.note(message) => {
                 let asked = desk.now + ASK_VERSION;
-                self.deadline = match (message, self.after.is_complete()) {
-                    (Message::Software(_), true) => Some(desk.now + BANNER_QUIET),
-                    (Message::MenuKey(_), false) => Some(asked),
+                match (message, self.after.is_complete()) {
+                    (Message::Software(_), true) => self.wait_until(desk.now + BANNER_QUIET),
+                    (Message::MenuKey(_), false) => self.wait_until(asked),
                     // Rows may come faster than that: the unit is asked between them.
-                    (Message::Row(_) | Message::Network(_), false) => self.deadline.map(|deadline| deadline.min(asked)),
-                    _ => self.deadline,
-                };
+                    (Message::Row(_) | Message::Network(_), false) => {
+                        self.deadline = self.deadline.map(|deadline| deadline.min(asked));
+                    }
+                    _ => {}
+                }
             }
             _ => {}
+        }
+    }
+
+    /// What comes back is judged then, or when the time for all of it is over.
+    fn wait_until(&mut self, due: Instant) {
+        if let Stage::Finish { until } = self.stage {
+            self.deadline = Some(due.min(until));
         }
     }
 
@@ -106,17 +117,23 @@ impl Upload {
             let what = "the loader took the file but waits for another: it does not start what was sent";
             return self.end(desk, Verdict::Failed, UnitNow::Loader, what);
         }
-        match (&self.after.product, version) {
+        match (self.after.product.clone(), version) {
             (Some(product), Some(version)) => {
                 let runs = format!("the unit runs {product} V{version}");
-                let other =
-                    image.filter(|image| !image.product.eq_ignore_ascii_case(product) || image.version != version);
                 if let Some(transfer) = &mut self.transfer {
                     transfer.take_all_sent();
                 }
                 self.report_progress_of(Phase::Verify, desk);
-                match other {
-                    None => self.end(desk, Verdict::Done, UnitNow::Application, runs),
+                match image {
+                    None => {
+                        let what = format!(
+                            "{runs}; whether that is what was sent cannot be told, since the file has no identity"
+                        );
+                        self.end(desk, Verdict::Done, UnitNow::Application, what)
+                    }
+                    Some(sent) if sent.product.eq_ignore_ascii_case(&product) && sent.version == version => {
+                        self.end(desk, Verdict::Done, UnitNow::Application, runs)
+                    }
                     Some(sent) => {
                         let what = format!("{runs}, but {} V{} was sent", sent.product, sent.version);
                         self.end(desk, Verdict::WrongApplication, UnitNow::Application, what)
@@ -158,7 +175,7 @@ mod tests {
     fn of_all_versions_the_one_that_is_surest_counts_and_of_those_the_last() {
         let mut after = After::default();
         assert!(after.note(&named(None, (3, 2, 1), Confidence::Bare)));
-        assert!(!after.is_complete(), "nobody has said which product it is");
+        assert!(!after.is_complete(), "which product it is has not been said");
         assert!(after.note(&named(Some("AXTC4CO"), (1, 2, 0), Confidence::WithProduct)));
         assert!(after.is_complete());
         after.note(&named(None, (9, 9, 9), Confidence::Named));

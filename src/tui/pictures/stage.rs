@@ -15,8 +15,8 @@ use crate::endpoint::Transmit;
 use crate::image::{DefectId, make};
 use crate::record::Span;
 use crate::session::{
-    DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, ReadEntry, UnitNow, UnitState, Verdict,
-    WalkEnd,
+    DictionaryReading, Event, Facts, LoadReport, Outcome, Phase, Progress, Proof, ReadEntry, UnitNow, UnitState,
+    Verdict, WalkEnd,
 };
 use crate::time::{Duration, Instant};
 use crate::tui::{
@@ -449,6 +449,7 @@ pub(super) fn progress() -> Progress {
 pub(super) fn report(verdict: Verdict, unit: UnitNow) -> LoadReport {
     LoadReport {
         verdict,
+        proof: Proof::Banner,
         phase: Phase::Transfer,
         unit,
         product: Some("AXTC4CO".into()),

@@ -10,7 +10,7 @@ use axcon::device::{LoaderKind, Product};
 use axcon::emulator::cable::{Line, Plugged};
 use axcon::emulator::{Running, Setup, Unit};
 use axcon::endpoint::{Arrived, Endpoint};
-use axcon::image::{CheckedImage, make};
+use axcon::image::{CheckedImage, DefectId, make};
 use axcon::secret::Secret;
 use axcon::session::{Command, Event, LoadOrder, LoadReport, Outcome, Session};
 use axcon::time::{Duration, Instant, character_time};
@@ -348,13 +348,23 @@ pub fn order(image: CheckedImage) -> LoadOrder {
     LoadOrder::new(image, Secret::new(b"AXIO-2010".to_vec()))
 }
 
+/// An image that does not say what it is, for a user who wants it all the same.
+pub fn nameless_image(product: &str) -> CheckedImage {
+    made(product, "1.2.0", 320, Some(DefectId::NoIdentity))
+}
+
 fn checked(product: &str, version: &str, words: u32) -> CheckedImage {
+    made(product, version, words, None)
+}
+
+fn made(product: &str, version: &str, words: u32, flaw: Option<DefectId>) -> CheckedImage {
     let product = named(product);
     let version: Version = version.parse().expect("a version");
     let target = product.target();
-    let recipe = make::Recipe { target: &target, version, words, flaw: None };
+    let recipe = make::Recipe { target: &target, version, words, flaw };
     let file = make::make(&recipe).expect("an image of this size");
     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
-    let report = axcon::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice can be read");
+    let report =
+        axcon::image::check(file.as_slice(), None, &targets, None, flaw.as_slice()).expect("a slice can be read");
     report.image().unwrap_or_else(|| panic!("{:?}", report.defects))
 }

@@ -1,4 +1,4 @@
-//! What a loader's flow control shows: what is awaited behind each record, what a hold proves, and what none does.
+//! What a loader's flow control shows: what is awaited after each record, what a hold proves, and what none does.
 
 use std::ops::RangeInclusive;
 
@@ -10,13 +10,13 @@ use super::{Pages, Size, Stall, Transfer, WINDOW, believed_size};
 use crate::device::Pacing;
 use crate::time::{Duration, Instant};
 
-/// How long behind the last character of a record that crosses into another page the loader's XOFF may take: an
+/// How long after the last character of a record that crosses into another page the loader's XOFF may take: an
 /// adapter shows it 20 ms late at worst, a busy computer later still.
 const HOLD_EXPECTED: Duration = Duration::from_millis(300);
-/// How long behind the header the XOFF of a loader may take that was not expected to send one: the echo of the header's
+/// How long after the header the XOFF of a loader may take that was not expected to send one: the echo of the header's
 /// text, and an adapter of 20 ms.
 const HEADER_HOLD: Duration = Duration::from_millis(120);
-/// How long behind a record the XON may take that says it is taken, if the loader shows otherwise that it is there:
+/// How long after a record the XON may take that says it is taken, if the loader shows otherwise that it is there:
 /// words are programmed in 3 ms, but here the end of it is a failed upload, so a busy computer gets more time.
 const ACKNOWLEDGED: Duration = Duration::from_millis(1000);
 /// How long the loader may hold us. Writing a page takes it some 30 ms. Erasing all of its flash takes seconds, which
@@ -25,7 +25,7 @@ const LONGEST_HOLD: Duration = Duration::from_secs(4);
 /// The same, if nothing at all has been heard since the crossing before: a unit that lost its power is worth a moment,
 /// and not one more record, since what comes back may be its menu.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
-/// How long behind each record a hold may take while nobody knows where the loader stops its sender: an adapter of 20 ms
+/// How long after each record a hold may take while nobody knows where the loader stops its sender: an adapter of 20 ms
 /// there and back, and a busy computer.
 const WATCHED: Duration = Duration::from_millis(120);
 /// Words that may leave, from the header on, without any sign of life: the largest pages of such parts have 512, and twice
@@ -34,13 +34,13 @@ const MOST_UNHEARD: u32 = 1280;
 /// Records that have to be acknowledged one by one before more than one is on its way: the header, and the first data.
 const PROVEN: usize = 2;
 
-/// How the loader stops its sender as far as is known, and what has been seen of that. Which of them it is is believed
+/// How the loader stops its sender as far as is known, and what has been seen of that. Which of them it is is assumed
 /// first; holds, and their absence, decide.
 #[derive(Debug)]
 pub(super) enum Pace {
     /// Where another page begins.
     Pages(Paging),
-    /// Behind every record.
+    /// After every record.
     Ring(Ring),
 }
 
@@ -49,15 +49,15 @@ pub(super) enum Pace {
 pub(super) struct Paging {
     /// Where it stops us.
     pages: Pages,
-    /// It has done so elsewhere than believed.
+    /// It has done so elsewhere than assumed.
     surprised: bool,
     /// Records before this one left before the loader was watched.
     watched_from: usize,
-    /// Behind a record that the loader may stop us behind: when its last character has left.
+    /// After a record that the loader may stop us after: when its last character has left.
     crossing: Option<Instant>,
-    /// No hold came behind the header where none was expected.
+    /// No hold came after the header where none was expected.
     header_passed: bool,
-    /// Nor behind the last data.
+    /// Nor after the last data.
     end_passed: bool,
 }
 
@@ -80,7 +80,7 @@ impl Pace {
         }
     }
 
-    /// Since when a loader stops us that does so behind every record.
+    /// Since when a loader stops us that does so after every record.
     pub(super) fn stopped_since(&self) -> Option<Instant> {
         match self {
             Pace::Pages(_) => None,
@@ -90,7 +90,7 @@ impl Pace {
 }
 
 impl Paging {
-    /// Pages of so many words.
+    /// Pages of this many words.
     fn believed(page_words: u32) -> Self {
         Paging {
             pages: Pages::Words(page_words),
@@ -102,7 +102,7 @@ impl Paging {
         }
     }
 
-    /// Nothing is believed, before this record is let go.
+    /// Nothing is assumed, before this record is let go.
     pub(super) fn watched(record: usize) -> Self {
         Paging { pages: Pages::watched(), surprised: true, watched_from: record, ..Paging::believed(0) }
     }
@@ -112,7 +112,7 @@ impl Paging {
         Paging { header_passed: true, ..self }
     }
 
-    /// A record of these words is let go, behind those that end with `before`.
+    /// A record of these words is let go, after those that end with `before`.
     pub(super) fn let_go(&mut self, believed: u32, before: Option<u32>, words: &RangeInclusive<u32>, left_at: Instant) {
         if self.pages.may_hold(believed, before, words) {
             self.crossing = Some(left_at);
@@ -124,7 +124,7 @@ impl Paging {
         self.surprised
     }
 
-    /// Where it stops us, if that is elsewhere than believed.
+    /// Where it stops us, if that is elsewhere than assumed.
     pub(super) fn surprise(&self) -> Option<&Pages> {
         self.surprised.then_some(&self.pages)
     }
@@ -136,7 +136,7 @@ impl Paging {
         self.watched_from = way.sent;
     }
 
-    /// Whether the loader has stopped us behind the record let go last, which was alone on its way.
+    /// Whether the loader has stopped us after the record let go last, which was alone on its way.
     fn see(&mut self, way: &Way, held: bool) {
         let last = way.sent.saturating_sub(1);
         if last >= self.watched_from
@@ -153,7 +153,7 @@ impl Paging {
 
     /// Until when an answer is awaited before the next record may go, if one is.
     fn waits_until(&self, way: &Way, alive: bool) -> Option<Instant> {
-        // The header may be what an unexpected g3 stops us behind; its ring is soon full.
+        // The header may be what an unexpected g3 stops us after; its ring is soon full.
         if way.sent == 1 && !self.header_passed {
             return Some(*way.left_at.back()? + HEADER_HOLD);
         }
@@ -219,14 +219,14 @@ impl Transfer {
             self.acknowledged = true;
             self.way.take_one();
             ring.proven |= self.way.taken == PROVEN;
-            // Behind a long hold the ring may have had more in it. It is empty now.
+            // After a long hold the ring may have had more in it. It is empty now.
             while self.way.left_at.front().is_some_and(|&left_at| left_at + HOLD_EXPECTED <= now) {
                 self.way.take_one();
             }
         }
     }
 
-    /// The hold behind the header shows how late an acknowledgement is, before any data has left.
+    /// The hold after the header shows how late an acknowledgement is, before any data has left.
     fn choose_size(&mut self, now: Instant) {
         let Some(&left_at) = self.way.left_at.front().filter(|_| self.packed) else { return };
         let late = now.since(left_at).as_nanos() / self.character_time.as_nanos().max(1);
@@ -250,7 +250,7 @@ impl Transfer {
             Pace::Ring(_) => {
                 let &left_at = self.way.left_at.back()?;
                 let next = self.way.records.get(self.way.sent)?;
-                // The header and the first data have to show first that this loader answers, and behind the end nothing
+                // The header and the first data have to show first that this loader answers, and after the end nothing
                 // may be lost. Where two records may be taken in one hold, and the second time, each is alone.
                 let fits = self.writes_in_time && !self.again;
                 let fits = fits && self.way.characters() + next.text.len() <= WINDOW;
@@ -281,7 +281,7 @@ impl Transfer {
                 paging.end_passed = true;
                 return Ok(());
             }
-            // Its pages may be larger than believed, and it has nothing to say before the first one is full.
+            // Its pages may be larger than assumed, and it has nothing to say before the first one is full.
             (Some(_), pages)
                 if self.unheard_words < MOST_UNHEARD && !(self.acknowledged && paging.is_as_believed()) =>
             {
@@ -303,12 +303,12 @@ impl Transfer {
     fn pass_unheld_record(&mut self) -> Result<(), Stall> {
         let Pace::Ring(ring) = &self.pace else { return Ok(()) };
         match (self.way.taken, self.again) {
-            // G1 says nothing behind the header.
+            // G1 says nothing after the header.
             (0, false) => {
                 self.resize(believed_size(self.packed, Pacing::Pages));
                 self.pass_as_pages(Paging::believed(self.believed.1));
             }
-            // The header was acknowledged, and the first data is not: a g3 may have lost it, or a hold behind the header
+            // The header was acknowledged, and the first data is not: a g3 may have lost it, or a hold after the header
             // was something else.
             (taken, false) if taken < PROVEN => self.start_over(),
             // The second time round it was something else.
@@ -320,14 +320,14 @@ impl Transfer {
         Ok(())
     }
 
-    /// What does not stop us behind its records has no ring: what has left is taken, as far as anybody can say.
+    /// What does not stop us after its records has no ring: what has left is taken, as far as anybody can say.
     fn pass_as_pages(&mut self, paging: Paging) {
         self.pace = Pace::Pages(paging.behind_the_header());
         self.alive = false;
         self.take_all_sent();
     }
 
-    /// Whether a hold now is one behind the header, which only a loader with a ring makes: no page can have been full
+    /// Whether a hold now is one after the header, which only a loader with a ring makes: no page can have been full
     /// since.
     fn is_stopped_behind_the_header(&self) -> bool {
         let Pace::Pages(paging) = &self.pace else { return false };

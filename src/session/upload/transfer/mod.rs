@@ -1,4 +1,4 @@
-//! Sending an image to a loader: records built anew, never more on their way than it can keep, flow control awaited where
+//! Sending an image to a loader: records rebuilt, never more on their way than it can keep, flow control awaited where
 //! it must come.
 //!
 //! What decides how to send is in the public sources of the loaders, as profiles (`device::Pacing`):
@@ -6,19 +6,19 @@
 //! - Generation `g1` keeps one page of 256 words. A record whose data crosses into another page is parked, XOFF goes out,
 //!   and after 0.6 ms of silence the old page is written, during which the loader is deaf; XON says that it listens
 //!   again. A second record in the meantime is an overrun, and at the end record a parked one is lost while success is
-//!   reported. So behind each record that crosses, and before the end record, the sender waits for XON.
-//! - Generation `g3` has a ring of some 550 characters without an overrun check. It stops us behind every record and lets
+//!   reported. So after each record that crosses, and before the end record, the sender waits for XON.
+//! - Generation `g3` has a ring of some 550 characters without an overrun check. It stops us after every record and lets
 //!   us go on when the ring is empty, so each XOFF with its XON says that one more record has been taken. No more than
 //!   [`WINDOW`] characters are on their way without that, so the ring cannot overflow whatever an adapter shows late; and
-//!   behind the header, while all of the flash is erased, and before the end record nothing is. Should an
+//!   after the header, while all of the flash is erased, and before the end record nothing is. Should an
 //!   acknowledgement be missing, a record is lost, or its acknowledgement is, or the loader has taken two in one hold, as
 //!   it does if it writes more slowly than the line is. Nobody can say which record it was, so everything is sent once
 //!   more from the header on, one record at a time.
 //!
 //! That the XOFF may be shown late by an adapter (16 ms are 184 characters) does not matter either way: it is awaited,
-//! not reacted to. Which generation a unit has is believed, not known. A loader that stops us behind the header is a g3
-//! whatever the product's file says, and one that stops us neither there nor behind the first data is sent to as a g1.
-//! How many words a page has is believed as well: see `pages.rs`.
+//! not reacted to. Which generation a unit has is assumed, not known. A loader that stops us after the header is a g3
+//! whatever the product's file says, and one that stops us neither there nor after the first data is sent to as a g1.
+//! How many words a page has is assumed as well: see `pages.rs`.
 
 mod holds;
 mod way;
@@ -73,7 +73,7 @@ pub(super) struct Transfer {
     /// How far it had come the first time, as long as nobody has answered the second: a unit without power takes no header
     /// either, and what was taken stays taken until the loader erases it.
     before: Option<Reached>,
-    /// How long it may erase behind the header.
+    /// How long it may erase after the header.
     longest_erase: Duration,
     /// A loader with a ring has written each record before the next one has come, and acknowledges it alone.
     writes_in_time: bool,
@@ -151,7 +151,7 @@ impl Transfer {
         Ok(false)
     }
 
-    /// Builds the records anew. Nothing but the header may have left, which is the same in any size.
+    /// Rebuilds the records. Nothing but the header may have left, which is the same in any size.
     fn resize(&mut self, size: Size) {
         if size != self.size {
             self.size = size;
@@ -176,7 +176,7 @@ impl Transfer {
         matches!(self.pace, Pace::Pages(_)) && !self.again
     }
 
-    /// How the loader differs from what was believed of it.
+    /// How the loader differs from what was assumed of it.
     pub(super) fn remark(&self) -> Option<String> {
         let Pace::Pages(paging) = &self.pace else { return None };
         let believed = self.believed.1;
@@ -187,7 +187,7 @@ impl Transfer {
             Pages::Unheld => return Some("the loader stops its sender nowhere (XOFF)".into()),
         };
         let twice = if self.again { "; everything was sent twice" } else { "" };
-        Some(format!("the loader keeps {words}, and not of {believed} as believed{twice}"))
+        Some(format!("the loader keeps {words}, and not of {believed} as assumed{twice}"))
     }
 
     /// Whether nothing shows yet that the loader has taken any data.
@@ -196,7 +196,7 @@ impl Transfer {
     }
 
     /// From the header on, as if nothing had been sent. What the loader has seemed to show of its pace so far it has not:
-    /// it was busy with something else, and its silence behind the header has perhaps made another kind of loader of it.
+    /// it was busy with something else, and its silence after the header has perhaps made another kind of loader of it.
     pub(super) fn begin_again(&mut self) {
         self.start_over();
         (self.again, self.before) = (false, None);
@@ -267,7 +267,7 @@ impl Transfer {
     /// Lets the next record go.
     fn let_go(&mut self, now: Instant, transmitter: &mut Transmitter) {
         let record = &self.way.records[self.way.sent];
-        // The piece is let go in this same step, so it leaves behind what has been let go before.
+        // The piece is let go in this same step, so it leaves after what has been let go before.
         let left_at = transmitter.free_at().max(now) + transmitter.time_for(record.text.len());
         transmitter.push_piece(Transmit::open(record.text.clone()));
         if let Some(words) = &record.words {
@@ -289,8 +289,8 @@ impl Transfer {
     }
 }
 
-/// Data bytes of the records for a loader that is believed to have this pacing. How late its acknowledgements are shows
-/// only behind the header; the adapters in use make no difference.
+/// Data bytes of the records for a loader that is assumed to have this pacing. How late its acknowledgements are shows
+/// only after the header; the adapters in use make no difference.
 pub(super) fn believed_size(packed: bool, pacing: Pacing) -> Size {
     match (packed, pacing) {
         (false, _) => Size::AsInFile,
