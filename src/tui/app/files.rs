@@ -132,7 +132,7 @@ impl App {
         let name = visible::text(&name);
         let total = bytes.len();
         if self.can_send() && self.command(Command::SendFile(bytes)) {
-            self.view.sending = Some(Sending { name: name.clone(), sent: 0, total });
+            self.view.unit.sending = Some(Sending { name: name.clone(), sent: 0, total });
             let text = format!("the file {name} is sent, {}", format::counted(total, "byte"));
             self.scrollback.note(self.now, text.clone());
             effects.push(Effect::Mark(text));
@@ -143,7 +143,7 @@ impl App {
     /// Marks a moment: now, or the one that is looked at.
     pub(super) fn mark(&mut self, at: Option<Instant>, effects: &mut Vec<Effect>) {
         let at = at.unwrap_or(self.now).min(self.now);
-        let mark = self.view.monitor.stream.mark(at);
+        let mark = self.view.unit.monitor.stream.mark(at);
         let text = marked(mark.number, self.now.since(at));
         let places = match (self.view.link.recording.is_some(), self.view.export.is_some()) {
             (true, true) => "chart, recording and file",
@@ -168,7 +168,7 @@ impl App {
     }
 
     pub(super) fn export_stream(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
-        let (stream, start) = (&self.view.monitor.stream, self.view.link.start_millis);
+        let (stream, start) = (&self.view.unit.monitor.stream, self.view.link.start_millis);
         let channels: Vec<String> = stream.channels.iter().map(|channel| channel.name.clone()).collect();
         if channels.is_empty() {
             return self.not_written("There are no rows yet: T switches the stream on.".to_owned());
@@ -230,7 +230,7 @@ impl App {
         if self.view.export.as_ref().is_some_and(|export| export.path == path) {
             return self.not_written("Not written: the rows of the stream go to that file.".to_owned());
         }
-        let Some(read) = &self.view.dictionary else {
+        let Some(read) = &self.view.unit.dictionary else {
             return self.not_written("Nothing has been read yet: V reads the object dictionary.".to_owned());
         };
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
@@ -287,7 +287,7 @@ impl App {
             .and_then(|text| Dump::parse(&name, &text).map_err(|_| format!("{name} is no dump as JSON")));
         match dump {
             Err(why) => self.view.tell(Tone::Refused, format!("Not compared: {why}.")),
-            Ok(_) if self.view.dictionary.is_none() => {
+            Ok(_) if self.view.unit.dictionary.is_none() => {
                 self.view.tell(Tone::Bad, "Nothing to compare it with yet: V reads the unit's object dictionary.");
             }
             Ok(_) if self.view.current_dictionary().is_none() => {

@@ -12,7 +12,6 @@ use crate::time::{BITS_PER_CHARACTER, Duration};
 use crate::tui::input::Noted;
 use crate::tui::keymap::Press;
 use crate::tui::picker::Picker;
-use crate::tui::screens::bench::emulated;
 use crate::tui::theme::Theme;
 use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
@@ -235,10 +234,9 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
         Question::Password { field, complaint, .. } => (
             "Password for loading software",
             {
-                let is_emulated = view.link.name.as_deref().is_some_and(|name| name.starts_with("emu:"));
-                let origin = match is_emulated {
-                    true => "Emulated units take AXIO-2010.",
-                    false => "Your Axiomatic contact has it. Capital and small letters count.",
+                let origin = match view.emulated() {
+                    Some(_) => "Emulated units take AXIO-2010.",
+                    None => "Your Axiomatic contact has it. Capital and small letters count.",
                 };
                 let rows = paragraphs(&[origin, "It is neither shown nor recorded."], columns);
                 with_field(theme, rows, &field.dots(), *complaint, columns)
@@ -311,19 +309,19 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                     _ if view.would_be_left() => in_the_middle(view).map(str::to_owned).to_vec(),
                     _ => vec![format!("{name} is connected.")],
                 };
-                if emulated(view).is_some() {
+                if view.emulated().is_some() {
                     texts.push("The emulated unit is gone with its link, with all that was set and loaded.".into());
                 }
                 let is_same = *then == view.link.name;
                 texts.extend(then.as_deref().map(visible::text).map(|link| match is_same {
-                    true if emulated(view).is_some() => "Then a new one begins, as the factory made it.".to_owned(),
+                    true if view.emulated().is_some() => "Then a new one begins, as the factory made it.".to_owned(),
                     true => format!("Then {link} is opened again."),
                     false => format!("{link} is opened first: if that fails, the link stays."),
                 }));
                 paragraphs(&texts, columns)
             },
             match &view.link.state {
-                LinkState::Lost(_) if emulated(view).is_some() && *then == view.link.name => {
+                LinkState::Lost(_) if view.emulated().is_some() && *then == view.link.name => {
                     vec![(letter('y'), "new unit"), (letter('n'), "stay here")]
                 }
                 _ => vec![(letter('y'), "close the link"), (letter('n'), "stay connected")],

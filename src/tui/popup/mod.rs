@@ -249,9 +249,9 @@ impl Question {
     pub fn file(purpose: Purpose, view: &View) -> Question {
         let typed = match purpose {
             Purpose::Image => TextField::default(),
-            Purpose::ExportStream => TextField::new(suggested(view, "stream", view.monitor.stream.newest, "csv")),
+            Purpose::ExportStream => TextField::new(suggested(view, "stream", view.unit.monitor.stream.newest, "csv")),
             Purpose::ExportDictionary => {
-                let at = view.dictionary.as_ref().map(|read| read.at);
+                let at = view.unit.dictionary.as_ref().map(|read| read.at);
                 TextField::new(suggested(view, "dictionary", at, "json"))
             }
         };
@@ -286,9 +286,9 @@ impl Question {
 
     /// Asks what the stream shall send; what it has sent last is suggested.
     pub fn stream(view: &View) -> Question {
-        let stream = &view.monitor.stream;
+        let stream = &view.unit.monitor.stream;
         let millis =
-            stream.period_set().or(view.last_period).map_or(USUAL_PERIOD_MS, |period| period.as_millis() as u64);
+            stream.period_set().or(view.unit.last_period).map_or(USUAL_PERIOD_MS, |period| period.as_millis() as u64);
         Question::Stream {
             source: stream.source.unwrap_or(Source::FieldValue),
             millis: TextField::new(millis.to_string()),

@@ -13,7 +13,7 @@ use crate::host::replay::Recording;
 use crate::host::socket::Dialled;
 use crate::record::{LINK_BACK, LINK_LOST};
 use crate::time::Instant;
-use crate::tui::{Failure, Input, LinkInfo};
+use crate::tui::{Failure, Input, LinkInfo, LinkKind};
 
 /// A network link that was dialled.
 pub(super) struct Dial {
@@ -89,7 +89,11 @@ impl Console {
         let opened = Input::LinkOpened(LinkInfo {
             link: name.to_owned(),
             baud: self.world.baud,
-            read_only: false,
+            kind: match spec {
+                LinkSpec::Emulated(product) => LinkKind::Emulated(product),
+                LinkSpec::Replay(_) => LinkKind::Recording,
+                LinkSpec::Serial(_) | LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_) => LinkKind::Unit,
+            },
             recording,
             noted: (self.world.noted)(name),
             start_of_day,

@@ -9,6 +9,7 @@ use super::super::{
     FIRST_BYTES, FileEntry, FileKind, Input, LARGEST_TEXT, MOST_LISTED, PortEntry, Recorded, RecordingEntry,
     RecordingList,
 };
+use crate::host::link::LinkSpec;
 use crate::host::replay::open_regular;
 use crate::host::save::{SaveError, save};
 use crate::host::{self, library, ports, recorder};
@@ -101,7 +102,8 @@ pub(super) fn recordings(state: Result<PathBuf, String>, written: Option<PathBuf
         is_being_written: content.is_being_written,
     };
     let entry = |listed: library::Listed| RecordingEntry {
-        link: format!("replay:{}", listed.path.display()),
+        path: listed.path.display().to_string(),
+        link: LinkSpec::Replay(listed.path).to_string(),
         bytes: listed.bytes,
         content: listed.content.map(recorded),
     };

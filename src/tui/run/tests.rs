@@ -256,7 +256,7 @@ fn what_is_not_a_regular_file_is_refused_and_not_waited_for() {
     console.world.resolve = |name| Ok(LinkSpec::Replay(name.into()));
     type_keys(&mut console, &format!("1p{}\r", pipe.display()));
     let picture = Paper::new().picture(&console);
-    assert!(picture.contains("it is not a regular file"), "{picture}");
+    assert!(picture.contains("Not connected") && picture.contains("a regular file"), "{picture}");
 }
 
 #[test]
@@ -268,4 +268,14 @@ fn a_journal_that_keeps_everybody_waiting_does_not_keep_an_upload() {
     let noted = Noted { product: "AXTC4CO".into(), image: "a.S".into(), ran: None, begun: "today".into() };
     console.perform(vec![Effect::UploadBegins { link: "u0".into(), noted }, Effect::Quit]);
     assert!(console.quits);
+}
+
+#[test]
+fn the_screens_write_links_as_the_loop_reads_them() {
+    for product in crate::device::Product::all() {
+        let name = crate::tui::link_name::emulated(product);
+        assert_eq!(name.parse(), Ok(LinkSpec::Emulated(product)));
+    }
+    let expanded = crate::tui::link_name::expanded("Replay:~/a.cast", Some("/home/me".as_ref()));
+    assert_eq!(expanded.parse(), Ok(LinkSpec::Replay("/home/me/a.cast".into())));
 }
