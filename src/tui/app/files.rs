@@ -9,7 +9,7 @@ use crate::time::{Duration, Instant};
 use crate::tui::image_facts::ImageFacts;
 use crate::tui::input::{Effect, FIRST_BYTES, Failure, FileEntry};
 use crate::tui::picker::{begins_like_an_image, is_image_name};
-use crate::tui::popup::{Popup, Purpose, Question};
+use crate::tui::popup::{Popup, Purpose, Question, Sent};
 use crate::tui::screens::dictionary::other_product;
 use crate::tui::view::{Export, Sending, Tone, marked};
 use crate::tui::visible;
@@ -43,7 +43,7 @@ impl App {
         self.load.checked(facts);
     }
 
-    /// There is nothing to check. Who has typed the path finds it where it was typed.
+    /// There is nothing to check. If the path was typed, that is said where it was typed.
     pub(super) fn image_unreadable(&mut self, path: &Path, why: &str) {
         self.dirty = true;
         if !self.load.unreadable(path) {
@@ -51,7 +51,7 @@ impl App {
         }
         let text = format!("{}: {}", visible::sentence(why), visible::text(&path.to_string_lossy()));
         match &mut self.popup {
-            Some(Popup::Asking(Question::File { purpose: Purpose::Image, complaint, .. })) => *complaint = Some(text),
+            Some(Popup::Asking(question @ Question::File { purpose: Purpose::Image, .. })) => question.refused(text),
             Some(_) => self.view.tell(Tone::Bad, text),
             None => {
                 let failure = Failure { text, hints: Vec::new() };
@@ -77,16 +77,16 @@ impl App {
 
     /// A file is being written: the box in which its name was typed waits for that.
     fn is_written(&mut self, path: &Path) {
-        if let Some(Popup::Asking(Question::File { written, .. })) = &mut self.popup {
-            *written = Some(path.to_path_buf());
+        if let Some(Popup::Asking(Question::File { form, .. })) = &mut self.popup {
+            form.sent = Some(Sent::File(path.to_path_buf()));
         }
     }
 
-    /// What was typed on the bench has been done, or is refused and can be mended.
+    /// What was typed on the bench has been done, or is refused and can be corrected.
     pub(super) fn order_answered(&mut self, line: &str, answer: &Result<Option<String>, String>) {
         let Some(Popup::Asking(question)) = &mut self.popup else { return };
-        let (Question::Order { sent, .. } | Question::Temperature { sent, .. }) = question else { return };
-        if sent.as_deref() != Some(line) {
+        let sent = question.form().and_then(|form| form.sent.as_ref());
+        if !matches!(sent, Some(Sent::Order(order)) if order == line) {
             return;
         }
         match answer {
@@ -254,12 +254,15 @@ impl App {
 
     pub(super) fn file_written(&mut self, path: &Path, result: Result<(), String>) {
         self.dirty = true;
-        // Whoever looks for it needs to know in which folder.
+        // A user who looks for it needs to know the folder.
         let shown = self.options.directory.join(path);
         let shown = shown.display();
         let is_export = self.view.export.as_ref().is_some_and(|export| export.path == path);
-        let is_awaited =
-            matches!(&self.popup, Some(Popup::Asking(Question::File { written: Some(of), .. })) if of == path);
+        let sent = match &mut self.popup {
+            Some(Popup::Asking(question)) => question.form().and_then(|form| form.sent.as_ref()),
+            _ => None,
+        };
+        let is_awaited = matches!(sent, Some(Sent::File(of)) if of == path);
         if result.is_ok() && is_awaited {
             self.popup = None;
         }

@@ -11,7 +11,7 @@ use crate::tui::action::Action;
 use crate::tui::frame;
 use crate::tui::input::Effect;
 use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd, Press};
-use crate::tui::popup::{self, Answer, Popup, Question, Target};
+use crate::tui::popup::{self, Answer, Form, Popup, Question, Target};
 use crate::tui::screens::ScreenId;
 use crate::tui::screens::diagnostics::Diagnostics;
 use crate::tui::screens::help::Help;
@@ -97,8 +97,8 @@ impl App {
         match target {
             Target::Key(press) => self.key(press.event(), effects),
             Target::Entry(number) => {
-                let Some(Popup::Asking(Question::Choose { picker, typed, .. })) = &mut self.popup else { return };
-                typed.clear();
+                let Some(Popup::Asking(Question::Choose { picker, form, .. })) = &mut self.popup else { return };
+                form.typed.clear();
                 if picker.choose(number) {
                     self.key(Press::Plain(KeyCode::Enter).event(), effects);
                 }
@@ -396,7 +396,7 @@ impl App {
             }
             MenuCmd::View => self.ask(Question::View),
             MenuCmd::Defaults => {
-                self.ask(Question::Defaults { typed: Default::default(), complaint: None });
+                self.ask(Question::Defaults(Form::default()));
             }
             MenuCmd::Stream if self.view.facts.stream.is_some() => {
                 self.perform(Action::Command(Command::StreamOff), effects);
