@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::SyncSender;
 
 use super::error::{CliError, Kind};
+use super::output::Output;
 use super::{Global, image as image_cli, link};
 use crate::device::LoaderKind;
 use crate::host::Input;
@@ -48,6 +49,7 @@ pub fn run(global: &Global) -> Result<(), CliError> {
         unreadable: |error| failure(&link::recording_error(error)),
         check,
         note,
+        incomplete,
     };
     match tui::run::run(world) {
         Ok(End::Quit) => Ok(()),
@@ -94,6 +96,14 @@ fn failure(error: &CliError) -> Failure {
 fn check(path: PathBuf, loader: Option<LoaderKind>, allow: &[DefectId]) -> Result<ImageFacts, String> {
     let report = image_cli::read_for(&path, &image_cli::targets_with(loader), None, allow);
     report.map(|report| ImageFacts::of_report(path, &report, loader, allow)).map_err(|error| error.to_string())
+}
+
+/// The console has ended, the disk has not.
+fn incomplete(paths: &[PathBuf]) {
+    let mut output = Output::standard(false);
+    for path in paths {
+        output.remark(&format!("axcon: {} is incomplete: the disk takes too long", path.display()));
+    }
 }
 
 /// The console says what it notes; that a note could not be written costs a question later, no more.

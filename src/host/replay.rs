@@ -1,7 +1,7 @@
-//! A recording as a link: what was said, piece by piece, from a file that is never kept whole in memory.
+//! A recording as a link: what was said, piece by piece, from a file that is never held whole in memory.
 
 use std::collections::VecDeque;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub struct Recording {
     header: Header,
     waiting: VecDeque<Piece>,
     ending: Option<Ending>,
-    /// A fault behind what waits.
+    /// A fault after what waits.
     fault: Option<ReadError>,
 }
 
@@ -31,7 +31,7 @@ pub enum RecordingError {
         /// Why.
         error: io::Error,
     },
-    /// It is no recording.
+    /// It is not a recording.
     #[error("{}:{error}", path.display())]
     Content {
         /// Which.
@@ -41,20 +41,48 @@ pub enum RecordingError {
     },
 }
 
+/// Opens a regular file. Opening anything else may wait for ever, as for a pipe that nobody writes to.
+///
+/// # Errors
+/// If there is no such file, it is something else, or it may not be read.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    let metadata = fs::metadata(path)?;
+    if metadata.is_dir() {
+        Err(io::ErrorKind::IsADirectory.into())
+    } else if metadata.is_file() {
+        File::open(path)
+    } else {
+        Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"))
+    }
+}
+
+fn open_any(path: &Path) -> io::Result<File> {
+    let file = File::open(path)?;
+    if file.metadata()?.is_dir() { Err(io::ErrorKind::IsADirectory.into()) } else { Ok(file) }
+}
+
 /// Bytes read at once.
 const READ: usize = 64 << 10;
 
 impl Recording {
-    /// Opens a recording and reads its head.
+    /// Opens a recording and reads its head. A pipe is read like a file, and waited for.
     ///
     /// # Errors
-    /// If there is no such file, or it is no recording.
+    /// If there is no such file, or it is not a recording.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let failed = |error| RecordingError::File { path: path.to_owned(), error };
-        let file = File::open(path).map_err(failed)?;
-        if file.metadata().map_err(failed)?.is_dir() {
-            return Err(failed(io::ErrorKind::IsADirectory.into()));
-        }
+        Recording::read_head(path, open_any)
+    }
+
+    /// The same, but never waits for anybody: only a regular file is read.
+    ///
+    /// # Errors
+    /// If there is no such file, it is not a regular one, or it is not a recording.
+    pub fn open_file(path: &Path) -> Result<Self, RecordingError> {
+        Recording::read_head(path, open_regular)
+    }
+
+    fn read_head(path: &Path, open: fn(&Path) -> io::Result<File>) -> Result<Self, RecordingError> {
+        let file = open(path).map_err(|error| RecordingError::File { path: path.to_owned(), error })?;
         let mut recording = Recording {
             path: path.to_owned(),
             file,
@@ -71,7 +99,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// What stands at its head.
+    /// What its head says.
     pub fn header(&self) -> &Header {
         &self.header
     }
@@ -79,7 +107,7 @@ impl Recording {
     /// The next piece; `None` at the end.
     ///
     /// # Errors
-    /// If the file fails, or is no recording from here on.
+    /// If the file fails, or is not a recording from here on.
     // Not an iterator: an error ends it for good.
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> Result<Option<Piece>, RecordingError> {

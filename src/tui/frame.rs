@@ -7,7 +7,6 @@ use ratatui::text::{Line, Span};
 use super::keymap::{Binding, Cmd, EVERYWHERE, MENU};
 use super::popup::in_the_middle;
 use super::screens::ScreenId;
-use super::screens::bench::emulated;
 use super::theme::Theme;
 use super::view::{LinkState, Tone, View};
 use super::visible;
@@ -83,16 +82,16 @@ pub fn header(view: &View, theme: Theme, columns: usize) -> Line<'static> {
         // Without power it would look the same.
         UnitState::Loader if view.load.is_silent => Some("silent, in loader?"),
         UnitState::Loader => Some("in loader"),
-        _ if view.viewing => Some("halted by V"),
+        _ if view.unit.viewing => Some("halted by V"),
         _ if view.question.is_some() => Some("asks, see 3"),
         UnitState::Silent | UnitState::Unknown | UnitState::Application => None,
     };
     let link = match &view.link.state {
         LinkState::Closed => "not connected",
         LinkState::Opening => "opening",
-        LinkState::Open { read_only: false } if view.link.unrecorded.is_some() => "connected, not recorded",
-        LinkState::Open { read_only: false } => "connected",
-        LinkState::Open { read_only: true } => "read only",
+        LinkState::Open if view.is_recording() => "read only",
+        LinkState::Open if view.link.unrecorded.is_some() => "connected, not recorded",
+        LinkState::Open => "connected",
         LinkState::Lost(_) => "link lost",
     };
     let node = facts.node_id.as_ref().map(|known| format!("node {}", known.value));
@@ -143,7 +142,7 @@ fn tab_texts(view: &View, front: Option<ScreenId>, columns: usize) -> Vec<(Scree
     let needed: usize = ScreenId::ALL.map(|id| format::width(id.title()) + 5).iter().sum();
     let is_roomy = needed + ACTIVITY_COLUMNS <= columns;
     // Only an emulated unit has a bench.
-    let has_place = |id: &ScreenId| *id != ScreenId::Bench || front == Some(*id) || emulated(view).is_some();
+    let has_place = |id: &ScreenId| *id != ScreenId::Bench || front == Some(*id) || view.emulated().is_some();
     let text = |(number, id): (usize, ScreenId)| match is_roomy {
         true => (id, format!(" {number} {}  ", id.title())),
         false => (id, format!(" {number} {} ", id.short_title())),
@@ -214,10 +213,10 @@ pub fn lost(view: &View, front: ScreenId, theme: Theme, columns: usize) -> Vec<L
     let text = format!("Link lost: {}", visible::text(&failure.text));
     let mut rows = vec![Line::styled(format::left(&format!(" {text}"), columns), theme.alarm())];
     let then = match front {
-        ScreenId::Terminal if emulated(view).is_some() => {
+        ScreenId::Terminal if view.emulated().is_some() => {
             " Below is history. The emulated unit is gone with it; Ctrl-] C begins anew."
         }
-        _ if emulated(view).is_some() => {
+        _ if view.emulated().is_some() => {
             " Below is history. The emulated unit is gone with it; C begins with a new one."
         }
         ScreenId::Terminal => " Below is history. Plug it in again; Ctrl-] C connects, Ctrl-] 1 lists links.",

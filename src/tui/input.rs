@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use ratatui::crossterm::event::Event as TerminalEvent;
 
 use super::image_facts::ImageFacts;
-use crate::device::LoaderKind;
+use crate::device::{LoaderKind, Product};
 use crate::endpoint::{Arrived, Transmit};
 use crate::image::DefectId;
 use crate::time::Duration;
@@ -199,14 +199,14 @@ pub struct PortEntry {
 }
 
 /// An open link.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LinkInfo {
     /// What opened it; the console opens it again by this name.
     pub link: String,
     /// Baud rate.
     pub baud: u32,
-    /// Whether a replay or another reason forbids sending.
-    pub read_only: bool,
+    /// What is at its other end.
+    pub kind: LinkKind,
     /// Where the recording is written, if one is.
     pub recording: Option<String>,
     /// What is noted of an upload on it that has not ended well.
@@ -215,6 +215,18 @@ pub struct LinkInfo {
     pub start_of_day: Duration,
     /// The same moment in milliseconds since 1970, UTC.
     pub start_millis: i64,
+}
+
+/// What is at the other end of a link. Only the loop understands the names of links.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum LinkKind {
+    /// A unit, or something that passes for one.
+    #[default]
+    Unit,
+    /// A unit that this program emulates.
+    Emulated(&'static Product),
+    /// A recording, to which nothing can be sent.
+    Recording,
 }
 
 /// An upload that was begun on a link and has not ended well: the unit may wait in its loader, which says nothing.
@@ -244,6 +256,8 @@ pub struct RecordingList {
 pub struct RecordingEntry {
     /// What plays it: `replay:FILE`.
     pub link: String,
+    /// The file.
+    pub path: String,
     /// Bytes of the file.
     pub bytes: u64,
     /// What it holds, or why it cannot be read.

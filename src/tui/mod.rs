@@ -11,6 +11,7 @@ mod frame;
 mod image_facts;
 mod input;
 mod keymap;
+mod link_name;
 mod picker;
 mod popup;
 mod returning;
@@ -24,8 +25,8 @@ mod widgets;
 pub use app::{App, Options};
 pub use image_facts::ImageFacts;
 pub use input::{
-    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, Input, LARGEST_SENT, LARGEST_TEXT, LinkInfo, MOST_LISTED, Noted,
-    Pace, Playback, Playing, PortEntry, Recorded, RecordingEntry, RecordingList,
+    Effect, FIRST_BYTES, Failure, FileEntry, FileKind, Input, LARGEST_SENT, LARGEST_TEXT, LinkInfo, LinkKind,
+    MOST_LISTED, Noted, Pace, Playback, Playing, PortEntry, Recorded, RecordingEntry, RecordingList,
 };
 pub use popup::ORDERS;
 pub use theme::Palette;

@@ -19,8 +19,8 @@ use axcon::emulator::{Setup, Unit};
 use axcon::image::make;
 use axcon::time::{Duration, Instant, character_time};
 use axcon::tui::{
-    App, Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Noted, Options, Palette,
-    Recorded, RecordingEntry, RecordingList,
+    App, Effect, FIRST_BYTES, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, LinkKind, Noted, Options,
+    Palette, Recorded, RecordingEntry, RecordingList,
 };
 use axcon::version::Version;
 use insta::assert_snapshot;
@@ -90,7 +90,7 @@ impl Desk {
                     self.input(Input::LinkOpened(LinkInfo {
                         link,
                         baud: BAUD,
-                        read_only: false,
+                        kind: LinkKind::Emulated(Product::named("AXTC4CO").expect("a product")),
                         noted,
                         recording: None,
                         start_of_day: Duration::ZERO,
@@ -111,8 +111,13 @@ impl Desk {
                         length: Some(Duration::from_secs(600)),
                         is_being_written: false,
                     };
-                    let link = "replay:/home/service/.local/state/axcon/recordings/20260131T120000Z-ttyUSB0-1.cast";
-                    let entry = RecordingEntry { link: link.into(), bytes: 123_456, content: Ok(recorded) };
+                    let path = "/home/service/.local/state/axcon/recordings/20260131T120000Z-ttyUSB0-1.cast";
+                    let entry = RecordingEntry {
+                        link: format!("replay:{path}"),
+                        path: path.into(),
+                        bytes: 123_456,
+                        content: Ok(recorded),
+                    };
                     let list = RecordingList { entries: vec![entry], older: 0 };
                     self.input(Input::RecordingsListed(Ok(list)));
                 }

@@ -7,7 +7,7 @@ use std::thread;
 
 use axcon::record::{Direction, Piece, Reader};
 use axcon::time::{Duration, Instant};
-use axcon::tui::{App, Effect, Input, LinkInfo, Options};
+use axcon::tui::{App, Effect, Input, LinkInfo, LinkKind, Options};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
@@ -128,7 +128,7 @@ fn no_picture_of_the_console_holds_what_a_terminal_obeys() {
                 let info = LinkInfo {
                     link,
                     baud: 115_200,
-                    read_only: false,
+                    kind: LinkKind::Unit,
                     recording: Some("\x1b]0;x\x07".into()),
                     noted: None,
                     start_of_day: Duration::ZERO,

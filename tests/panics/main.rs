@@ -46,9 +46,10 @@ mod child {
             open: |_, _, _, _| Err(Failure { text: "no link opens here".into(), hints: Vec::new() }),
             explain: |error| Failure { text: error.to_string(), hints: Vec::new() },
             unreadable: |error| Failure { text: error.to_string(), hints: Vec::new() },
-            check: |path, _, _| panic!("{} is no image, said by a worker", path.display()),
+            check: |path, _, _| panic!("{} is not an image, said by a worker", path.display()),
             note: |_, _| {},
             noted: |_| None,
+            incomplete: |_| {},
         };
         axcon::tui::run::run(world).expect("a terminal");
     }
@@ -86,7 +87,7 @@ mod story {
         screen.wait("Choose a file");
         screen.keys("pCargo.toml\r");
         assert_eq!(screen.wait_end(), PANICKED, "half a program must not go on: {}", screen.text());
-        is_told(&screen, "Cargo.toml is no image, said by a worker");
+        is_told(&screen, "Cargo.toml is not an image, said by a worker");
     }
 
     /// The terminal is the shell's again, and the panic stands on it: whole, and each line at the left edge, which raw mode

@@ -10,7 +10,7 @@ use crate::tui::keymap::{Binding, Cmd};
 use crate::tui::popup::{self, Popup, Question};
 use crate::tui::screens::recordings::Recordings;
 use crate::tui::screens::stream::Stream;
-use crate::tui::screens::{Scene, ScreenId, bench, overview};
+use crate::tui::screens::{Scene, ScreenId, overview};
 use crate::tui::view::LinkState;
 use crate::tui::widgets::lines;
 
@@ -65,23 +65,23 @@ impl App {
     /// Whether a key of the screen in front does something now. One that does not is left out of the footer.
     fn means_something(&self, cmd: Cmd) -> bool {
         let view = &self.view;
-        let has_rows = !view.monitor.stream.channels.is_empty();
+        let has_rows = !view.unit.monitor.stream.channels.is_empty();
         match (self.front, cmd) {
             (ScreenId::Connect, Cmd::Disconnect) => {
-                matches!(view.link.state, LinkState::Open { .. } | LinkState::Lost(_))
+                matches!(view.link.state, LinkState::Open | LinkState::Lost(_))
             }
             (ScreenId::Overview, Cmd::PageDown) => overview::has_faults(self.scene()),
             (ScreenId::Stream, Cmd::Mark) => view.link.name.is_some(),
             (ScreenId::Stream, Cmd::Export) => has_rows || view.export.is_some(),
             (ScreenId::Overview | ScreenId::Stream, _) => has_rows,
             (ScreenId::Dictionary, Cmd::Compare) => view.current_dictionary().is_some(),
-            (ScreenId::Dictionary, Cmd::Export | Cmd::Only) => view.dictionary.is_some(),
+            (ScreenId::Dictionary, Cmd::Export | Cmd::Only) => view.unit.dictionary.is_some(),
             (ScreenId::Dictionary, Cmd::Back) => self.dictionary.is_narrowed() || view.job == Some(Job::ReadDictionary),
-            (ScreenId::Dictionary, _) => view.dictionary.is_some() || view.product().is_some(),
-            (ScreenId::Diagnostics, _) => view.monitor.diagnostics.at.is_some(),
+            (ScreenId::Dictionary, _) => view.unit.dictionary.is_some() || view.product().is_some(),
+            (ScreenId::Diagnostics, _) => view.unit.monitor.diagnostics.at.is_some(),
             (ScreenId::Recordings, Cmd::Down | Cmd::Accept) => !self.recordings.entries().is_empty(),
             (ScreenId::Recordings, cmd) if cmd != Cmd::Refresh => view.playing.is_some(),
-            (ScreenId::Bench, _) => bench::emulated(view).is_some(),
+            (ScreenId::Bench, _) => view.emulated().is_some(),
             (ScreenId::Terminal, Cmd::SendFile | Cmd::Break) => view.can_send(),
             (ScreenId::Connect | ScreenId::Terminal | ScreenId::Load | ScreenId::Recordings, _) => true,
         }

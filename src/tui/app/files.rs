@@ -9,7 +9,7 @@ use crate::time::{Duration, Instant};
 use crate::tui::image_facts::ImageFacts;
 use crate::tui::input::{Effect, FIRST_BYTES, Failure, FileEntry};
 use crate::tui::picker::{begins_like_an_image, is_image_name};
-use crate::tui::popup::{Popup, Purpose, Question};
+use crate::tui::popup::{Popup, Purpose, Question, Sent};
 use crate::tui::screens::dictionary::other_product;
 use crate::tui::view::{Export, Sending, Tone, marked};
 use crate::tui::visible;
@@ -43,7 +43,7 @@ impl App {
         self.load.checked(facts);
     }
 
-    /// There is nothing to check. Who has typed the path finds it where it was typed.
+    /// There is nothing to check. If the path was typed, that is said where it was typed.
     pub(super) fn image_unreadable(&mut self, path: &Path, why: &str) {
         self.dirty = true;
         if !self.load.unreadable(path) {
@@ -51,7 +51,7 @@ impl App {
         }
         let text = format!("{}: {}", visible::sentence(why), visible::text(&path.to_string_lossy()));
         match &mut self.popup {
-            Some(Popup::Asking(Question::File { purpose: Purpose::Image, complaint, .. })) => *complaint = Some(text),
+            Some(Popup::Asking(question @ Question::File { purpose: Purpose::Image, .. })) => question.refused(text),
             Some(_) => self.view.tell(Tone::Bad, text),
             None => {
                 let failure = Failure { text, hints: Vec::new() };
@@ -77,16 +77,16 @@ impl App {
 
     /// A file is being written: the box in which its name was typed waits for that.
     fn is_written(&mut self, path: &Path) {
-        if let Some(Popup::Asking(Question::File { written, .. })) = &mut self.popup {
-            *written = Some(path.to_path_buf());
+        if let Some(Popup::Asking(Question::File { form, .. })) = &mut self.popup {
+            form.sent = Some(Sent::File(path.to_path_buf()));
         }
     }
 
-    /// What was typed on the bench has been done, or is refused and can be mended.
+    /// What was typed on the bench has been done, or is refused and can be corrected.
     pub(super) fn order_answered(&mut self, line: &str, answer: &Result<Option<String>, String>) {
         let Some(Popup::Asking(question)) = &mut self.popup else { return };
-        let (Question::Order { sent, .. } | Question::Temperature { sent, .. }) = question else { return };
-        if sent.as_deref() != Some(line) {
+        let sent = question.form().and_then(|form| form.sent.as_ref());
+        if !matches!(sent, Some(Sent::Order(order)) if order == line) {
             return;
         }
         match answer {
@@ -132,7 +132,7 @@ impl App {
         let name = visible::text(&name);
         let total = bytes.len();
         if self.can_send() && self.command(Command::SendFile(bytes)) {
-            self.view.sending = Some(Sending { name: name.clone(), sent: 0, total });
+            self.view.unit.sending = Some(Sending { name: name.clone(), sent: 0, total });
             let text = format!("the file {name} is sent, {}", format::counted(total, "byte"));
             self.scrollback.note(self.now, text.clone());
             effects.push(Effect::Mark(text));
@@ -143,7 +143,7 @@ impl App {
     /// Marks a moment: now, or the one that is looked at.
     pub(super) fn mark(&mut self, at: Option<Instant>, effects: &mut Vec<Effect>) {
         let at = at.unwrap_or(self.now).min(self.now);
-        let mark = self.view.monitor.stream.mark(at);
+        let mark = self.view.unit.monitor.stream.mark(at);
         let text = marked(mark.number, self.now.since(at));
         let places = match (self.view.link.recording.is_some(), self.view.export.is_some()) {
             (true, true) => "chart, recording and file",
@@ -168,7 +168,7 @@ impl App {
     }
 
     pub(super) fn export_stream(&mut self, path: PathBuf, effects: &mut Vec<Effect>) {
-        let (stream, start) = (&self.view.monitor.stream, self.view.link.start_millis);
+        let (stream, start) = (&self.view.unit.monitor.stream, self.view.link.start_millis);
         let channels: Vec<String> = stream.channels.iter().map(|channel| channel.name.clone()).collect();
         if channels.is_empty() {
             return self.not_written("There are no rows yet: T switches the stream on.".to_owned());
@@ -230,7 +230,7 @@ impl App {
         if self.view.export.as_ref().is_some_and(|export| export.path == path) {
             return self.not_written("Not written: the rows of the stream go to that file.".to_owned());
         }
-        let Some(read) = &self.view.dictionary else {
+        let Some(read) = &self.view.unit.dictionary else {
             return self.not_written("Nothing has been read yet: V reads the object dictionary.".to_owned());
         };
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
@@ -254,12 +254,15 @@ impl App {
 
     pub(super) fn file_written(&mut self, path: &Path, result: Result<(), String>) {
         self.dirty = true;
-        // Whoever looks for it needs to know in which folder.
+        // A user who looks for it needs to know the folder.
         let shown = self.options.directory.join(path);
         let shown = shown.display();
         let is_export = self.view.export.as_ref().is_some_and(|export| export.path == path);
-        let is_awaited =
-            matches!(&self.popup, Some(Popup::Asking(Question::File { written: Some(of), .. })) if of == path);
+        let sent = match &mut self.popup {
+            Some(Popup::Asking(question)) => question.form().and_then(|form| form.sent.as_ref()),
+            _ => None,
+        };
+        let is_awaited = matches!(sent, Some(Sent::File(of)) if of == path);
         if result.is_ok() && is_awaited {
             self.popup = None;
         }
@@ -287,7 +290,7 @@ impl App {
             .and_then(|text| Dump::parse(&name, &text).map_err(|_| format!("{name} is no dump as JSON")));
         match dump {
             Err(why) => self.view.tell(Tone::Refused, format!("Not compared: {why}.")),
-            Ok(_) if self.view.dictionary.is_none() => {
+            Ok(_) if self.view.unit.dictionary.is_none() => {
                 self.view.tell(Tone::Bad, "Nothing to compare it with yet: V reads the unit's object dictionary.");
             }
             Ok(_) if self.view.current_dictionary().is_none() => {

@@ -11,11 +11,11 @@ use crate::tui::action::Action;
 use crate::tui::frame;
 use crate::tui::input::Effect;
 use crate::tui::keymap::{self, Cmd, EVERYWHERE, MENU, MenuCmd, Press};
-use crate::tui::popup::{self, Answer, Popup, Question, Target};
+use crate::tui::popup::{self, Answer, Form, Popup, Question, Target};
+use crate::tui::screens::ScreenId;
 use crate::tui::screens::diagnostics::Diagnostics;
 use crate::tui::screens::help::Help;
 use crate::tui::screens::terminal::Meaning;
-use crate::tui::screens::{ScreenId, bench};
 use crate::tui::theme::Theme;
 use crate::tui::view::{LinkState, Tone};
 use crate::tui::widgets::lines;
@@ -97,8 +97,8 @@ impl App {
         match target {
             Target::Key(press) => self.key(press.event(), effects),
             Target::Entry(number) => {
-                let Some(Popup::Asking(Question::Choose { picker, typed, .. })) = &mut self.popup else { return };
-                typed.clear();
+                let Some(Popup::Asking(Question::Choose { picker, form, .. })) = &mut self.popup else { return };
+                form.typed.clear();
                 if picker.choose(number) {
                     self.key(Press::Plain(KeyCode::Enter).event(), effects);
                 }
@@ -276,11 +276,11 @@ impl App {
             }
             Cmd::Reconnect => match self.view.link.state {
                 // It lived on this link only: another one begins as the factory made it.
-                LinkState::Lost(_) if bench::emulated(&self.view).is_some() => {
+                LinkState::Lost(_) if self.view.emulated().is_some() => {
                     self.ask(Question::Disconnect { then: self.view.link.name.clone() });
                 }
                 LinkState::Lost(_) => self.perform(Action::Reconnect, effects),
-                LinkState::Closed | LinkState::Opening | LinkState::Open { .. } => {
+                LinkState::Closed | LinkState::Opening | LinkState::Open => {
                     self.view.tell(Tone::Quiet, "No link is lost: 1 lists links.");
                 }
             },
@@ -341,7 +341,7 @@ impl App {
             ScreenId::Connect => self.connect.on(cmd, &self.view),
             ScreenId::Overview => {
                 let faults = self.overview.faults_at(self.scene(), area);
-                self.overview.on(cmd, self.view.monitor.stream.channels.len(), faults)
+                self.overview.on(cmd, self.view.unit.monitor.stream.channels.len(), faults)
             }
             ScreenId::Terminal => self.terminal.on(cmd, &self.view, &self.scrollback, record, area),
             ScreenId::Load => self.load.on(cmd, &self.view, area),
@@ -379,7 +379,7 @@ impl App {
             (MenuCmd::Diagnostics, Some(Job::Diagnostics), _) | (_, Some(Job::Identify), _) => None,
             (_, Some(_), _) => self.view.busy(),
             (MenuCmd::Menu, ..) => None,
-            (_, None, _) if self.view.viewing => Some("the view is open and has keys of its own: M closes it"),
+            (_, None, _) if self.view.unit.viewing => Some("the view is open and has keys of its own: M closes it"),
             (_, None, UnitState::Loader) => Some(IN_LOADER),
             (_, None, _) => None,
         };
@@ -389,14 +389,14 @@ impl App {
         match menu {
             MenuCmd::Menu => {
                 // In the view a key may be swallowed, and the unit is halted as long as it is open.
-                if self.view.viewing {
+                if self.view.unit.viewing {
                     self.perform(Action::Command(Command::Keys(b"x".to_vec())), effects);
                 }
                 self.perform(Action::Command(Command::Identify), effects);
             }
             MenuCmd::View => self.ask(Question::View),
             MenuCmd::Defaults => {
-                self.ask(Question::Defaults { typed: Default::default(), complaint: None });
+                self.ask(Question::Defaults(Form::default()));
             }
             MenuCmd::Stream if self.view.facts.stream.is_some() => {
                 self.perform(Action::Command(Command::StreamOff), effects);

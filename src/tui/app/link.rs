@@ -6,7 +6,7 @@ use super::App;
 use crate::monitor::Scrollback;
 use crate::session::{Command, Event, Session, UnitNow, UnitState};
 use crate::time::{Duration, Instant};
-use crate::tui::input::{Effect, Failure, LinkInfo};
+use crate::tui::input::{Effect, Failure, LinkInfo, LinkKind};
 use crate::tui::keymap::Press;
 use crate::tui::popup::Popup;
 use crate::tui::returning::{Returning, Who};
@@ -33,8 +33,8 @@ impl App {
     /// Whether something can be sent; if not, the user is told why.
     pub(super) fn can_send(&mut self) -> bool {
         let (what, key, to) = match &self.view.link.state {
-            LinkState::Open { read_only: false } => return true,
-            LinkState::Open { read_only: true } => ("this is a recording", "1", "choose a link"),
+            LinkState::Open if self.view.is_recording() => ("this is a recording", "1", "choose a link"),
+            LinkState::Open => return true,
             LinkState::Opening | LinkState::Closed => ("no unit is connected", "1", "choose a link"),
             LinkState::Lost(_) => ("the link is lost", "C", "connect again"),
         };
@@ -50,12 +50,12 @@ impl App {
     /// its cable may be plugged in again meanwhile.
     pub(super) fn open(&mut self, link: String, effects: &mut Vec<Effect>) {
         let stays = match self.view.link.state {
-            LinkState::Open { .. } => self.view.link.name.as_ref() != Some(&link),
+            LinkState::Open => self.view.link.name.as_ref() != Some(&link),
             LinkState::Lost(_) => true,
             LinkState::Closed | LinkState::Opening => false,
         };
         if !stays {
-            if matches!(self.view.link.state, LinkState::Open { .. }) {
+            if self.view.link.state == LinkState::Open {
                 effects.push(Effect::CloseLink);
             }
             self.session = None;
@@ -71,7 +71,7 @@ impl App {
     pub(super) fn give_up_opening(&mut self, effects: &mut Vec<Effect>) {
         self.opening = None;
         match self.view.link.state {
-            LinkState::Open { .. } | LinkState::Lost(_) => effects.push(Effect::DoNotOpen),
+            LinkState::Open | LinkState::Lost(_) => effects.push(Effect::DoNotOpen),
             LinkState::Opening | LinkState::Closed => self.disconnect(effects),
         }
     }
@@ -88,7 +88,7 @@ impl App {
         if self.view.has_job_to_end() {
             self.command(Command::Cancel);
         }
-        if self.view.viewing && !self.view.has_job_to_end() {
+        if self.view.unit.viewing && !self.view.has_job_to_end() {
             self.command(Command::Keys(b"x".to_vec()));
         }
         self.dirty = true;
@@ -153,18 +153,18 @@ impl App {
             return;
         }
         self.popup = None;
-        let read_only = info.read_only;
-        if read_only || self.view.link.state == (LinkState::Open { read_only: true }) {
+        let is_recording = info.kind == LinkKind::Recording;
+        if is_recording || self.view.is_recording() {
             self.forget_lines();
         }
-        if !read_only {
+        if !is_recording {
             self.connect.opened(&info.link);
         }
         self.scrollback.begin(now, format!("connected to {}", visible::text(&info.link)));
         self.begin_session(info, effects);
         // Who has chosen a recording wants to steer it.
         self.front = if self.front == ScreenId::Recordings { self.front } else { ScreenId::Overview };
-        if !read_only {
+        if !is_recording {
             self.command(Command::Identify);
         }
         self.list_recordings_in_front(effects);
@@ -178,8 +178,8 @@ impl App {
 
     /// A session on the link that has just been opened.
     pub(super) fn begin_session(&mut self, info: LinkInfo, effects: &mut Vec<Effect>) {
-        let session = if info.read_only { Session::of_recording } else { Session::new };
-        self.session = Some(session(info.baud));
+        let is_recording = info.kind == LinkKind::Recording;
+        self.session = Some(if is_recording { Session::of_recording(info.baud) } else { Session::new(info.baud) });
         self.start_of_day = info.start_of_day;
         self.begin_link(Link {
             name: Some(info.link),
@@ -187,7 +187,8 @@ impl App {
             recording: info.recording,
             noted: info.noted,
             start_millis: info.start_millis,
-            state: LinkState::Open { read_only: info.read_only },
+            kind: info.kind,
+            state: LinkState::Open,
             ..Link::default()
         });
         self.terminal.begin_record();
@@ -195,7 +196,7 @@ impl App {
         self.stream.begin_link();
         self.bench.begin_link();
         self.forget_loader(effects);
-        if info.read_only {
+        if is_recording {
             // What goes by in a recording is understood as it goes by; nothing is sent for it.
             self.command(Command::Overhear);
             self.view.job = None;
@@ -205,7 +206,7 @@ impl App {
     /// The recording is played from its beginning again: nothing of it has happened yet.
     pub(super) fn played_anew(&mut self, now: Instant, info: LinkInfo, effects: &mut Vec<Effect>) {
         self.dirty = true;
-        if matches!(self.view.link.state, LinkState::Open { read_only: true }) {
+        if self.view.is_recording() {
             let playing = self.view.playing;
             self.forget_lines();
             self.scrollback.begin(now, "from the beginning".into());
@@ -228,7 +229,7 @@ impl App {
 
     pub(super) fn link_gone(&mut self, now: Instant, failure: Failure, effects: &mut Vec<Effect>) {
         self.dirty = true;
-        if matches!(self.view.link.state, LinkState::Open { .. }) {
+        if self.view.link.state == LinkState::Open {
             self.scrollback.note(now, "link lost".into());
             self.export_note(now, "link lost", effects);
             self.view.link.state = LinkState::Lost(failure);
@@ -251,7 +252,7 @@ impl App {
         if matches!(self.view.link.state, LinkState::Lost(_)) {
             self.scrollback.note(now, format!("link back as {}", visible::text(name)));
             self.export_note(now, "link back", effects);
-            self.view.link.state = LinkState::Open { read_only: false };
+            self.view.link.state = LinkState::Open;
             self.view.link_back();
             if let Some(session) = &mut self.session {
                 session.link_back(now);
@@ -342,12 +343,12 @@ impl App {
 
     /// Two units of one product and version differ in their serial numbers only, which the object dictionary alone has.
     pub(super) fn compare_serial(&mut self, before: Option<u32>, effects: &mut Vec<Effect>) {
-        let (Some(before), Some(now)) = (before, self.view.serial) else { return };
+        let (Some(before), Some(now)) = (before, self.view.unit.serial) else { return };
         if before != now {
-            let read = self.view.dictionary.take();
+            let read = self.view.unit.dictionary.take();
             let text = format!("Another unit is on the cable: its serial number is {now}, before it was {before}.");
             self.begin_unit(text, effects);
-            (self.view.dictionary, self.view.serial) = (read, Some(now));
+            (self.view.unit.dictionary, self.view.unit.serial) = (read, Some(now));
         }
     }
 

@@ -140,19 +140,19 @@ impl App {
             Input::Terminal(event) => self.terminal_event(event, &mut effects),
             Input::Bytes(bytes) => {
                 self.view.heard(now);
-                if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
+                if let (LinkState::Open, Some(session)) = (&self.view.link.state, &mut self.session) {
                     session.handle_bytes(now, &bytes);
                 }
             }
             Input::Arrived(backlog) => {
                 self.view.heard(now);
-                if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
+                if let (LinkState::Open, Some(session)) = (&self.view.link.state, &mut self.session) {
                     session.handle_backlog(now, &backlog);
                 }
             }
             Input::ArrivedSoFar(backlog) => {
                 self.view.heard(now);
-                if let (LinkState::Open { .. }, Some(session)) = (&self.view.link.state, &mut self.session) {
+                if let (LinkState::Open, Some(session)) = (&self.view.link.state, &mut self.session) {
                     session.begin_backlog(now, &backlog);
                 }
             }
@@ -220,7 +220,7 @@ impl App {
 
     /// When [`Input::Timeout`] is wanted next. `None`: only an input from outside can bring anything new.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let is_open = matches!(self.view.link.state, LinkState::Open { .. });
+        let is_open = self.view.link.state == LinkState::Open;
         let session = self.session.as_ref().and_then(Session::poll_timeout);
         let tick = (self.view.job == Some(Job::Load)).then(|| self.now + UPLOAD_TICK);
         let late = self.view.poll_timeout().filter(|_| is_open);
@@ -288,14 +288,14 @@ impl App {
 
     /// Everything the session has to say and to send.
     fn drain(&mut self, effects: &mut Vec<Effect>) {
-        let is_open = matches!(self.view.link.state, LinkState::Open { .. });
+        let is_open = self.view.link.state == LinkState::Open;
         while let Some(transmit) = self.session.as_mut().and_then(Session::poll_transmit) {
             if is_open {
                 effects.push(Effect::Transmit(transmit));
             }
         }
         while let Some(event) = self.session.as_mut().and_then(Session::poll_event) {
-            let serial = self.view.serial;
+            let serial = self.view.unit.serial;
             let facts = self.session.as_ref().map_or(&self.no_facts, Session::facts);
             self.view.fold(self.now, &event, facts);
             if let (Event::Finished(_), Some(session)) = (&event, &self.session) {

@@ -4,41 +4,25 @@ use std::path::PathBuf;
 
 use super::App;
 use super::link::Next;
+use crate::secret::Secret;
 use crate::session::{Command, Job, LoadOrder, Refusal};
 use crate::tui::action::Action;
 use crate::tui::input::{Effect, Noted};
+use crate::tui::link_name;
 use crate::tui::picker::expanded;
 use crate::tui::popup::{Popup, Question, Wanted};
-use crate::tui::screens::{ScreenId, bench};
+use crate::tui::screens::ScreenId;
 use crate::tui::view::Tone;
 use crate::tui::widgets::format;
-
-/// Begins the name of a recording as a link.
-const REPLAY: &str = "replay:";
 
 impl App {
     pub(super) fn perform(&mut self, action: Action, effects: &mut Vec<Effect>) {
         self.dirty = true;
         match action {
-            Action::Go(screen) => {
-                if self.front != screen {
-                    // It was about what was done there, and stands before what is being done.
-                    self.view.forget_notice();
-                }
-                self.front = screen;
-                match screen {
-                    ScreenId::Load => {
-                        if let Some(action) = self.load.entered() {
-                            self.perform(action, effects);
-                        }
-                    }
-                    ScreenId::Recordings => effects.push(Effect::ListRecordings),
-                    _ => {}
-                }
-            }
+            Action::Go(screen) => self.go(screen, effects),
             // A recording can be opened again as it was; whoever has a unit at the line is asked.
             Action::Open(link) => {
-                let link = self.link_named(link);
+                let link = link_name::expanded(&link, self.options.home.as_deref());
                 match self.view.can_send() {
                     true => self.ask(Question::Disconnect { then: Some(link) }),
                     false => self.open(link, effects),
@@ -71,7 +55,7 @@ impl App {
             Action::Command(command) => {
                 let reads = matches!(command, Command::ReadDictionary);
                 if self.can_send() && self.command(command) && reads {
-                    self.view.entries_read = 0;
+                    self.view.unit.entries_read = 0;
                     self.front = ScreenId::Dictionary;
                 }
             }
@@ -83,41 +67,8 @@ impl App {
                         .tell(Tone::Quiet, "V is sent. Enter shows the next object, X leaves and lets scanning go on.");
                 }
             }
-            Action::StartLoad { password, product } => {
-                if !self.can_send() {
-                    return;
-                }
-                let Some(facts) = self.load.image() else { return };
-                let Some(image) = facts.checked.clone() else { return };
-                let file = facts.path.display().to_string();
-                // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
-                let said = self.view.facts.product.as_ref().map(|known| known.value.clone());
-                let product = product.or_else(|| self.view.noted().map(|noted| noted.product.clone()));
-                let known = said.or(product.clone());
-                let ran = self.view.ran();
-                let packed = self.load.is_packed();
-                let (loader, allowed) = (self.load.loader(), self.load.allowed().to_vec());
-                let order = LoadOrder { product, ran, packed, loader, allowed, ..LoadOrder::new(image, password) };
-                if self.command(Command::Load(Box::new(order)))
-                    && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
-                {
-                    // Noted before the first byte leaves: what the session sends is drained behind this.
-                    let begun = format!("at {}", format::time_of_day(self.start_of_day, self.now));
-                    let noted = Noted { product, image: file, ran, begun };
-                    self.view.link.noted = Some(noted.clone());
-                    effects.push(Effect::UploadBegins { link, noted });
-                }
-            }
-            Action::OtherUnit => {
-                // Not removed where it is kept: it may still be true of the unit it was made for, until another upload on
-                // this link takes its place.
-                let Some(noted) = self.view.link.noted.take() else { return };
-                if let Some(action) = self.load.ask_label(&self.view) {
-                    self.perform(action, effects);
-                }
-                let about = format!("{}, {}", noted.product, noted.begun);
-                self.view.tell(Tone::Quiet, format!("Our note ({about}) is set aside: another unit."));
-            }
+            Action::StartLoad { password, product } => self.start_load(password, product, effects),
+            Action::OtherUnit => self.other_unit(effects),
             Action::DismissReport => self.view.load.report = None,
             Action::RestartExtremes => {
                 self.view.restart_extremes();
@@ -147,13 +98,73 @@ impl App {
             Action::Break => {}
             Action::ListRecordings => effects.push(Effect::ListRecordings),
             Action::Play(playback) => effects.push(Effect::Play(playback)),
-            Action::Order(line) if bench::emulated(&self.view).is_some() => {
+            Action::Order(line) if self.view.emulated().is_some() => {
                 self.bench.ordered(self.now, line.clone());
                 effects.push(Effect::Order(line));
             }
             Action::Order(_) => {}
             Action::Quit => self.leave(Next::Quit, effects),
         }
+    }
+
+    fn go(&mut self, screen: ScreenId, effects: &mut Vec<Effect>) {
+        if self.front != screen {
+            // It was about what was done there, and would hide what is being done.
+            self.view.forget_notice();
+        }
+        self.front = screen;
+        match screen {
+            ScreenId::Load => {
+                if let Some(action) = self.load.entered() {
+                    self.perform(action, effects);
+                }
+            }
+            ScreenId::Recordings => effects.push(Effect::ListRecordings),
+            ScreenId::Connect
+            | ScreenId::Overview
+            | ScreenId::Terminal
+            | ScreenId::Dictionary
+            | ScreenId::Stream
+            | ScreenId::Diagnostics
+            | ScreenId::Bench => {}
+        }
+    }
+
+    fn start_load(&mut self, password: Option<Secret>, label: Option<String>, effects: &mut Vec<Effect>) {
+        if !self.can_send() {
+            return;
+        }
+        let Some(facts) = self.load.image() else { return };
+        let Some(image) = facts.checked.clone() else { return };
+        let file = facts.path.display().to_string();
+        // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
+        let said = self.view.facts.product.as_ref().map(|known| known.value.clone());
+        let product = label.or_else(|| self.view.noted().map(|noted| noted.product.clone()));
+        let known = said.or(product.clone());
+        let ran = self.view.ran();
+        let packed = self.load.is_packed();
+        let (loader, allowed) = (self.load.loader(), self.load.allowed().to_vec());
+        let order = LoadOrder { product, ran, packed, loader, allowed, ..LoadOrder::new(image, password) };
+        if self.command(Command::Load(Box::new(order)))
+            && let (Some(link), Some(product)) = (self.view.link.name.clone(), known)
+        {
+            // Noted before the first byte leaves: what the session sends is drained after this.
+            let begun = format!("at {}", format::time_of_day(self.start_of_day, self.now));
+            let noted = Noted { product, image: file, ran, begun };
+            self.view.link.noted = Some(noted.clone());
+            effects.push(Effect::UploadBegins { link, noted });
+        }
+    }
+
+    /// Sets the note of an upload aside. It stays where it is kept: it may still be true of the unit it was made for,
+    /// until another upload on this link takes its place.
+    fn other_unit(&mut self, effects: &mut Vec<Effect>) {
+        let Some(noted) = self.view.link.noted.take() else { return };
+        if let Some(action) = self.load.ask_label(&self.view) {
+            self.perform(action, effects);
+        }
+        let about = format!("{}, {}", noted.product, noted.begun);
+        self.view.tell(Tone::Quiet, format!("Our note ({about}) is set aside: another unit."));
     }
 
     /// Gives a command to the session. Says whether it was taken; if not, the user knows why.
@@ -191,18 +202,18 @@ impl App {
                     self.view.job = Some(job);
                     self.view.forget_notice();
                 }
-                self.view.wanted_period = period.or(self.view.wanted_period.filter(|_| job.is_none()));
+                self.view.unit.wanted_period = period.or(self.view.unit.wanted_period.filter(|_| job.is_none()));
                 if may_set {
-                    self.view.monitor.stream.set_period(None);
+                    self.view.unit.monitor.stream.set_period(None);
                 }
                 if viewing == Some(true) {
-                    self.view.monitor.stream.interrupt();
+                    self.view.unit.monitor.stream.interrupt();
                 }
                 if job == Some(Job::Load) {
                     self.view.load = Default::default();
                     self.front = ScreenId::Load;
                 }
-                self.view.viewing = viewing.unwrap_or(self.view.viewing);
+                self.view.unit.viewing = viewing.unwrap_or(self.view.unit.viewing);
                 true
             }
             Err(Refusal::Busy(job)) => {
@@ -219,18 +230,6 @@ impl App {
     /// A path with the user's home folder in place of `~`.
     pub(super) fn expanded(&self, path: PathBuf) -> PathBuf {
         expanded(path, self.options.home.as_deref())
-    }
-
-    /// The same for a link: the path of a port, or of a recording.
-    fn link_named(&self, name: String) -> String {
-        let (kind, path) = match name.strip_prefix(REPLAY) {
-            Some(path) => (REPLAY, path),
-            None => ("", name.as_str()),
-        };
-        match path.starts_with('~') {
-            true => format!("{kind}{}", self.expanded(path.into()).display()),
-            false => name,
-        }
     }
 
     pub(super) fn ask(&mut self, question: Question) {

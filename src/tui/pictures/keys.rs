@@ -9,7 +9,7 @@ use crate::canopen::{ObjectAddress, Value};
 use crate::record::Span;
 use crate::session::{DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry, WalkEnd};
 use crate::time::Duration;
-use crate::tui::{Effect, Input, LinkInfo, Pace, Playback, Playing};
+use crate::tui::{Effect, Input, LinkInfo, LinkKind, Pace, Playback, Playing};
 use crate::wire::stream::Source;
 
 #[test]
@@ -128,7 +128,7 @@ fn a_recording_is_steered_by_its_keys() {
     stage.input(Input::LinkOpened(LinkInfo {
         link: "replay:x".into(),
         baud: 115_200,
-        read_only: true,
+        kind: LinkKind::Recording,
         noted: None,
         recording: None,
         start_of_day: NOON,
@@ -371,7 +371,9 @@ fn a_click_chooses_an_entry_of_a_list_and_a_second_one_does_it() {
 #[test]
 fn keys_on_the_terminal_of_a_recording_are_the_consoles() {
     let mut stage = Stage::with_ports(SMALL);
-    stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    stage
+        .press(KeyCode::Enter)
+        .input(Input::LinkOpened(LinkInfo { kind: LinkKind::Recording, ..link_info("replay:x") }));
     stage.bytes(BANNER).keys("3");
     assert!(stage.shows("H hex") && !stage.shows("keys to the unit"), "{}", stage.picture());
     assert!(!stage.shows("F file"), "{}", stage.picture());
@@ -386,10 +388,12 @@ fn keys_on_the_terminal_of_a_recording_are_the_consoles() {
 #[test]
 fn a_recording_from_its_beginning_shows_nothing_that_has_not_happened_yet() {
     let mut stage = Stage::with_ports(SMALL);
-    stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    stage
+        .press(KeyCode::Enter)
+        .input(Input::LinkOpened(LinkInfo { kind: LinkKind::Recording, ..link_info("replay:x") }));
     stage.bytes(BANNER).bytes(b"Waiting for application S-Record.\r\n").keys("3");
     assert!(stage.shows("S-Record"), "{}", stage.picture());
-    stage.input(Input::PlayedAnew(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    stage.input(Input::PlayedAnew(LinkInfo { kind: LinkKind::Recording, ..link_info("replay:x") }));
     stage.bytes(BANNER);
     assert!(stage.shows("from the beginning") && !stage.shows("S-Record"), "{}", stage.picture());
 }

@@ -6,7 +6,7 @@ use super::stage::*;
 use crate::endpoint::Transmit;
 use crate::session::{Job, Outcome};
 use crate::time::Duration;
-use crate::tui::{App, Effect, Failure, Input, LinkInfo, Options, Pace, Palette, Playing, PortEntry};
+use crate::tui::{App, Effect, Failure, Input, LinkInfo, LinkKind, Options, Pace, Palette, Playing, PortEntry};
 
 #[test]
 fn connecting_asks_the_unit_who_it_is() {
@@ -250,7 +250,9 @@ fn a_unit_without_a_name_shows_the_channels_of_its_diagnostics_as_they_are_named
 #[test]
 fn a_recording_that_cannot_be_read_on_says_so_and_where() {
     let mut stage = Stage::with_ports(SMALL).with_recordings();
-    stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    stage
+        .press(KeyCode::Enter)
+        .input(Input::LinkOpened(LinkInfo { kind: LinkKind::Recording, ..link_info("replay:x") }));
     let seconds = Duration::from_secs(5);
     stage.input(Input::Playing(Playing { position: seconds, length: Some(seconds), pace: Pace::AtOnce }));
     let text = "x.cast:40:2: this is no event";

@@ -6,7 +6,7 @@ use super::stage::*;
 use crate::record::Span;
 use crate::session::{Event, Facts, Known, Origin};
 use crate::time::Duration;
-use crate::tui::{Effect, Failure, Input, LinkInfo, Recorded, RecordingList};
+use crate::tui::{Effect, Failure, Input, LinkInfo, LinkKind, Recorded, RecordingList};
 
 /// The terminal with a hundred lines, each with its number.
 fn hundred_lines() -> Stage {
@@ -195,7 +195,7 @@ fn a_recording_s_name_stays_in_one_piece_and_those_being_written_are_called_that
     let name = "2026-01-31T12-00-00.cast";
     let entry = |port: &str, is_being_written| {
         let mut entry = recording("2026-01-31 12:00:00", port, 1, Some(Duration::from_secs(1)));
-        entry.link = format!("replay:/home/{}/{name}", "a".repeat(47));
+        entry.path = format!("/home/{}/{name}", "a".repeat(47));
         entry.content = entry.content.map(|recorded| Recorded { is_being_written, ..recorded });
         entry
     };
@@ -236,7 +236,9 @@ fn the_list_of_recordings_is_read_anew_when_a_link_opens_or_ends_in_front_of_it(
     assert!(is_read(&mut stage), "as the screen comes to the front");
     stage.lost();
     assert!(is_read(&mut stage), "its recording is not written any more");
-    stage.press(KeyCode::Enter).input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") }));
+    stage
+        .press(KeyCode::Enter)
+        .input(Input::LinkOpened(LinkInfo { kind: LinkKind::Recording, ..link_info("replay:x") }));
     assert!(is_read(&mut stage));
     stage.keys("1").asked();
     stage.keys("x");

@@ -20,8 +20,8 @@ use crate::session::{
 };
 use crate::time::{Duration, Instant};
 use crate::tui::{
-    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, Noted, Options, Palette, PortEntry,
-    Recorded, RecordingEntry, RecordingList,
+    App, Effect, Failure, FileEntry, FileKind, ImageFacts, Input, LinkInfo, LinkKind, Noted, Options, Palette,
+    PortEntry, Recorded, RecordingEntry, RecordingList,
 };
 use crate::version::Version;
 
@@ -324,6 +324,7 @@ impl Stage {
 pub(super) fn recording(begun: &str, port: &str, part: u32, length: Option<Duration>) -> RecordingEntry {
     RecordingEntry {
         link: format!("replay:/home/user/{begun}.cast"),
+        path: format!("/home/user/{begun}.cast"),
         bytes: 1_234_567,
         content: Ok(Recorded { begun: begun.into(), port: port.into(), part, length, is_being_written: false }),
     }
@@ -331,7 +332,7 @@ pub(super) fn recording(begun: &str, port: &str, part: u32, length: Option<Durat
 
 /// A file with the name of a recording, and why it is none.
 pub(super) fn no_recording(path: &str, why: &str) -> RecordingEntry {
-    RecordingEntry { link: format!("replay:{path}"), bytes: 12, content: Err(why.into()) }
+    RecordingEntry { link: format!("replay:{path}"), path: path.into(), bytes: 12, content: Err(why.into()) }
 }
 
 /// What is in the folder of images.
@@ -354,10 +355,11 @@ pub(super) fn files() -> Vec<FileEntry> {
 }
 
 pub(super) fn link_info(link: &str) -> LinkInfo {
+    let emulated = link.strip_prefix("emu:").and_then(Product::named);
     LinkInfo {
         link: link.into(),
         baud: 115_200,
-        read_only: false,
+        kind: emulated.map_or(LinkKind::Unit, LinkKind::Emulated),
         noted: None,
         recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
         start_of_day: NOON,

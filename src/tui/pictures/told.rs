@@ -13,7 +13,7 @@ use crate::session::{
     Verdict, WalkEnd,
 };
 use crate::tui::popup::ORDERS;
-use crate::tui::{Effect, Input, LinkInfo};
+use crate::tui::{Effect, Input, LinkInfo, LinkKind};
 use crate::wire::stream::Source;
 
 /// Connected to an emulated unit that streams.
@@ -170,7 +170,10 @@ fn v_reads_no_dictionary_where_no_unit_is() {
     assert!(!stage.shows("V reads it") && stage.shows("C connects again"), "{}", stage.picture());
     let mut stage = Stage::with_ports(SMALL);
     stage.press(KeyCode::Enter);
-    stage.input(Input::LinkOpened(LinkInfo { read_only: true, ..link_info("replay:x") })).bytes(BANNER).keys("5");
+    stage
+        .input(Input::LinkOpened(LinkInfo { kind: LinkKind::Recording, ..link_info("replay:x") }))
+        .bytes(BANNER)
+        .keys("5");
     assert!(!stage.shows("V reads") && stage.shows("read it in this recording"), "{}", stage.picture());
 }
 

@@ -1,10 +1,11 @@
 //! What keys and pasted text do to what stands in front of a screen.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::{LONGEST_PERIOD_MS, Popup, Purpose, Question, SHORTEST_PERIOD_MS, Wanted};
+use super::{Form, LONGEST_PERIOD_MS, Popup, Purpose, Question, SHORTEST_PERIOD_MS, Sent, Wanted};
 use crate::device::Product;
 use crate::session::Command;
 use crate::time::Duration;
@@ -77,7 +78,8 @@ impl Question {
         match key.code {
             KeyCode::Esc => self.leave(),
             KeyCode::Char('c') if with_ctrl => self.leave(),
-            _ if self.is_on_its_way() => Answer::Stay,
+            // What was typed is on its way: what is typed meanwhile would be lost or done twice.
+            _ if self.form().is_some_and(|form| form.sent.is_some()) => Answer::Stay,
             KeyCode::Char('u') if with_ctrl => {
                 self.edit(TextField::clear, PasswordField::clear);
                 self.changed()
@@ -120,7 +122,7 @@ impl Question {
     }
 
     fn is_untyped_choice(&self) -> bool {
-        matches!(self, Question::Choose { typed, .. } if typed.text().is_empty())
+        matches!(self, Question::Choose { form, .. } if form.typed.text().is_empty())
     }
 
     /// Moves in the list of files, where there is one.
@@ -161,7 +163,7 @@ impl Question {
     /// The field has changed.
     fn changed(&self) -> Answer {
         match self {
-            Question::Find(field) => Answer::Meanwhile(Action::Find(field.text().to_owned())),
+            Question::Find(form) => Answer::Meanwhile(Action::Find(form.typed.text().to_owned())),
             _ => Answer::Stay,
         }
     }
@@ -169,68 +171,69 @@ impl Question {
     /// Enter, or Y.
     fn accept(&mut self) -> Answer {
         match self {
-            Question::Link(field) if field.text().trim().is_empty() => Answer::Stay,
-            Question::Link(field) => Answer::Act(Action::Open(field.text().trim().to_owned())),
-            Question::File { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
-            Question::File { purpose, typed, directory, complaint, .. } => {
-                let path = placed(directory, typed.text());
-                *complaint = None;
+            Question::Link(form) | Question::File { form, .. } | Question::Order(form) if form.text().is_empty() => {
+                Answer::Stay
+            }
+            Question::Link(form) => Answer::Act(Action::Open(form.text().to_owned())),
+            Question::File { purpose, form, directory } => {
+                let path = placed(directory, form.typed.text());
+                form.complaint = None;
                 match purpose {
-                    // A name typed wrong is mended here: the box goes when the file has been read.
+                    // A mistyped name can be corrected here: the box goes when the file has been read.
                     Purpose::Image => Answer::Meanwhile(Action::CheckImage(path)),
                     Purpose::ExportStream => Answer::Meanwhile(Action::ExportStream(path)),
                     Purpose::ExportDictionary => Answer::Meanwhile(Action::ExportDictionary(path)),
                 }
             }
-            Question::Choose { picker, typed, .. } if typed.text().trim().is_empty() => {
+            Question::Choose { picker, form, .. } if form.text().is_empty() => {
                 let picked = picker.on(Cmd::Accept, PAGE);
                 self.picked(picked)
             }
-            Question::Choose { wanted, picker, typed } => {
-                Answer::Act(wanted.action(placed(picker.directory(), typed.text())))
+            Question::Choose { wanted, picker, form } => {
+                Answer::Act(wanted.action(placed(picker.directory(), form.typed.text())))
             }
             Question::Find(_) => Answer::Close,
-            Question::Temperature { input, typed, complaint, sent } => match typed.text().trim().parse::<f64>() {
+            Question::Temperature { input, form } => match form.text().parse::<f64>() {
                 Ok(value) if value.is_finite() => {
                     let line = format!("set {input} temperature {value}");
-                    *sent = Some(line.clone());
+                    form.sent = Some(Sent::Order(line.clone()));
                     Answer::Meanwhile(Action::Order(line))
                 }
                 _ => {
-                    *complaint = Some("A number of degrees, e.g. 451.5.".to_owned());
+                    form.complaint = Some("A number of degrees, e.g. 451.5.".into());
                     Answer::Stay
                 }
             },
-            Question::Order { typed, .. } if typed.text().trim().is_empty() => Answer::Stay,
-            Question::Order { typed, complaint, sent } => match typed.text().trim() {
+            Question::Order(form) => match form.text() {
                 // The emulator's own help is made for a page, not for a line of answers.
                 text if text.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("help")) => {
-                    *complaint = Some("They stand above; docs/emulator.md has all, with every fault.".to_owned());
                     // What is typed next is the order that was looked for.
-                    typed.clear();
+                    form.typed.clear();
+                    form.complaint = Some("They are above; docs/emulator.md has all, with every fault.".into());
                     Answer::Stay
                 }
                 text => {
-                    *sent = Some(text.to_owned());
-                    Answer::Meanwhile(Action::Order(text.to_owned()))
+                    let line = text.to_owned();
+                    form.sent = Some(Sent::Order(line.clone()));
+                    Answer::Meanwhile(Action::Order(line))
                 }
             },
-            Question::Stream { source, millis, complaint, .. } => match millis.text().parse() {
+            Question::Stream { source, millis, .. } => match millis.text().parse() {
                 Ok(number @ SHORTEST_PERIOD_MS..=LONGEST_PERIOD_MS) => {
                     let period = Duration::from_millis(number);
                     Answer::Act(Action::Command(Command::StreamOn { source: *source, period }))
                 }
                 _ => {
-                    *complaint = Some("A whole number of milliseconds from 1 to 60000.");
+                    millis.complaint = Some("A whole number of milliseconds from 1 to 60000.".into());
                     Answer::Stay
                 }
             },
             Question::View => Answer::Act(Action::Command(Command::ReadDictionary)),
-            Question::Defaults { typed, .. } if typed.text() == YES => {
+            Question::Defaults(form) if form.typed.text() == YES => {
                 Answer::Act(Action::Command(Command::RestoreDefaults))
             }
-            Question::Defaults { complaint, .. } => {
-                *complaint = Some("Only the word Yes, written like this, starts it.");
+            Question::Defaults(form) => {
+                form.complaint = Some("Only the word Yes, written like this, starts it.".into());
                 Answer::Stay
             }
             Question::Allow { errors, cursor, complaint } => match errors.get(*cursor) {
@@ -243,22 +246,23 @@ impl Question {
             Question::Begun { noted, in_loader } => {
                 Answer::Act(Question::then_password(*in_loader, Some(noted.product.clone())))
             }
-            Question::Label { typed, image, in_loader, complaint } => {
-                let label = typed.text().trim();
+            Question::Label { form, image, in_loader } => {
+                let label = form.text();
                 // Noted and compared as the product is written, however it is typed.
                 let known = Product::named(label).map(|product| product.name.as_str());
                 let of_image = image.as_deref().filter(|image| image.eq_ignore_ascii_case(label));
-                *complaint = Some(match known.or(of_image) {
-                    _ if label.is_empty() => "The part number is missing.".to_owned(),
+                let complaint: Cow<str> = match known.or(of_image) {
+                    _ if label.is_empty() => "The part number is missing.".into(),
                     None => {
                         let names: Vec<&str> = Product::all().iter().map(|product| product.name.as_str()).collect();
-                        format!("There is no such product. Those there are: {}.", names.join(", "))
+                        format!("There is no such product. Those there are: {}.", names.join(", ")).into()
                     }
                     Some(_) if image.is_some() && of_image.is_none() => {
-                        "The file is for another product: it must not be sent to this unit.".to_owned()
+                        "The file is for another product: it must not be sent to this unit.".into()
                     }
                     Some(name) => return Answer::Act(Question::then_password(*in_loader, Some(name.to_owned()))),
-                });
+                };
+                form.complaint = Some(complaint);
                 Answer::Stay
             }
             Question::Password { field, complaint, .. } if field.is_empty() => {
@@ -283,8 +287,8 @@ impl Question {
             Question::Stream { source, millis, is_suggested, .. } => match character.to_ascii_lowercase() {
                 'f' => *source = Source::FieldValue,
                 'p' => *source = Source::ProcessValue,
-                '0'..='9' if std::mem::take(is_suggested) => *millis = TextField::new(character),
-                '0'..='9' if millis.text().len() < LONGEST_PERIOD_MS.to_string().len() => {
+                '0'..='9' if std::mem::take(is_suggested) => *millis = Form::with(character),
+                '0'..='9' if millis.typed.text().len() < LONGEST_PERIOD_MS.to_string().len() => {
                     self.edit(|field| field.push(character), |_| {});
                 }
                 _ => {}
@@ -299,79 +303,43 @@ impl Question {
             }
             // Whoever types on without looking must not close them: the rest would be keys to the unit.
             Question::Paste { .. } | Question::SendFile { .. } if !character.eq_ignore_ascii_case(&'y') => {}
-            _ if self.has_field() => {
+            _ => {
+                if !self.has_field() {
+                    return self.answered(character);
+                }
                 self.edit(|field| field.push(character), |field| field.push(character));
                 return self.changed();
             }
-            _ => match character.to_ascii_lowercase() {
-                'y' => return self.accept(),
-                'n' => return Answer::Close,
-                _ => {}
-            },
         }
         Answer::Stay
     }
 
-    /// Changes what has been typed. What was wrong with it was wrong with what it was.
+    /// A letter where nothing is typed.
+    fn answered(&mut self, letter: char) -> Answer {
+        match letter.to_ascii_lowercase() {
+            'y' => self.accept(),
+            'n' => Answer::Close,
+            _ => Answer::Stay,
+        }
+    }
+
+    /// Changes what has been typed.
     fn edit(&mut self, text: impl FnOnce(&mut TextField), password: impl FnOnce(&mut PasswordField)) {
         match self {
-            Question::Link(field) | Question::Choose { typed: field, .. } | Question::Find(field) => text(field),
-            Question::File { typed: field, complaint, .. } => {
-                *complaint = None;
-                text(field);
-            }
-            Question::Order { typed: field, complaint, .. } | Question::Temperature { typed: field, complaint, .. } => {
-                *complaint = None;
-                text(field);
-            }
-            Question::Defaults { typed: field, complaint } => {
-                *complaint = None;
-                text(field);
-            }
-            Question::Label { typed: field, complaint, .. } => {
-                *complaint = None;
-                text(field);
-            }
-            Question::Stream { millis, is_suggested, complaint, .. } => {
-                (*is_suggested, *complaint) = (false, None);
-                text(millis);
-            }
             Question::Password { field, complaint, .. } => {
                 *complaint = None;
-                password(field);
+                return password(field);
             }
-            Question::View
-            | Question::Allow { .. }
-            | Question::Begun { .. }
-            | Question::CancelLoad
-            | Question::Paste { .. }
-            | Question::SendFile { .. }
-            | Question::Disconnect { .. }
-            | Question::Quit => {}
+            Question::Stream { is_suggested, .. } => *is_suggested = false,
+            _ => {}
+        }
+        if let Some(form) = self.form() {
+            form.edit(text);
         }
     }
 
     /// Whether something is typed here.
-    fn has_field(&self) -> bool {
-        match self {
-            Question::Link(_)
-            | Question::File { .. }
-            | Question::Choose { .. }
-            | Question::Find(_)
-            | Question::Temperature { .. }
-            | Question::Order { .. }
-            | Question::Stream { .. }
-            | Question::Defaults { .. }
-            | Question::Label { .. }
-            | Question::Password { .. } => true,
-            Question::View
-            | Question::Allow { .. }
-            | Question::Begun { .. }
-            | Question::CancelLoad
-            | Question::Paste { .. }
-            | Question::SendFile { .. }
-            | Question::Disconnect { .. }
-            | Question::Quit => false,
-        }
+    fn has_field(&mut self) -> bool {
+        matches!(self, Question::Password { .. }) || self.form().is_some()
     }
 }

@@ -6,13 +6,12 @@ use ratatui::crossterm::event::KeyCode;
 use ratatui::text::{Line, Span};
 
 use super::warnings::{consequence, in_the_middle, loses_rows, too_fast};
-use super::{ORDERS, Purpose, Question, Wanted};
+use super::{Form, ORDERS, Purpose, Question, Wanted};
 use crate::image::DefectId;
 use crate::time::{BITS_PER_CHARACTER, Duration};
 use crate::tui::input::Noted;
 use crate::tui::keymap::Press;
 use crate::tui::picker::Picker;
-use crate::tui::screens::bench::emulated;
 use crate::tui::theme::Theme;
 use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
@@ -66,16 +65,16 @@ fn choose(wanted: Wanted, picker: &Picker, text: &str, theme: Theme, (columns, r
 /// What a question shows in so many columns; a list of files in it has so many rows.
 pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, usize)) -> Content {
     let (title, rows, hints) = match question {
-        Question::Link(field) => (
+        Question::Link(form) => (
             "Connect to",
             {
                 let text = "A serial port (/dev/ttyUSB0, COM3) or its adapter's serial number, an address in the network \
                             (tcp://host:port), or an emulated unit (emu:axtc4co).";
-                with_field(theme, paragraphs(&[text], columns), field.text(), None, columns)
+                with_form(theme, paragraphs(&[text], columns), form, columns)
             },
             vec![(ENTER, "connect"), (ESC, "back")],
         ),
-        Question::File { purpose, typed: field, directory, complaint, .. } => {
+        Question::File { purpose, form, directory } => {
             let (title, text, key) = match purpose {
                 Purpose::Image => ("Image file", "A path, absolute or from this folder:", "check it"),
                 Purpose::ExportStream => (
@@ -94,21 +93,21 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                 let directory = visible::text(&directory.to_string_lossy());
                 rows.push(Line::styled(format::keep_end(&directory, columns), theme.quiet()));
             }
-            let rows = with_field(theme, rows, field.text(), complaint.as_deref(), columns);
+            let rows = with_form(theme, rows, form, columns);
             (title, rows, vec![(ENTER, key), (CLEAR, "clear"), (ESC, "back")])
         }
-        Question::Find(field) => {
-            ("Find", vec![typed(theme, "", field.text(), columns)], vec![(ENTER, "keep"), (ESC, "end the search")])
+        Question::Find(form) => {
+            ("Find", vec![typed(theme, "", form.typed.text(), columns)], vec![(ENTER, "keep"), (ESC, "end the search")])
         }
-        Question::Temperature { input, typed: field, complaint, .. } => (
+        Question::Temperature { input, form } => (
             "Temperature of the sensor",
             {
                 let label = format!("Input {input}, in °C");
-                with_field(theme, paragraphs(&[&label], columns), field.text(), complaint.as_deref(), columns)
+                with_form(theme, paragraphs(&[&label], columns), form, columns)
             },
             vec![(ENTER, "set"), (ESC, "back")],
         ),
-        Question::Order { typed: field, complaint, .. } => (
+        Question::Order(form) => (
             "Order to the emulated unit",
             {
                 let example = |(orders, does): &(&[&str], &str)| {
@@ -118,13 +117,13 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                     ])
                 };
                 // What is wrong has to be read to its end: on a small screen it takes the place of examples.
-                let wrong = complaint.as_deref().map_or(0, |text| format::wrap(text, columns).len());
+                let wrong = form.complaint.as_deref().map_or(0, |text| format::wrap(text, columns).len());
                 let examples = ORDERS.iter().take(ORDERS.len() - wrong.saturating_sub(1).min(ORDERS.len()));
-                with_field(theme, examples.map(example).collect(), field.text(), complaint.as_deref(), columns)
+                with_form(theme, examples.map(example).collect(), form, columns)
             },
             vec![(ENTER, "do it"), (ESC, "back")],
         ),
-        Question::Stream { source, millis, complaint, .. } => (
+        Question::Stream { source, millis, .. } => (
             "Switch the data stream on",
             {
                 let choice = |mine: Source, text: &'static str| match mine == *source {
@@ -135,18 +134,20 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                     choice(Source::FieldValue, "F  field value, object 6100h, in °C"),
                     choice(Source::ProcessValue, "P  process value, object 7130h, in counts"),
                     Line::default(),
-                    typed(theme, "Every, in ms: ", millis.text(), columns),
+                    typed(theme, "Every, in ms: ", millis.typed.text(), columns),
                     Line::default(),
                 ];
                 rows.extend(paragraphs(
                     &["The unit stores this: the stream comes back after every power cycle until T switches it off."],
                     columns,
                 ));
-                for text in [too_fast(view, *source, millis.text()), loses_rows(view, *source)].into_iter().flatten() {
+                for text in
+                    [too_fast(view, *source, millis.typed.text()), loses_rows(view, *source)].into_iter().flatten()
+                {
                     rows.push(Line::default());
                     rows.extend(format::wrap(&text, columns).into_iter().map(|row| Line::styled(row, theme.warning())));
                 }
-                rows.extend(complain(theme, *complaint, columns));
+                rows.extend(complain(theme, millis.complaint.as_deref(), columns));
                 rows
             },
             vec![(letter('f'), "field"), (letter('p'), "process"), (ENTER, "switch on"), (ESC, "back")],
@@ -164,7 +165,7 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
             ),
             vec![(ENTER, "read all of it"), (letter('t'), "on the terminal"), (ESC, "back")],
         ),
-        Question::Defaults { typed: field, complaint } => (
+        Question::Defaults(form) => (
             "Restore the default object dictionary",
             {
                 let rows = paragraphs(
@@ -175,7 +176,7 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                     ],
                     columns,
                 );
-                with_field(theme, rows, field.text(), *complaint, columns)
+                with_form(theme, rows, form, columns)
             },
             vec![(ENTER, "restore"), (ESC, "back")],
         ),
@@ -220,7 +221,7 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                 (ESC, "back"),
             ],
         ),
-        Question::Label { typed: field, image, complaint, .. } => (
+        Question::Label { form, image, .. } => (
             "Which product is the unit?",
             {
                 let image = image.as_deref().map_or("not said".to_owned(), visible::text);
@@ -228,17 +229,16 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                             product would make the unit useless until the right one is sent.";
                 let named = format!("The file is for: {image}. Type the part number on the unit's label.");
                 let rows = paragraphs(&[text, named.as_str()], columns);
-                with_field(theme, rows, field.text(), complaint.as_deref(), columns)
+                with_form(theme, rows, form, columns)
             },
             vec![(ENTER, "go on"), (ESC, "back")],
         ),
         Question::Password { field, complaint, .. } => (
             "Password for loading software",
             {
-                let is_emulated = view.link.name.as_deref().is_some_and(|name| name.starts_with("emu:"));
-                let origin = match is_emulated {
-                    true => "Emulated units take AXIO-2010.",
-                    false => "Your Axiomatic contact has it. Capital and small letters count.",
+                let origin = match view.emulated() {
+                    Some(_) => "Emulated units take AXIO-2010.",
+                    None => "Your Axiomatic contact has it. Capital and small letters count.",
                 };
                 let rows = paragraphs(&[origin, "It is neither shown nor recorded."], columns);
                 with_field(theme, rows, &field.dots(), *complaint, columns)
@@ -269,8 +269,8 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
             },
             vec![(letter('y'), "send"), (ESC, "do not send")],
         ),
-        Question::Choose { wanted, picker, typed } => {
-            return choose(*wanted, picker, typed.text(), theme, (columns, room));
+        Question::Choose { wanted, picker, form } => {
+            return choose(*wanted, picker, form.typed.text(), theme, (columns, room));
         }
         Question::SendFile { name, bytes, is_image } => (
             "Send this file as it is?",
@@ -311,19 +311,19 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
                     _ if view.would_be_left() => in_the_middle(view).map(str::to_owned).to_vec(),
                     _ => vec![format!("{name} is connected.")],
                 };
-                if emulated(view).is_some() {
+                if view.emulated().is_some() {
                     texts.push("The emulated unit is gone with its link, with all that was set and loaded.".into());
                 }
                 let is_same = *then == view.link.name;
                 texts.extend(then.as_deref().map(visible::text).map(|link| match is_same {
-                    true if emulated(view).is_some() => "Then a new one begins, as the factory made it.".to_owned(),
+                    true if view.emulated().is_some() => "Then a new one begins, as the factory made it.".to_owned(),
                     true => format!("Then {link} is opened again."),
                     false => format!("{link} is opened first: if that fails, the link stays."),
                 }));
                 paragraphs(&texts, columns)
             },
             match &view.link.state {
-                LinkState::Lost(_) if emulated(view).is_some() && *then == view.link.name => {
+                LinkState::Lost(_) if view.emulated().is_some() && *then == view.link.name => {
                     vec![(letter('y'), "new unit"), (letter('n'), "stay here")]
                 }
                 _ => vec![(letter('y'), "close the link"), (letter('n'), "stay connected")],
@@ -366,6 +366,11 @@ pub(super) fn paragraphs(texts: &[impl AsRef<str>], columns: usize) -> Vec<Line<
         rows.extend(format::wrap(text.as_ref(), columns).into_iter().map(Line::raw));
     }
     rows
+}
+
+/// A line that is typed, below what is asked.
+fn with_form(theme: Theme, asked: Vec<Line<'static>>, form: &Form, columns: usize) -> Vec<Line<'static>> {
+    with_field(theme, asked, form.typed.text(), form.complaint.as_deref(), columns)
 }
 
 /// A field below what is asked, and below it what is wrong with what was typed.

@@ -7,6 +7,7 @@ mod content;
 mod draw;
 mod warnings;
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::action::Action;
@@ -51,19 +52,15 @@ pub enum Popup {
 #[derive(Debug)]
 pub enum Question {
     /// A link by name.
-    Link(TextField),
+    Link(Form),
     /// A file by name, in a folder.
     File {
         /// What it is for.
         purpose: Purpose,
-        /// What has been typed; relative to the folder.
-        typed: TextField,
+        /// Its name, relative to the folder. The box goes when the file has been written.
+        form: Form,
         /// The folder; empty for the one the program was started in.
         directory: PathBuf,
-        /// Why the file named cannot be read, or written.
-        complaint: Option<String>,
-        /// It is being written under this name: the box goes when it is.
-        written: Option<PathBuf>,
     },
     /// A file that is there: chosen from its folder, or its path typed.
     Choose {
@@ -71,8 +68,8 @@ pub enum Question {
         wanted: Wanted,
         /// The folder.
         picker: Picker,
-        /// What has been typed; where something has, it is what Enter takes.
-        typed: TextField,
+        /// A path; where one has been typed, Enter takes that.
+        form: Form,
     },
     /// Shall this file go to the unit as it is?
     SendFile {
@@ -84,47 +81,29 @@ pub enum Question {
         is_image: bool,
     },
     /// Words to look for; every letter looks.
-    Find(TextField),
+    Find(Form),
     /// The temperature of an emulated unit's sensor.
     Temperature {
         /// Which input, from 1.
         input: usize,
-        /// What has been typed.
-        typed: TextField,
-        /// What is wrong with it.
-        complaint: Option<String>,
-        /// The order that was made of it, until the unit has answered.
-        sent: Option<String>,
+        /// In °C.
+        form: Form,
     },
     /// An order to an emulated unit.
-    Order {
-        /// What has been typed.
-        typed: TextField,
-        /// What is wrong with it.
-        complaint: Option<String>,
-        /// What of it has been sent, until the unit has answered.
-        sent: Option<String>,
-    },
+    Order(Form),
     /// What the stream shall send.
     Stream {
         /// Field or process value.
         source: Source,
         /// Repetition time in milliseconds.
-        millis: TextField,
+        millis: Form,
         /// It is still the suggested one: a digit replaces it.
         is_suggested: bool,
-        /// What is wrong with it.
-        complaint: Option<&'static str>,
     },
     /// Shall the object dictionary be read, or its view be opened on the terminal?
     View,
     /// Shall the defaults be restored?
-    Defaults {
-        /// What has been typed.
-        typed: TextField,
-        /// What is wrong with it.
-        complaint: Option<&'static str>,
-    },
+    Defaults(Form),
     /// In spite of which error shall the image be sent? No text: a password typed from habit stood here in clear.
     Allow {
         /// Which errors there are.
@@ -143,14 +122,12 @@ pub enum Question {
     },
     /// What the unit's label says.
     Label {
-        /// What has been typed.
-        typed: TextField,
+        /// The part number.
+        form: Form,
         /// What the image is for.
         image: Option<String>,
         /// It waits in its loader already, which asks for no password.
         in_loader: bool,
-        /// What is wrong with it.
-        complaint: Option<String>,
     },
     /// The unit's password.
     Password {
@@ -177,6 +154,26 @@ pub enum Question {
     },
     /// Shall the program end though something is in the middle?
     Quit,
+}
+
+/// A line that is typed.
+#[derive(Debug, Default)]
+pub struct Form {
+    /// What has been typed.
+    pub typed: TextField,
+    /// What is wrong with it.
+    pub complaint: Option<Cow<'static, str>>,
+    /// What was made of it and is on its way, until there is an answer.
+    pub sent: Option<Sent>,
+}
+
+/// What was made of a line that was typed.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Sent {
+    /// An order to the emulated unit.
+    Order(String),
+    /// A file that is being written under this name.
+    File(PathBuf),
 }
 
 /// What a file is for.
@@ -230,32 +227,25 @@ impl Popup {
 impl Question {
     /// Asks for a link.
     pub fn link() -> Question {
-        Question::Link(TextField::default())
+        Question::Link(Form::default())
     }
 
     /// Asks for an image.
     pub fn image(directory: &Path) -> Question {
-        let directory = directory.to_path_buf();
-        Question::File {
-            purpose: Purpose::Image,
-            typed: TextField::default(),
-            directory,
-            complaint: None,
-            written: None,
-        }
+        Question::File { purpose: Purpose::Image, form: Form::default(), directory: directory.to_path_buf() }
     }
 
     /// Asks for another file, and suggests a name for a new one.
     pub fn file(purpose: Purpose, view: &View) -> Question {
-        let typed = match purpose {
-            Purpose::Image => TextField::default(),
-            Purpose::ExportStream => TextField::new(suggested(view, "stream", view.monitor.stream.newest, "csv")),
+        let form = match purpose {
+            Purpose::Image => Form::default(),
+            Purpose::ExportStream => Form::with(suggested(view, "stream", view.unit.monitor.stream.newest, "csv")),
             Purpose::ExportDictionary => {
-                let at = view.dictionary.as_ref().map(|read| read.at);
-                TextField::new(suggested(view, "dictionary", at, "json"))
+                let at = view.unit.dictionary.as_ref().map(|read| read.at);
+                Form::with(suggested(view, "dictionary", at, "json"))
             }
         };
-        Question::File { purpose, typed, directory: PathBuf::new(), complaint: None, written: None }
+        Question::File { purpose, form, directory: PathBuf::new() }
     }
 
     /// Asks for a file that is there, beginning in a folder that has to be read.
@@ -266,34 +256,33 @@ impl Question {
         };
         let mut picker = Picker::new(offers, directory.to_path_buf());
         picker.list(directory.to_path_buf());
-        Question::Choose { wanted, picker, typed: TextField::default() }
+        Question::Choose { wanted, picker, form: Form::default() }
     }
 
     /// Asks for words to look for, those of the last time given.
     pub fn find(words: &str) -> Question {
-        Question::Find(TextField::new(words))
+        Question::Find(Form::with(words))
     }
 
     /// Asks for the temperature of an emulated unit's sensor.
     pub fn temperature(input: usize) -> Question {
-        Question::Temperature { input, typed: TextField::default(), complaint: None, sent: None }
+        Question::Temperature { input, form: Form::default() }
     }
 
     /// Asks for an order to an emulated unit.
     pub fn order() -> Question {
-        Question::Order { typed: TextField::default(), complaint: None, sent: None }
+        Question::Order(Form::default())
     }
 
     /// Asks what the stream shall send; what it has sent last is suggested.
     pub fn stream(view: &View) -> Question {
-        let stream = &view.monitor.stream;
+        let stream = &view.unit.monitor.stream;
         let millis =
-            stream.period_set().or(view.last_period).map_or(USUAL_PERIOD_MS, |period| period.as_millis() as u64);
+            stream.period_set().or(view.unit.last_period).map_or(USUAL_PERIOD_MS, |period| period.as_millis() as u64);
         Question::Stream {
             source: stream.source.unwrap_or(Source::FieldValue),
-            millis: TextField::new(millis.to_string()),
+            millis: Form::with(millis.to_string()),
             is_suggested: true,
-            complaint: None,
         }
     }
 
@@ -317,7 +306,7 @@ impl Question {
     /// Asks what the unit's label says.
     pub fn label(view: &View, facts: &ImageFacts) -> Question {
         let (image, in_loader) = (facts.product.clone(), view.facts.state == UnitState::Loader);
-        Question::Label { typed: TextField::default(), image, in_loader, complaint: None }
+        Question::Label { form: Form::default(), image, in_loader }
     }
 
     /// The password is asked for, but not for a loader, which wants none.
@@ -328,23 +317,34 @@ impl Question {
         }
     }
 
-    /// Whether what was typed is on its way, and what is typed meanwhile would be lost or done twice.
-    fn is_on_its_way(&self) -> bool {
+    /// The line that is typed here, if one is. A password is not such a line: it is never text.
+    pub fn form(&mut self) -> Option<&mut Form> {
         match self {
-            Question::File { written, .. } => written.is_some(),
-            Question::Temperature { sent, .. } | Question::Order { sent, .. } => sent.is_some(),
-            _ => false,
+            Question::Link(form)
+            | Question::File { form, .. }
+            | Question::Choose { form, .. }
+            | Question::Find(form)
+            | Question::Temperature { form, .. }
+            | Question::Order(form)
+            | Question::Stream { millis: form, .. }
+            | Question::Defaults(form)
+            | Question::Label { form, .. } => Some(form),
+            Question::SendFile { .. }
+            | Question::View
+            | Question::Allow { .. }
+            | Question::Begun { .. }
+            | Question::Password { .. }
+            | Question::CancelLoad
+            | Question::Paste { .. }
+            | Question::Disconnect { .. }
+            | Question::Quit => None,
         }
     }
 
-    /// What was typed is refused: it is mended where it was typed.
+    /// What was typed is refused: it can be corrected where it was typed.
     pub fn refused(&mut self, why: String) {
-        match self {
-            Question::File { written, complaint, .. } => (*written, *complaint) = (None, Some(why)),
-            Question::Temperature { sent, complaint, .. } | Question::Order { sent, complaint, .. } => {
-                (*sent, *complaint) = (None, Some(why));
-            }
-            _ => {}
+        if let Some(form) = self.form() {
+            (form.sent, form.complaint) = (None, Some(why.into()));
         }
     }
 
@@ -354,7 +354,7 @@ impl Question {
             Question::SendFile { .. }
             | Question::Stream { .. }
             | Question::View
-            | Question::Defaults { .. }
+            | Question::Defaults(_)
             | Question::Begun { .. }
             | Question::Label { .. }
             | Question::Password { .. }
@@ -365,11 +365,29 @@ impl Question {
             | Question::Choose { .. }
             | Question::Find(_)
             | Question::Temperature { .. }
-            | Question::Order { .. }
+            | Question::Order(_)
             | Question::Allow { .. }
             | Question::Disconnect { .. }
             | Question::Quit => false,
         }
+    }
+}
+
+impl Form {
+    /// A line with this text in it.
+    fn with(text: impl Into<String>) -> Self {
+        Form { typed: TextField::new(text), ..Form::default() }
+    }
+
+    /// What has been typed, without the blanks around it.
+    fn text(&self) -> &str {
+        self.typed.text().trim()
+    }
+
+    /// Changes what has been typed. What was wrong with it was wrong with what it was.
+    fn edit(&mut self, change: impl FnOnce(&mut TextField)) {
+        self.complaint = None;
+        change(&mut self.typed);
     }
 }
 

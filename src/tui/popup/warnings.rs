@@ -8,7 +8,7 @@ use crate::wire::stream::Source;
 
 /// What becomes of the rows on the screen, if they are of the other source.
 pub(super) fn loses_rows(view: &View, source: Source) -> Option<String> {
-    let stream = &view.monitor.stream;
+    let stream = &view.unit.monitor.stream;
     let rows = stream.source.filter(|shown| *shown != source).map(|_| format::counted(stream.rows, "row"))?;
     Some(format!("The screens begin anew with it: {rows} of the other kind stay in the recording only."))
 }

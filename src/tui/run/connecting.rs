@@ -1,8 +1,10 @@
 //! The link of the loop: opened, taken over, lost, looked for, closed.
 
+use std::path::PathBuf;
+
+use super::Console;
+use super::answers::Found;
 use super::player::Player;
-use super::{Console, in_thread};
-use crate::host;
 use crate::host::clock;
 use crate::host::comeback::Comeback;
 use crate::host::link::{self, Connection, LinkError, LinkSpec};
@@ -11,28 +13,22 @@ use crate::host::replay::Recording;
 use crate::host::socket::Dialled;
 use crate::record::{LINK_BACK, LINK_LOST};
 use crate::time::Instant;
-use crate::tui::{Failure, Input, LinkInfo};
+use crate::tui::{Failure, Input, LinkInfo, LinkKind};
 
-/// Which dial, of what, and what came of it.
-pub(super) type DialResult = (u64, String, LinkSpec, Result<Dialled, LinkError>);
+/// A network link that was dialled.
+pub(super) struct Dial {
+    /// Which of those dialled so far.
+    number: u64,
+    name: String,
+    spec: LinkSpec,
+    result: Result<Dialled, LinkError>,
+}
 
 impl Console {
-    /// Opens a link that does not have to be dialled. Gives `true` when the console is to end.
-    pub(super) fn open(&mut self, name: &str, spec: LinkSpec) -> bool {
-        if let LinkSpec::Replay(path) = &spec {
-            let mut leaves = false;
-            let input = match Recording::open(path) {
-                Ok(recording) => {
-                    leaves |= self.take_rest();
-                    self.close_link();
-                    let player = Player::begin(name, path.clone(), recording, self.now());
-                    let info = player.link_info(self.world.baud);
-                    self.player = Some(player);
-                    Input::LinkOpened(info)
-                }
-                Err(error) => Input::LinkFailed((self.world.unreadable)(error)),
-            };
-            return self.handle(input) || leaves;
+    /// Opens a link that does not have to be dialled.
+    pub(super) fn open(&mut self, name: &str, spec: LinkSpec) {
+        if let LinkSpec::Replay(path) = spec {
+            return self.open_recording(name, path);
         }
         match (self.world.open)(&spec, self.world.baud, self.clock, self.sender.clone()) {
             Ok(connection) => self.begin(name, connection, spec),
@@ -40,22 +36,32 @@ impl Console {
         }
     }
 
+    fn open_recording(&mut self, name: &str, path: PathBuf) {
+        let recording = match Recording::open_file(&path) {
+            Ok(recording) => recording,
+            Err(error) => return self.handle(Input::LinkFailed((self.world.unreadable)(error))),
+        };
+        self.take_rest();
+        self.close_link();
+        let player = Player::begin(name, path, recording, self.now());
+        let info = player.link_info(self.world.baud);
+        self.player = Some(player);
+        self.handle(Input::LinkOpened(info));
+    }
+
     /// Begins to dial a network link, in a thread: a host that is switched off answers nothing for seconds.
     pub(super) fn dial(&mut self, name: String, spec: LinkSpec) {
-        let (dial, clock, options) = (self.dial, self.clock, link::Options { baud: self.world.baud });
-        let (dialling, sender) = (self.dialling.clone(), self.sender.clone());
-        in_thread("dial", move || {
+        let (number, clock, options) = (self.dial, self.clock, link::Options { baud: self.world.baud });
+        self.ask(move || {
             let result = Connection::dial(&spec, options, clock);
-            if dialling.send((dial, name, spec, result)).is_ok() {
-                let _ = sender.try_send(host::Input::Wake);
-            }
+            Found::Dialled(Box::new(Dial { number, name, spec, result }))
         });
     }
 
-    /// Takes what came of dialling, unless the user has gone on to something else. Gives `true` when it is to end.
-    pub(super) fn take_dialled(&mut self, (dial, name, spec, result): DialResult) -> bool {
-        if dial != self.dial {
-            return false;
+    /// Takes what came of dialling, unless the user has gone on to something else.
+    pub(super) fn take_dialled(&mut self, Dial { number, name, spec, result }: Dial) {
+        if number != self.dial {
+            return;
         }
         let options = link::Options { baud: self.world.baud };
         let connection =
@@ -66,11 +72,11 @@ impl Console {
         }
     }
 
-    /// Takes over an open link and starts its recording. Gives `true` when the console is to end.
-    fn begin(&mut self, name: &str, connection: Connection, spec: LinkSpec) -> bool {
-        // What the old link has brought belongs to its own session and recording; what the new one has said since it is
-        // open waits for them to be there.
-        let leaves = self.take_rest();
+    /// Takes over an open link and starts its recording.
+    fn begin(&mut self, name: &str, connection: Connection, spec: LinkSpec) {
+        // What the old link has brought belongs to its own session and recording; what the new one has said since it was
+        // opened waits for its own.
+        self.take_rest();
         self.close_link();
         self.sessions += 1;
         let plan = self.world.recording.of_session(self.sessions);
@@ -83,22 +89,26 @@ impl Console {
         let opened = Input::LinkOpened(LinkInfo {
             link: name.to_owned(),
             baud: self.world.baud,
-            read_only: false,
+            kind: match spec {
+                LinkSpec::Emulated(product) => LinkKind::Emulated(product),
+                LinkSpec::Replay(_) => LinkKind::Recording,
+                LinkSpec::Serial(_) | LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_) => LinkKind::Unit,
+            },
             recording,
             noted: (self.world.noted)(name),
             start_of_day,
             start_millis: self.clock.wall(Instant::ZERO).as_millisecond()
                 - i64::try_from(self.skew.as_millis()).unwrap_or_default(),
         });
-        self.handle(opened) || leaves
+        self.handle(opened);
     }
 
-    /// The open link has ended by itself. Gives `true` when the console is to end.
-    pub(super) fn lose_link(&mut self, failure: Failure) -> bool {
-        // What the reader has brought behind the loss that the writer has noticed, or before a write that was refused.
-        let leaves = self.take_rest();
+    /// The open link has ended by itself.
+    pub(super) fn lose_link(&mut self, failure: Failure) {
+        // What the reader has brought since the writer noticed the loss, or before a write that was refused.
+        self.take_rest();
         if self.link.is_none() {
-            return leaves;
+            return;
         }
         let recorder = std::mem::take(&mut self.recorder);
         let mut comeback = self.comeback.take();
@@ -110,7 +120,7 @@ impl Console {
             self.retry = Some(self.clock.now() + Comeback::RETRY);
         }
         self.comeback = comeback;
-        self.handle(Input::LinkGone(failure)) || leaves
+        self.handle(Input::LinkGone(failure));
     }
 
     /// Looks whether the lost link is there again.
@@ -144,10 +154,11 @@ impl Console {
         self.recorder = Recorder::nothing();
     }
 
-    /// Hands the app what the open link has brought and nobody has taken, as the last of it. Gives `true` when it is to
-    /// end.
-    fn take_rest(&mut self) -> bool {
-        let rest = self.link.as_ref().map(|link| self.inbox.rest(link.id()));
-        self.hand_in(rest.unwrap_or_default(), Input::Arrived)
+    /// Hands the app what the open link has brought and nobody has taken, as the last of it.
+    fn take_rest(&mut self) {
+        if let Some(link) = &self.link {
+            let rest = self.inbox.rest(link.id());
+            self.hand_in(rest, Input::Arrived);
+        }
     }
 }

@@ -9,6 +9,8 @@ use super::super::{
     FIRST_BYTES, FileEntry, FileKind, Input, LARGEST_TEXT, MOST_LISTED, PortEntry, Recorded, RecordingEntry,
     RecordingList,
 };
+use crate::host::link::LinkSpec;
+use crate::host::replay::open_regular;
 use crate::host::save::{SaveError, save};
 use crate::host::{self, library, ports, recorder};
 
@@ -50,17 +52,15 @@ pub(super) fn folder(directory: &Path) -> Input {
             .flatten()
             .take(MOST_LISTED)
             .filter_map(|entry| {
-                // Behind a link, what it leads to.
+                // Of a link, what it leads to.
                 let metadata = fs::metadata(entry.path()).ok()?;
                 let kind = if metadata.is_dir() { FileKind::Folder } else { FileKind::File };
                 let name = entry.file_name().to_string_lossy().into_owned();
-                // Only plain files: to open another may wait for ever.
-                let is_asked = metadata.is_file() && !is_image_name(&name);
-                let begins = if is_asked { first_bytes(&entry.path()).unwrap_or_default() } else { Vec::new() };
+                let begins = if is_image_name(&name) { None } else { first_bytes(&entry.path()).ok() };
                 Some(FileEntry {
                     name,
                     kind,
-                    begins,
+                    begins: begins.unwrap_or_default(),
                     bytes: if kind == FileKind::File { metadata.len() } else { 0 },
                     modified: metadata.modified().ok().and_then(host::clock::local_date_and_time),
                 })
@@ -72,16 +72,19 @@ pub(super) fn folder(directory: &Path) -> Input {
 
 fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(FIRST_BYTES as u64).read_to_end(&mut bytes)?;
+    open_regular(path)?.take(FIRST_BYTES as u64).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// The recordings: those of the state directory, and the one that this console writes, which may lie elsewhere.
-pub(super) fn recordings(written: Option<PathBuf>) -> Result<RecordingList, String> {
+/// Where recordings are kept.
+pub(super) fn state_folder() -> Result<PathBuf, String> {
+    recorder::folder().ok_or_else(|| "this system does not say where programs keep their state".to_owned())
+}
+
+/// The recordings: those of the state folder, and the one that this console writes, which may lie elsewhere.
+pub(super) fn recordings(state: Result<PathBuf, String>, written: Option<PathBuf>) -> Result<RecordingList, String> {
     let written = written.and_then(library::look);
-    let in_state =
-        recorder::folder().ok_or("this system does not say where programs keep their state").map_err(str::to_owned);
-    let in_state = in_state.and_then(|folder| {
+    let in_state = state.and_then(|folder| {
         library::list(&folder).map_err(|error| format!("cannot read '{}': {error}", folder.display()))
     });
     let mut library = match in_state {
@@ -99,7 +102,8 @@ pub(super) fn recordings(written: Option<PathBuf>) -> Result<RecordingList, Stri
         is_being_written: content.is_being_written,
     };
     let entry = |listed: library::Listed| RecordingEntry {
-        link: format!("replay:{}", listed.path.display()),
+        path: listed.path.display().to_string(),
+        link: LinkSpec::Replay(listed.path).to_string(),
         bytes: listed.bytes,
         content: listed.content.map(recorded),
     };
@@ -114,7 +118,7 @@ pub(super) fn create(path: &Path, bytes: &[u8]) -> Result<(), String> {
     })
 }
 
-/// Writes behind what is in a file.
+/// Writes more at the end of a file.
 pub(super) fn append(path: &Path, bytes: &[u8]) -> Result<(), String> {
     let written = File::options().append(true).open(path).and_then(|mut file| file.write_all(bytes));
     written.map_err(|error| error.to_string())
@@ -123,29 +127,23 @@ pub(super) fn append(path: &Path, bytes: &[u8]) -> Result<(), String> {
 /// A text file that is not too large.
 pub(super) fn text(path: &Path) -> Result<String, String> {
     let bytes = bytes(path, LARGEST_TEXT)?;
-    String::from_utf8(bytes).map_err(|_| "it is no text in UTF-8".to_owned())
+    String::from_utf8(bytes).map_err(|_| "it is not text in UTF-8".to_owned())
 }
 
-/// A file that has not more bytes than this.
+/// A file of no more bytes than this.
 pub(super) fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, String> {
-    // To open anything else, a pipe without a writer for example, may wait for ever.
-    let metadata = fs::metadata(path).map_err(|error| said(&error))?;
-    if !metadata.is_file() {
-        return Err(if metadata.is_dir() { "it is a folder" } else { "it is no plain file" }.to_owned());
-    }
     let mut bytes = Vec::new();
-    let file = File::open(path).map_err(|error| said(&error))?;
     // One byte more than allowed shows that there is more.
-    file.take(most + 1).read_to_end(&mut bytes).map_err(|error| said(&error))?;
+    open(path)?.take(most + 1).read_to_end(&mut bytes).map_err(|error| said(&error))?;
     if bytes.len() as u64 > most {
         return Err(format!("it has more than {most} bytes"));
     }
     Ok(bytes)
 }
 
-/// Whether there is something of this name to be read.
-pub(super) fn is_there(path: &Path) -> Result<(), String> {
-    fs::metadata(path).map(drop).map_err(|error| said(&error))
+/// A file, open, if it can be read without waiting for anybody.
+pub(super) fn open(path: &Path) -> Result<File, String> {
+    open_regular(path).map_err(|error| said(&error))
 }
 
 /// What the system says, without the number that it adds.
@@ -153,6 +151,7 @@ fn said(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file".to_owned(),
         io::ErrorKind::PermissionDenied => "it may not be read".to_owned(),
+        io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
         _ => error.to_string(),
     }
 }
@@ -161,18 +160,34 @@ fn said(error: &io::Error) -> String {
 mod tests {
     use super::*;
 
+    fn in_folder(state: &Path, written: Option<&Path>) -> RecordingList {
+        recordings(Ok(state.to_owned()), written.map(Path::to_owned)).expect("listed")
+    }
+
     #[test]
     fn a_recording_elsewhere_that_is_being_written_is_the_first_of_the_list() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("mine.cast");
-        fs::write(&path, "{\"version\": 2, \"width\": 80, \"height\": 24}\n[1.5, \"o\", \"hello\"]\n")
-            .expect("written");
-        let listed = recordings(Some(path.clone())).expect("listed").entries;
+        let (state, elsewhere) = (tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("another"));
+        let cast = "{\"version\": 2, \"width\": 80, \"height\": 24}\n[1.5, \"o\", \"hello\"]\n";
+        let path = elsewhere.path().join("mine.cast");
+        for path in [&path, &state.path().join("20260131T120000Z-ttyUSB0-1.cast")] {
+            fs::write(path, cast).expect("written");
+        }
+        let listed = in_folder(state.path(), Some(&path)).entries;
+        assert_eq!(listed.len(), 2);
         assert_eq!(listed[0].link, format!("replay:{}", path.display()));
         let length = listed[0].content.as_ref().map(|content| content.length);
         assert_eq!(length, Ok(Some(crate::time::Duration::from_millis(1500))));
         fs::remove_file(&path).expect("removed");
-        let without = recordings(Some(path)).map_or_else(|_| Vec::new(), |list| list.entries);
-        assert_eq!(without.len(), listed.len() - 1, "what is not there is not listed");
+        assert_eq!(in_folder(state.path(), Some(&path)).entries, listed[1..], "what is not there is not listed");
+    }
+
+    #[test]
+    fn without_a_state_folder_the_recording_that_is_being_written_is_all_there_is() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("mine.cast");
+        fs::write(&path, "{\"version\": 2, \"width\": 80, \"height\": 24}\n").expect("written");
+        let nowhere = || Err("nowhere".to_owned());
+        assert_eq!(recordings(nowhere(), Some(path)).map(|list| list.entries.len()), Ok(1));
+        assert_eq!(recordings(nowhere(), None), Err("nowhere".to_owned()));
     }
 }

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::{Failure, Input, LinkInfo, Pace, Playback, Playing};
+use super::super::{Failure, Input, LinkInfo, LinkKind, Pace, Playback, Playing};
 use crate::host::clock;
 use crate::host::replay::{Recording, RecordingError};
 use crate::record::{Direction, Ending, Piece};
@@ -95,7 +95,7 @@ impl Player {
         LinkInfo {
             link: self.name.clone(),
             baud,
-            read_only: true,
+            kind: LinkKind::Recording,
             recording: None,
             noted: None,
             start_of_day: clock::day_before(clock::time_of_day(millis), before),

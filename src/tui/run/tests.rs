@@ -6,12 +6,52 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::KeyCode;
 
+use super::answers::Found;
 use super::*;
+use crate::host::LinkId;
 use crate::host::link::Options as LinkOptions;
 use crate::host::pty::Pty;
 
+/// A screen in memory.
+struct Paper(Terminal<TestBackend>);
+
+impl Paper {
+    fn new() -> Self {
+        Paper(Terminal::new(TestBackend::new(80, 24)).expect("a test backend"))
+    }
+
+    fn picture(&mut self, console: &Console) -> String {
+        self.draw(&console.app).expect("drawing in memory");
+        self.0.backend().to_string()
+    }
+}
+
+impl Canvas for Paper {
+    fn size(&self) -> io::Result<Size> {
+        Ok(self.0.size().expect("a test backend"))
+    }
+
+    fn draw(&mut self, app: &App) -> io::Result<()> {
+        self.0.draw(|frame| app.draw(frame)).expect("drawing in memory");
+        Ok(())
+    }
+
+    fn suspend(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn retake(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// A console that has been told nothing yet.
 fn console() -> Console {
+    console_and_keys().0
+}
+
+/// The same, and where its keys are typed.
+fn console_and_keys() -> (Console, SyncSender<TerminalEvent>) {
     let world = World {
         link: None,
         baud: 115_200,
@@ -31,18 +71,32 @@ fn console() -> Console {
         check: |_, _, _| Err("nobody asks for it here".into()),
         note: |_, _| {},
         noted: |_| None,
+        incomplete: |_| {},
     };
     let app =
         App::new(Options { link: None, directory: PathBuf::new(), home: None, palette: Palette::Mono, size: (80, 24) });
     let (sender, inputs) = host::channel();
-    let (_, keys) = sync_channel(1);
-    Console::new(app, world, Clock::start(), sender, inputs, keys)
+    let (typed, keys) = sync_channel(1);
+    let console = Console::new(app, world, Clock::start(), sender, inputs, keys);
+    (console.expect("a thread for files"), typed)
+}
+
+/// What a thread reports next.
+fn answer(console: &Console) -> Input {
+    match console.answers.recv_timeout(std::time::Duration::from_secs(60)).expect("an answer") {
+        Found::Answer(input) => input,
+        Found::Dialled(_) => panic!("nothing is dialled here"),
+    }
+}
+
+fn key(character: char) -> TerminalEvent {
+    let code = if character == '\r' { KeyCode::Enter } else { KeyCode::Char(character) };
+    TerminalEvent::Key(code.into())
 }
 
 fn type_keys(console: &mut Console, keys: &str) {
-    for key in keys.chars() {
-        let code = if key == '\r' { KeyCode::Enter } else { KeyCode::Char(key) };
-        console.handle(Input::Terminal(TerminalEvent::Key(code.into())));
+    for character in keys.chars() {
+        console.handle(Input::Terminal(key(character)));
     }
 }
 
@@ -102,12 +156,10 @@ fn a_path_of_nothing_is_told_as_what_it_is() {
     let words = "There is no such file: /nowhere/x.S";
     for _ in 0..2 {
         // The folder's list, and what came of the path.
-        let answer = console.answers.recv_timeout(Duration::from_secs(60)).expect("an answer");
+        let answer = answer(&console);
         console.handle(answer);
     }
-    let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a test backend");
-    terminal.draw(|frame| console.app.draw(frame)).expect("drawing in memory");
-    let picture = terminal.backend().to_string();
+    let picture = Paper::new().picture(&console);
     assert!(picture.contains(words) && picture.contains("› /nowhere/x.S"), "{picture}");
 }
 
@@ -142,10 +194,88 @@ fn files_are_written_in_their_order_beside_the_loop_and_are_whole_when_it_ends()
     std::fs::write(&theirs, "theirs").expect("written");
     let more = Effect::AppendFile { path: theirs.clone(), bytes: "ours".into() };
     console.perform(vec![Effect::CreateFile { path: theirs.clone(), bytes: "ours".into() }, more]);
-    let answer = || console.answers.recv_timeout(Duration::from_secs(60)).expect("an answer");
-    assert!(matches!(answer(), Input::FileWritten { result: Ok(()), .. }));
-    assert!(matches!(answer(), Input::FileWritten { result: Err(_), .. }), "it is there already");
-    drop(console);
+    assert!(matches!(answer(&console), Input::FileWritten { result: Ok(()), .. }));
+    assert!(matches!(answer(&console), Input::FileWritten { result: Err(_), .. }), "it is there already");
+    assert_eq!(console.into_writer().finish(std::time::Duration::from_secs(60)), [PathBuf::new(); 0]);
     let written = |path| std::fs::read_to_string(path).expect("there");
     assert_eq!((written(&path), written(&theirs)), ("abc".into(), "theirs".into()));
+}
+
+#[test]
+fn an_answer_is_taken_also_when_the_channel_had_no_room_to_wake_the_loop() {
+    let mut console = console();
+    let mut paper = Paper::new();
+    let byte = || host::Input::Bytes { link: LinkId::next(), at: Instant::ZERO, bytes: vec![0] };
+    while console.sender.try_send(byte()).is_ok() {}
+    console.reporter.report(Input::PortsListed(Err("they are on strike".into())));
+    console.turn(&mut paper);
+    let picture = paper.picture(&console);
+    assert!(picture.contains("they are on strike"), "{picture}");
+}
+
+#[test]
+fn the_loop_ends_when_the_user_leaves_and_when_the_terminal_fails() {
+    let (mut console, keys) = console_and_keys();
+    keys.send(key('q')).expect("there is room");
+    assert_eq!(console.serve(&mut Paper::new()).ok(), Some(End::Quit));
+
+    struct Torn;
+    impl Canvas for Torn {
+        fn size(&self) -> io::Result<Size> {
+            Ok(Size::new(80, 24))
+        }
+        fn draw(&mut self, _: &App) -> io::Result<()> {
+            Err(io::Error::other("torn"))
+        }
+        fn suspend(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+        fn retake(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+    let error = self::console().serve(&mut Torn).expect_err("there is nothing to draw on");
+    assert_eq!(error.to_string(), "torn");
+}
+
+#[test]
+fn what_is_not_a_regular_file_is_refused_and_not_waited_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("pipe.S");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("a program of every Unix");
+    assert!(made.success());
+    let mut console = console();
+    let check = Effect::CheckImage { path: pipe.clone(), loader: None, allow: Vec::new() };
+    console.perform(vec![check, Effect::ReadFile(pipe.clone())]);
+    for _ in 0..2 {
+        let (Input::ImageUnreadable { why, .. } | Input::FileRead { text: Err(why), .. }) = answer(&console) else {
+            panic!("it was read");
+        };
+        assert_eq!(why, "it is not a regular file");
+    }
+    console.world.resolve = |name| Ok(LinkSpec::Replay(name.into()));
+    type_keys(&mut console, &format!("1p{}\r", pipe.display()));
+    let picture = Paper::new().picture(&console);
+    assert!(picture.contains("Not connected") && picture.contains("a regular file"), "{picture}");
+}
+
+#[test]
+fn a_journal_that_keeps_everybody_waiting_does_not_keep_an_upload() {
+    let mut console = console();
+    console.world.note = |_, _| loop {
+        std::thread::park();
+    };
+    let noted = Noted { product: "AXTC4CO".into(), image: "a.S".into(), ran: None, begun: "today".into() };
+    console.perform(vec![Effect::UploadBegins { link: "u0".into(), noted }, Effect::Quit]);
+    assert!(console.quits);
+}
+
+#[test]
+fn the_screens_write_links_as_the_loop_reads_them() {
+    for product in crate::device::Product::all() {
+        let name = crate::tui::link_name::emulated(product);
+        assert_eq!(name.parse(), Ok(LinkSpec::Emulated(product)));
+    }
+    let expanded = crate::tui::link_name::expanded("Replay:~/a.cast", Some("/home/me".as_ref()));
+    assert_eq!(expanded.parse(), Ok(LinkSpec::Replay("/home/me/a.cast".into())));
 }

@@ -79,8 +79,6 @@ const ORDER_COLUMNS: usize = 28;
 pub const NO_UNIT: &str = "No emulated unit is connected: press 1 and choose one.";
 /// Orders that are remembered.
 const KEPT_ORDERS: usize = 100;
-/// Prefix of links to emulated units in this program.
-const EMULATED: &str = "emu:";
 
 /// The page.
 #[derive(Debug, Default)]
@@ -113,14 +111,6 @@ struct Order {
     answer: Option<Result<Option<String>, String>>,
 }
 
-/// The product of the emulated unit in this program, if the link is one.
-pub fn emulated(view: &View) -> Option<&'static Product> {
-    let name = view.link.name.as_deref()?;
-    let (scheme, rest) = name.split_at_checked(EMULATED.len())?;
-    let product = rest.split('?').next().unwrap_or(rest);
-    scheme.eq_ignore_ascii_case(EMULATED).then(|| Product::named(product)).flatten()
-}
-
 impl Bench {
     /// Another link: another bench.
     pub fn begin_link(&mut self) {
@@ -148,7 +138,7 @@ impl Bench {
 
     /// What a command does here.
     pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
-        let Some(product) = emulated(view) else { return Some(Action::Tell(NO_UNIT.to_owned())) };
+        let Some(product) = view.emulated() else { return Some(Action::Tell(NO_UNIT.to_owned())) };
         let last = usize::from(product.measurement.channels).saturating_sub(1);
         let number = self.input + 1;
         let warmer = |by: f64| {
@@ -206,14 +196,14 @@ impl Bench {
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let theme = scene.theme;
-        let Some(product) = emulated(scene.view) else {
+        let Some(product) = scene.view.emulated() else {
             let texts = ["Here the sensors, the cable and the power of an emulated unit are in your hands.", NO_UNIT];
             let room = usize::from(area.width).saturating_sub(4);
             let broken = texts.into_iter().flat_map(|text| format::wrap(text, room));
             let rows = broken.map(|line| Line::raw(format!("  {line}")));
             return lines::draw(frame, area, [lines::rule(theme, area.width, "Bench", "")].into_iter().chain(rows));
         };
-        let newest = scene.view.monitor.stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
+        let newest = scene.view.unit.monitor.stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
         let newest = newest.map(|time| format!(", newest row {time}")).unwrap_or_default();
         let remark = format!("of this emulated {}{newest}", product.name);
         let mut rows = vec![lines::rule(theme, area.width, "Sensors", &remark)];
@@ -256,7 +246,7 @@ impl Bench {
         let says = channel.and_then(|channel| channel.reading.value()).map_or_else(
             || "-".to_owned(),
             |value| {
-                let source = scene.view.monitor.stream.source.unwrap_or(Source::FieldValue);
+                let source = scene.view.unit.monitor.stream.source.unwrap_or(Source::FieldValue);
                 format!("{value:.*}", super::overview::decimals(scene.view, source))
             },
         );
@@ -274,13 +264,13 @@ impl Bench {
 
 /// The stream's channel of an input: a unit may send its cold junction in front.
 fn channel_of<'a>(view: &'a View, product: &Product, place: usize) -> Option<&'a Channel> {
-    let channels = &view.monitor.stream.channels;
+    let channels = &view.unit.monitor.stream.channels;
     let in_front = channels.len().checked_sub(usize::from(product.measurement.channels))?;
     channels.get(in_front + place)
 }
 
 fn streamed(view: &View, product: &Product, place: usize) -> Option<f64> {
-    let is_temperature = view.monitor.stream.source == Some(Source::FieldValue);
+    let is_temperature = view.unit.monitor.stream.source == Some(Source::FieldValue);
     channel_of(view, product, place).filter(|_| is_temperature)?.reading.value()
 }
 

@@ -10,6 +10,7 @@ use crate::device::Product;
 use crate::tui::action::Action;
 use crate::tui::input::{PortEntry, RecordingEntry};
 use crate::tui::keymap::{Binding, Cmd, Press};
+use crate::tui::link_name;
 use crate::tui::popup::Question;
 use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
@@ -171,10 +172,10 @@ impl Connect {
             Cmd::Refresh => return Some(Action::ListPorts),
             Cmd::Disconnect => {
                 return match view.link.state {
-                    LinkState::Open { .. } if view.is_in_the_middle() => {
+                    LinkState::Open if view.is_in_the_middle() => {
                         Some(Action::Ask(Question::Disconnect { then: None }))
                     }
-                    LinkState::Open { .. } | LinkState::Lost(_) => Some(Action::Disconnect { then: None }),
+                    LinkState::Open | LinkState::Lost(_) => Some(Action::Disconnect { then: None }),
                     LinkState::Closed | LinkState::Opening => Some(Action::Tell("No link is open.".into())),
                 };
             }
@@ -345,7 +346,7 @@ impl Entry<'_> {
     fn name(&self) -> String {
         match self {
             Entry::Port(port) => port.link.clone(),
-            Entry::Emulated(product) => emulated_link(product),
+            Entry::Emulated(product) => link_name::emulated(product),
             Entry::Recent(name) => (*name).to_owned(),
             Entry::Other => "another port ...".into(),
             Entry::Recordings => "recordings ...".into(),
@@ -360,14 +361,17 @@ fn row(scene: Scene, entry: &Entry, is_chosen: bool, columns: usize) -> Line<'st
             let busy = if port.busy_by.is_some() { "in use: " } else { "" };
             (visible::text(&port.link), format!("{busy}{}", visible::text(&port.description)), Some(port.link.clone()))
         }
-        Entry::Emulated(product) => (emulated_link(product), product.title.clone(), Some(emulated_link(product))),
+        Entry::Emulated(product) => {
+            let link = link_name::emulated(product);
+            (link.clone(), product.title.clone(), Some(link))
+        }
         Entry::Recent(name) => (visible::text(name), String::new(), Some((*name).to_owned())),
         Entry::Other => (entry.name(), "type its path, or an address in the network".into(), None),
         Entry::Recordings => (entry.name(), "what was connected before, to look at again".into(), None),
     };
     let is_ours = link.is_some() && link == scene.view.link.name;
     let state = match &scene.view.link.state {
-        LinkState::Open { .. } if is_ours => format!("connected, {} baud", scene.view.link.baud),
+        LinkState::Open if is_ours => format!("connected, {} baud", scene.view.link.baud),
         LinkState::Opening if is_ours => "opening".into(),
         LinkState::Lost(_) if is_ours => "lost".into(),
         _ => String::new(),
@@ -378,8 +382,4 @@ fn row(scene: Scene, entry: &Entry, is_chosen: bool, columns: usize) -> Line<'st
     let text = format!(" {mark} {name}  {} {state} ", format::left(&description, room));
     let style = if is_chosen { theme.bar() } else { ratatui::style::Style::new() };
     Line::styled(text, style)
-}
-
-fn emulated_link(product: &Product) -> String {
-    format!("emu:{}", product.name.to_lowercase())
 }

@@ -71,7 +71,7 @@ impl Diagnostics {
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let (theme, view) = (scene.theme, scene.view);
-        let diagnostics = &view.monitor.diagnostics;
+        let diagnostics = &view.unit.monitor.diagnostics;
         let runs = view.job == Some(Job::Diagnostics) || view.facts.diagnostics.is_some();
         let Some(at) = diagnostics.at else {
             let mut rows = vec![lines::rule(theme, area.width, "Diagnostics", "")];
@@ -141,7 +141,7 @@ struct Parts {
 
 impl Parts {
     fn of(scene: Scene, area: Rect) -> Self {
-        let diagnostics = &scene.view.monitor.diagnostics;
+        let diagnostics = &scene.view.unit.monitor.diagnostics;
         let printed: Vec<String> = diagnostics.lines.iter().map(|line| visible::text(line)).collect();
         // Rows broken in the middle of a number are hard to read: the numbers have what the page leaves beside it, or
         // stand below.

@@ -233,7 +233,7 @@ impl Recordings {
     fn detail(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
         let Some(entry) = self.entries().get(self.cursor) else { return Vec::new() };
         let theme = scene.theme;
-        let path = visible::text(path_of(entry));
+        let path = visible::text(&entry.path);
         let room = usize::from(columns).saturating_sub(4);
         let (heading, text) = match &entry.content {
             Ok(_) => (
@@ -260,18 +260,13 @@ impl Recordings {
     }
 }
 
-/// The file of a recording.
-fn path_of(entry: &RecordingEntry) -> &str {
-    entry.link.strip_prefix("replay:").unwrap_or(&entry.link)
-}
-
 /// An entry of the list: a recording, or why the file is none.
 fn row(theme: Theme, entry: &RecordingEntry, is_chosen: bool, columns: usize) -> Line<'static> {
     let mark = if is_chosen { "›" } else { " " };
     let recorded = match &entry.content {
         Ok(recorded) => recorded,
         Err(why) => {
-            let path = visible::text(path_of(entry));
+            let path = visible::text(&entry.path);
             let name = path.rsplit('/').next().unwrap_or_default();
             let text = format!(" {mark} {name}  cannot be read: {}", visible::text(why));
             return Line::styled(format::left(&text, columns), if is_chosen { theme.bar() } else { theme.bad() });

@@ -139,7 +139,7 @@ impl Stream {
 
     /// What a command does here.
     pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
-        let values = &view.monitor.stream;
+        let values = &view.unit.monitor.stream;
         let last = values.channels.len().saturating_sub(1);
         self.channel = self.channel.min(last);
         match cmd {
@@ -212,7 +212,7 @@ impl Stream {
 
     /// The picture.
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
-        let (theme, values) = (scene.theme, &scene.view.monitor.stream);
+        let (theme, values) = (scene.theme, &scene.view.unit.monitor.stream);
         let Some(newest) = values.newest else {
             let mut rows = vec![lines::rule(theme, area.width, "Stream", "")];
             let room = usize::from(area.width).saturating_sub(4);
@@ -278,7 +278,7 @@ impl Stream {
     }
 
     fn curve(&self, scene: Scene, number: usize, window: (Instant, Instant)) -> Option<Curve> {
-        let values = &scene.view.monitor.stream;
+        let values = &scene.view.unit.monitor.stream;
         let channel = values.channels.get(number)?;
         let source = values.source.unwrap_or(Source::FieldValue);
         Some(Curve {
@@ -304,7 +304,7 @@ impl Stream {
 
     /// What its values span, where that is not all that is on the screen, and which time it shows.
     fn remark(&self, scene: Scene, curve: &Curve, number: usize, charts: &[(usize, Rect)]) -> String {
-        let values = &scene.view.monitor.stream;
+        let values = &scene.view.unit.monitor.stream;
         let decimals = super::overview::decimals(scene.view, values.source.unwrap_or(Source::FieldValue));
         let known = curve.samples.iter().filter_map(|&(_, value)| value);
         let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
@@ -328,7 +328,7 @@ impl Stream {
     }
 
     fn table(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
-        let (theme, values) = (scene.theme, &scene.view.monitor.stream);
+        let (theme, values) = (scene.theme, &scene.view.unit.monitor.stream);
         let source = match values.source {
             Some(Source::ProcessValue) => "process value (7130h) in counts",
             Some(Source::FieldValue) | None => "field value (6100h) in °C",
@@ -350,7 +350,7 @@ impl Stream {
     }
 
     fn row(&self, scene: Scene, channel: &Channel, number: usize, columns: u16) -> Line<'static> {
-        let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
+        let (theme, stream) = (scene.theme, &scene.view.unit.monitor.stream);
         let source = stream.source.unwrap_or(Source::FieldValue);
         let decimals = super::overview::decimals(scene.view, source);
         let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));

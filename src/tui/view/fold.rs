@@ -1,13 +1,13 @@
 //! What the session's events make of what the screens may read.
 
 use super::mark::read_mark;
-use super::{DictionaryRead, LinkState, Notice, Tone, View};
+use super::{DictionaryRead, LinkState, Refutation, Tone, View};
 use crate::canopen::{ObjectAddress, Value};
 use crate::dump::Dump;
 use crate::monitor::Mark;
 use crate::record::LINK_LOST;
 use crate::session::{
-    DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitNow, UnitState, Verdict, WalkEnd,
+    Awaited, DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitNow, UnitState, Verdict, WalkEnd,
 };
 use crate::time::Instant;
 use crate::tui::widgets::format;
@@ -15,21 +15,13 @@ use crate::wire::visible;
 
 /// Serial number of the identity object (CiA 301; both manuals, section 3.3).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
-/// What is told of a unit that says nothing, until it says something ...
-const NOBODY: &str = "Nobody has answered: check power, cable and port.";
-/// ... of one that does not say its name, until it does ...
-const NAMELESS: &str = "The unit talks, but does not say what it is: V reads that, a power cycle shows it.";
-/// ... and of one that shows no diagnostics, or no more of them, until it shows them.
-const NO_PAGE: [&str; 2] =
-    ["No answer: no page of diagnostics came.", "No answer: the next page of diagnostics did not come."];
-
 impl View {
     /// Takes in one event; `facts` are the session's at that moment.
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         match event {
             Event::Heard { .. } => {}
             Event::Overheard { at, reading } => self.dictionary_overheard(*at, reading),
-            Event::EntriesRead(count) => self.entries_read = *count,
+            Event::EntriesRead(count) => self.unit.entries_read = *count,
             Event::Row { .. } | Event::Page { .. } if self.returning.is_some() => {
                 if let Some(returning) = &mut self.returning {
                     returning.wait(event.clone());
@@ -37,7 +29,7 @@ impl View {
             }
             Event::Row { .. } | Event::Page { .. } => {
                 let product = self.product();
-                self.monitor.fold(event, product);
+                self.unit.monitor.fold(event, product);
             }
             Event::FactsChanged => self.facts_changed(now, facts),
             Event::Held(true) => self.load.held_since = Some(now),
@@ -47,7 +39,7 @@ impl View {
                 self.load.progress = Some(*progress);
             }
             Event::FileProgress { sent, .. } => {
-                if let Some(sending) = &mut self.sending {
+                if let Some(sending) = &mut self.unit.sending {
                     sending.sent = *sent;
                 }
             }
@@ -61,12 +53,12 @@ impl View {
     /// A remark in a recording: where it is a mark, it is one again. A link that was lost then is lost.
     pub fn remarked(&mut self, at: Instant, text: &str) {
         if text == LINK_LOST {
-            self.is_cut_off = true;
-            self.monitor.stream.interrupt();
+            self.unit.is_cut_off = true;
+            self.unit.monitor.stream.interrupt();
         }
         if let Some((number, before)) = read_mark(text) {
             let at = Instant::ZERO + at.since_start().saturating_sub(before);
-            self.monitor.stream.set_mark(Mark { number, at });
+            self.unit.monitor.stream.set_mark(Mark { number, at });
         }
     }
 
@@ -78,30 +70,31 @@ impl View {
         }
         if facts.state == UnitState::Application && self.facts.state != UnitState::Application {
             // Whatever sub-menu was open, a restart has closed it.
-            self.viewing = false;
+            self.unit.viewing = false;
         }
         let banner = |facts: &Facts| {
             facts.version.as_ref().filter(|known| known.origin == Origin::Banner).map(|known| known.span)
         };
         let has_started = banner(facts).is_some() && banner(facts) != banner(&self.facts);
-        if self.notice.as_ref().is_some_and(|notice| notice.is_refuted(facts)) {
+        let refutation = self.notice.as_ref().and_then(|notice| notice.refuted_by);
+        if refutation.is_some_and(|refutation| refutation.has_come(facts)) {
             self.forget_notice();
         }
         let was_loader = self.facts.state == UnitState::Loader && facts.state != UnitState::Loader;
         if has_started || was_loader {
-            self.monitor.stream.interrupt();
+            self.unit.monitor.stream.interrupt();
         }
         match (self.facts.stream, facts.stream) {
             // Who is away, or starts anew, has not been switched off by that.
             (Some(_), None) => {
                 let is_away = self.returning.is_some() || has_started || facts.state == UnitState::Loader;
-                let is_away = is_away || self.is_cut_off;
-                (self.stream_is_off, self.monitor.stream.late) = (!is_away, false);
+                let is_away = is_away || self.unit.is_cut_off;
+                (self.unit.stream_is_off, self.unit.monitor.stream.late) = (!is_away, false);
             }
             (None, None) => {}
             (None, Some(_)) => {
-                (self.stream_is_off, self.is_cut_off) = (false, false);
-                self.monitor.stream.switched_on(now);
+                (self.unit.stream_is_off, self.unit.is_cut_off) = (false, false);
+                self.unit.monitor.stream.switched_on(now);
             }
             (Some(_), Some(_)) => {}
         }
@@ -110,7 +103,7 @@ impl View {
             self.outdate_dictionary();
         }
         if self.job == Some(Job::StreamOn) && facts.stream.is_some() && self.facts.stream.is_none() {
-            self.monitor.stream.set_period(self.wanted_period);
+            self.unit.monitor.stream.set_period(self.unit.wanted_period);
         }
         let product_before = self.product();
         self.facts = facts.clone();
@@ -118,7 +111,7 @@ impl View {
         // While it is asked who is there, the dictionary is history and stays as it was.
         if product_before != product
             && self.returning.is_none()
-            && let Some(read) = &mut self.dictionary
+            && let Some(read) = &mut self.unit.dictionary
         {
             // What was read gets its names, and something to be compared with.
             read.dump = Dump::of(&read.reading, product, &self.facts);
@@ -134,8 +127,8 @@ impl View {
             }
             Outcome::DictionaryRead(reading) => {
                 // Its view was left again.
-                self.viewing = false;
-                self.monitor.stream.interrupt();
+                self.unit.viewing = false;
+                self.unit.monitor.stream.interrupt();
                 let is_cancelled = reading.end == WalkEnd::Cancelled;
                 // A whole one stays.
                 if !is_cancelled || self.current_dictionary().is_none_or(|read| !read.reading.is_complete()) {
@@ -156,21 +149,26 @@ impl View {
             }
             Outcome::Done(Job::Overhear) => {}
             Outcome::StreamRuns { was_on } => {
-                let period = self.wanted_period.take();
-                self.last_period = period.or(self.last_period);
-                self.monitor.stream.set_period(period);
+                let period = self.unit.wanted_period.take();
+                self.unit.last_period = period.or(self.unit.last_period);
+                self.unit.monitor.stream.set_period(period);
                 let text = match was_on {
                     true => "The stream was on already and now sends what you asked for.",
                     false => done(Job::StreamOn),
                 };
                 self.tell(Tone::Good, text);
             }
-            Outcome::Done(job) => {
-                if matches!(job, Job::StreamOff | Job::RestoreDefaults) {
-                    self.monitor.stream.set_period(None);
-                }
-                self.stream_is_off |= *job == Job::StreamOff;
-                self.tell(Tone::Good, done(*job));
+            Outcome::Done(Job::StreamOff) => {
+                self.unit.monitor.stream.set_period(None);
+                self.unit.stream_is_off = true;
+                self.tell_until(Refutation::Stream, Tone::Good, done(Job::StreamOff));
+            }
+            Outcome::Done(Job::Diagnostics) => {
+                self.tell_until(Refutation::Page, Tone::Good, done(Job::Diagnostics));
+            }
+            Outcome::Done(job) => self.tell(Tone::Good, done(*job)),
+            Outcome::NoAnswer { awaited: awaited @ (Awaited::Page | Awaited::NextPage), .. } => {
+                self.tell_until(Refutation::Page, Tone::Bad, format!("No answer: {awaited}."));
             }
             Outcome::NoAnswer { awaited, .. } => self.tell(Tone::Bad, format!("No answer: {awaited}.")),
             Outcome::Refused { job, reason, .. } => {
@@ -182,7 +180,9 @@ impl View {
             Outcome::Cancelled(job) if matches!(self.link.state, LinkState::Lost(_)) => {
                 self.tell(Tone::Bad, format!("The link was lost, {}.", job.doing()));
             }
-            Outcome::Cancelled(Job::Diagnostics) => self.tell(Tone::Quiet, done(Job::Diagnostics)),
+            Outcome::Cancelled(Job::Diagnostics) => {
+                self.tell_until(Refutation::Page, Tone::Quiet, done(Job::Diagnostics));
+            }
             Outcome::Cancelled(job) => self.tell(Tone::Quiet, format!("Cancelled, {}.", job.doing())),
             Outcome::FileSent { sent, total, end } => self.file_sent(*sent, *total, *end),
             Outcome::Loaded(report) => {
@@ -202,7 +202,7 @@ impl View {
     }
 
     fn file_sent(&mut self, sent: usize, total: usize, end: FileEnd) {
-        let name = self.sending.take().map_or_else(|| "the file".to_owned(), |sending| sending.name);
+        let name = self.unit.sending.take().map_or_else(|| "the file".to_owned(), |sending| sending.name);
         let (sent, total) = (format::grouped(sent), format::counted(total, "byte"));
         match end {
             FileEnd::Whole => self.tell(Tone::Good, format!("Sent: all of {name} has left, {total}.")),
@@ -252,13 +252,13 @@ impl View {
             );
         }
         let serial = reading.entries.iter().find(|read| read.at == SERIAL_NUMBER).and_then(|read| read.value);
-        self.serial = serial.and_then(Value::as_integer).and_then(|number| u32::try_from(number).ok());
-        self.dictionary = Some(DictionaryRead { dump, reading: reading.clone(), at: now, is_outdated: false });
+        self.unit.serial = serial.and_then(Value::as_integer).and_then(|number| u32::try_from(number).ok());
+        self.unit.dictionary = Some(DictionaryRead { dump, reading: reading.clone(), at: now, is_outdated: false });
     }
 
     /// The unit has other values now than those that were read.
     fn outdate_dictionary(&mut self) {
-        if let Some(read) = &mut self.dictionary {
+        if let Some(read) = &mut self.unit.dictionary {
             read.is_outdated = true;
         }
     }
@@ -266,7 +266,10 @@ impl View {
     fn identified(&mut self) {
         let version = self.facts.version.as_ref().map(|known| format!(" {}", known.value)).unwrap_or_default();
         match (self.facts.state, &self.facts.product) {
-            (UnitState::Silent, _) => self.tell(Tone::Bad, NOBODY),
+            (UnitState::Silent, _) => {
+                let text = "Nobody has answered: check power, cable and port.";
+                self.tell_until(Refutation::Answer, Tone::Bad, text);
+            }
             (UnitState::Loader, _) => {
                 let which =
                     self.noted().map_or_else(String::new, |noted| format!(", an {} by our notes,", noted.product));
@@ -276,19 +279,22 @@ impl View {
                 let text = format!("The unit is an {}{version}.", product.value);
                 self.tell(Tone::Good, text);
             }
-            (UnitState::Unknown | UnitState::Application, None) => self.tell(Tone::Quiet, NAMELESS),
+            (UnitState::Unknown | UnitState::Application, None) => {
+                let text = "The unit talks, but does not say what it is: V reads that, a power cycle shows it.";
+                self.tell_until(Refutation::Product, Tone::Quiet, text);
+            }
         }
     }
 }
 
-impl Notice {
-    /// Whether what is known by now says otherwise: whoever reads both would not know what to believe.
-    fn is_refuted(&self, facts: &Facts) -> bool {
-        let is = |text: &str| self.text == text;
-        is(NOBODY) && facts.state != UnitState::Silent
-            || is(NAMELESS) && facts.product.is_some()
-            || (NO_PAGE.into_iter().any(is) || is(done(Job::Diagnostics))) && facts.diagnostics.is_some()
-            || is(done(Job::StreamOff)) && facts.stream.is_some()
+impl Refutation {
+    fn has_come(self, facts: &Facts) -> bool {
+        match self {
+            Refutation::Answer => facts.state != UnitState::Silent,
+            Refutation::Product => facts.product.is_some(),
+            Refutation::Page => facts.diagnostics.is_some(),
+            Refutation::Stream => facts.stream.is_some(),
+        }
     }
 }
 

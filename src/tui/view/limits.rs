@@ -51,7 +51,7 @@ impl View {
     /// The channels whose newest value has reached their shutdown limit, with both; the unit itself waits for its reaction
     /// delay (4030h) before it says so.
     pub fn over_shutdown(&self) -> Vec<(&str, f64, f64)> {
-        let stream = &self.monitor.stream;
+        let stream = &self.unit.monitor.stream;
         // They are temperatures: beside counts they would say nothing.
         let channels = stream.channels.iter().filter(|_| stream.source == Some(Source::FieldValue));
         channels

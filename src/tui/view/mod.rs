@@ -9,7 +9,7 @@ mod old;
 
 pub use mark::marked;
 
-use super::input::{Failure, Noted, Playing};
+use super::input::{Failure, LinkKind, Noted, Playing};
 use super::returning::Returning;
 use super::widgets::format;
 use crate::device::Product;
@@ -32,38 +32,20 @@ const SILENT: Duration = Duration::from_millis(2500);
 pub struct View {
     /// The link.
     pub link: Link,
+    /// What the unit has shown, and what it was told.
+    pub unit: UnitView,
     /// What is known of the unit.
     pub facts: Facts,
     /// The job that runs.
     pub job: Option<Job>,
-    /// What it has shown: stream, faults, diagnostics.
-    pub monitor: Monitor,
     /// The file that rows are written to.
     pub export: Option<Export>,
-    /// The unit's object dictionary, once it has been read.
-    pub dictionary: Option<DictionaryRead>,
-    /// Entries read so far while it is being read.
-    pub entries_read: usize,
     /// After a lost link has come back: the unit of before, until it is known who is there now.
     pub returning: Option<Returning>,
-    /// The serial number of the unit (1018h:4), as its object dictionary had it when that was read last.
-    pub serial: Option<u32>,
     /// The upload.
     pub load: Load,
-    /// The file that is being sent as it is.
-    pub sending: Option<Sending>,
     /// How a recording is played, where the link is one.
     pub playing: Option<Playing>,
-    /// The stream was seen to be switched off. Without that, silence may be a long repetition time.
-    pub stream_is_off: bool,
-    /// In a recording: the link was lost, and no row has come since.
-    is_cut_off: bool,
-    /// The repetition time that the stream was asked for and has not confirmed yet.
-    pub wanted_period: Option<Duration>,
-    /// The repetition time that the stream was last switched on with, also once it is off.
-    pub last_period: Option<Duration>,
-    /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
-    pub viewing: bool,
     /// The key that was typed on the terminal and whose question is still open: the unit takes the next key for an answer.
     pub question: Option<MenuKey>,
     /// When the unit said last which CANopen state it is in: it says so on request, and changes it without a word.
@@ -80,11 +62,38 @@ pub struct View {
     pub now: Instant,
 }
 
-/// The link and how it stands.
+/// What the unit at hand has shown, and what it was told: none of it is true of another one.
+#[derive(Debug, Default)]
+pub struct UnitView {
+    /// Stream, faults, diagnostics.
+    pub monitor: Monitor,
+    /// The unit's object dictionary, once it has been read.
+    pub dictionary: Option<DictionaryRead>,
+    /// Entries read so far while it is being read.
+    pub entries_read: usize,
+    /// The serial number of the unit (1018h:4), as its object dictionary had it when that was read last.
+    pub serial: Option<u32>,
+    /// The file that is being sent as it is.
+    pub sending: Option<Sending>,
+    /// The stream was seen to be switched off. Without that, silence may be a long repetition time.
+    pub stream_is_off: bool,
+    /// In a recording: the link was lost, and no row has come since.
+    is_cut_off: bool,
+    /// The repetition time that the stream was asked for and has not confirmed yet.
+    pub wanted_period: Option<Duration>,
+    /// The repetition time that the stream was last switched on with, also once it is off.
+    pub last_period: Option<Duration>,
+    /// The unit's view sub-menu is open, as far as our keys tell: scanning and CAN are halted.
+    pub viewing: bool,
+}
+
+/// The link and its state.
 #[derive(Debug, Default)]
 pub struct Link {
     /// What opened it, or was to open it.
     pub name: Option<String>,
+    /// What is at its other end.
+    pub kind: LinkKind,
     /// Baud rate.
     pub baud: u32,
     /// Where the recording is written.
@@ -110,10 +119,7 @@ pub enum LinkState {
     /// Being opened.
     Opening,
     /// Open.
-    Open {
-        /// Whether sending is forbidden.
-        read_only: bool,
-    },
+    Open,
     /// It has ended by itself.
     Lost(Failure),
 }
@@ -177,8 +183,23 @@ pub struct Notice {
     pub tone: Tone,
     /// What it says.
     pub text: String,
-    /// Until when no news takes its place: it answers a key, and whoever pressed that has to have read it.
+    /// Until when no news takes its place: it answers a key, and the user has to have read it.
     until: Option<Instant>,
+    /// What makes it untrue.
+    refuted_by: Option<Refutation>,
+}
+
+/// What makes a word untrue: a user who read both would not know which to believe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Refutation {
+    /// The unit says something.
+    Answer,
+    /// The unit says its name.
+    Product,
+    /// A page of diagnostics comes.
+    Page,
+    /// The stream is on.
+    Stream,
 }
 
 /// How much a word matters.
@@ -214,7 +235,7 @@ impl View {
 
     /// When [`View::timeout`] is wanted.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.monitor.stream.late_at().filter(|_| self.facts.stream.is_some())
+        self.unit.monitor.stream.late_at().filter(|_| self.facts.stream.is_some())
     }
 
     /// The time is `now`. Says whether anything has changed.
@@ -224,7 +245,7 @@ impl View {
             self.read_notice();
         }
         let late = self.poll_timeout().is_some_and(|due| due <= now);
-        self.monitor.stream.late |= late;
+        self.unit.monitor.stream.late |= late;
         late || is_read
     }
 
@@ -244,7 +265,7 @@ impl View {
 
     /// Starts minimum, maximum and mean of every channel anew.
     pub fn restart_extremes(&mut self) {
-        self.monitor.stream.restart_extremes();
+        self.unit.monitor.stream.restart_extremes();
     }
 
     /// A new link: what was known of the unit before says nothing about the one at its end.
@@ -258,28 +279,33 @@ impl View {
         if self.returning.is_none() {
             self.returning = Some(Returning::new(self.facts.clone()));
         }
-        self.viewing = false;
-        self.monitor.stream.interrupt();
+        self.unit.viewing = false;
+        self.unit.monitor.stream.interrupt();
     }
 
     /// The unit on the cable is not the one from before, or may not be: nothing of that one is shown as its own.
     pub fn begin_unit(&mut self) {
-        self.monitor = Monitor::default();
-        (self.dictionary, self.entries_read, self.serial) = (None, 0, None);
-        (self.wanted_period, self.last_period) = (None, None);
-        (self.viewing, self.stream_is_off) = (false, false);
+        self.unit = UnitView::default();
         self.load.product_unknown = false;
         self.load.is_of_before = self.load.report.is_some();
     }
 
     /// Whether keys and commands can reach a unit.
     pub fn can_send(&self) -> bool {
-        self.link.state == LinkState::Open { read_only: false }
+        self.link.state == LinkState::Open && self.link.kind != LinkKind::Recording
     }
 
     /// Whether the link is a recording.
     pub fn is_recording(&self) -> bool {
-        self.link.state == LinkState::Open { read_only: true }
+        self.link.state == LinkState::Open && self.link.kind == LinkKind::Recording
+    }
+
+    /// The product of the unit that this program emulates at the other end, if it does.
+    pub fn emulated(&self) -> Option<&'static Product> {
+        match self.link.kind {
+            LinkKind::Emulated(product) => Some(product),
+            LinkKind::Unit | LinkKind::Recording => None,
+        }
     }
 
     /// Whether a job runs that has to be ended before the unit is left alone. Being asked who it is, or listened to,
@@ -309,7 +335,7 @@ impl View {
 
     /// Whether something would stay half done if the link were closed now.
     pub fn is_in_the_middle(&self) -> bool {
-        self.has_job_to_end() || self.viewing || self.question.is_some()
+        self.has_job_to_end() || self.unit.viewing || self.question.is_some()
     }
 
     /// Whether the unit at the line waits in its loader for a file.
@@ -350,10 +376,18 @@ impl View {
 
     /// Says something to the user.
     pub fn tell(&mut self, tone: Tone, text: impl Into<String>) {
-        let text = text.into();
+        self.notify(tone, text.into(), None);
+    }
+
+    /// Says something that is true until this happens.
+    fn tell_until(&mut self, refuted_by: Refutation, tone: Tone, text: impl Into<String>) {
+        self.notify(tone, text.into(), Some(refuted_by));
+    }
+
+    fn notify(&mut self, tone: Tone, text: String, refuted_by: Option<Refutation>) {
         let is_refusal = tone == Tone::Refused;
         let until = is_refusal.then(|| self.now + REFUSAL_STAYS);
-        let notice = Some(Notice { tone, text, until });
+        let notice = Some(Notice { tone, text, until, refuted_by });
         let is_kept = |before: &Notice| before.until.is_some_and(|until| until > self.now);
         match self.notice.as_ref().is_some_and(is_kept) && !is_refusal {
             true => self.next_notice = notice,
@@ -384,7 +418,7 @@ impl View {
 
     /// What was read of the unit's object dictionary, as long as it can be what the unit has.
     pub fn current_dictionary(&self) -> Option<&DictionaryRead> {
-        self.dictionary.as_ref().filter(|read| !read.is_outdated)
+        self.unit.dictionary.as_ref().filter(|read| !read.is_outdated)
     }
 }
 
@@ -419,13 +453,13 @@ mod tests {
         assert!(view.timeout(Instant::from_millis(60_000)));
         assert_eq!(view.poll_timeout(), None, "it cannot get later than late");
         row(&mut view, 61_000, with_first(Reading::Value(20.0)));
-        assert!(!view.monitor.stream.late);
+        assert!(!view.unit.monitor.stream.late);
     }
 
     #[test]
     fn a_state_that_was_heard_ages_until_it_is_heard_again() {
         let mut view = View::default();
-        view.link.state = LinkState::Open { read_only: false };
+        view.link.state = LinkState::Open;
         let said = |start| {
             let known = Known { value: "stopped".into(), origin: Origin::Menu, span: Span { start, end: start + 9 } };
             Facts { nmt_state: Some(known), ..Facts::default() }
@@ -439,7 +473,7 @@ mod tests {
         assert_eq!(view.nmt_heard, Some(Instant::from_millis(20_000)), "the same word anew");
         view.fold(Instant::from_millis(21_000), &Event::FactsChanged, &said(50));
         assert_eq!(view.nmt_heard, Some(Instant::from_millis(20_000)), "something else has changed");
-        view.link.state = LinkState::Open { read_only: true };
+        view.link.kind = LinkKind::Recording;
         assert_eq!(view.ages_at(), None, "a recording does not age");
     }
 }

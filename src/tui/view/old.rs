@@ -61,15 +61,15 @@ impl Old {
 impl View {
     /// Why the values that are shown are those of before, if there are any and they are.
     pub fn why_old(&self) -> Option<Old> {
-        let stream = &self.monitor.stream;
+        let stream = &self.unit.monitor.stream;
         stream.newest?;
         match self.facts.state {
             _ if matches!(self.link.state, LinkState::Lost(_)) => Some(Old::LinkLost),
             UnitState::Loader => Some(Old::InLoader),
             UnitState::Silent => Some(Old::Silent),
             _ if self.job == Some(Job::ReadDictionary) => Some(Old::DictionaryIsRead),
-            _ if self.viewing => Some(Old::Viewing),
-            _ if self.facts.stream.is_none() && self.stream_is_off => Some(Old::StreamOff),
+            _ if self.unit.viewing => Some(Old::Viewing),
+            _ if self.facts.stream.is_none() && self.unit.stream_is_off => Some(Old::StreamOff),
             _ if self.facts.stream.is_none() => Some(Old::NotHeard),
             _ if stream.late => Some(Old::NoRow),
             _ if stream.awaits_first_row() => Some(Old::NoRowYet),

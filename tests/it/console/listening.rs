@@ -115,7 +115,7 @@ fn replayed(record: &[Entry], marks: &[(Instant, &str)], behind: Duration) -> De
     desk.input(Input::LinkOpened(LinkInfo {
         link: "replay:talk.cast".into(),
         baud: BAUD,
-        read_only: true,
+        kind: LinkKind::Recording,
         noted: None,
         recording: None,
         start_of_day: Duration::ZERO,

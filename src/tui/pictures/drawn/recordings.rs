@@ -4,7 +4,7 @@ use ratatui::crossterm::event::KeyCode;
 
 use crate::time::Duration;
 use crate::tui::pictures::stage::*;
-use crate::tui::{Input, LinkInfo, Pace, Playing};
+use crate::tui::{Input, LinkInfo, LinkKind, Pace, Playing};
 
 pictures! {
     recordings_link_lost: |size| {
@@ -37,7 +37,7 @@ pictures! {
         stage.input(Input::LinkOpened(LinkInfo {
             link: "replay:/home/user/20260131T110000Z-ttyUSB0-7.cast".into(),
             baud: 115_200,
-            read_only: true,
+            kind: LinkKind::Recording,
             noted: None,
             recording: None,
             start_of_day: NOON,

@@ -49,7 +49,7 @@ impl Row<'_> {
         match self.read {
             Some(read) if read.deviates => value.push_str("; not as the factory made it"),
             Some(_) => {}
-            None => match &scene.view.dictionary {
+            None => match &scene.view.unit.dictionary {
                 Some(read) if !read.reading.is_complete() => value = "not read: the reading was not completed".into(),
                 Some(_) => value = "not shown by the unit".into(),
                 None if scene.view.can_send() => value = "not read yet: V reads it".into(),

@@ -110,7 +110,7 @@ struct Other {
 
 /// The products of a dump and of the unit, where they are not the same.
 pub fn other_product(dump: &Dump, view: &View) -> Option<(String, String)> {
-    let ours = view.dictionary.as_ref().and_then(|read| read.dump.product.as_deref());
+    let ours = view.unit.dictionary.as_ref().and_then(|read| read.dump.product.as_deref());
     let (theirs, ours) = dump.product.as_deref().zip(ours)?;
     (!theirs.eq_ignore_ascii_case(ours)).then(|| (visible::text(theirs), visible::text(ours)))
 }
@@ -163,7 +163,7 @@ impl Dictionary {
                 (self.only, self.other, self.cursor) = (Only::Everything, None, 0);
                 self.words.clear();
             }
-            Cmd::Compare | Cmd::Export if view.dictionary.is_none() => {
+            Cmd::Compare | Cmd::Export if view.unit.dictionary.is_none() => {
                 let what = match view.can_send() {
                     true => "Nothing has been read yet: V reads the object dictionary.".to_owned(),
                     false => format!("Nothing has been read. {}", without_unit(view)),
@@ -201,11 +201,11 @@ impl Dictionary {
             Some((object, object.entry(at.sub)?))
         };
         let mut rows: BTreeMap<ObjectAddress, Row> = Row::of_manual(product).map(|row| (row.at, row)).collect();
-        let read = view.dictionary.iter().flat_map(|read| &read.dump.entries);
+        let read = view.unit.dictionary.iter().flat_map(|read| &read.dump.entries);
         for (at, entry) in read.filter_map(|entry| Some((entry.at()?, entry))) {
             rows.insert(at, Row { at, known: known(at), read: Some(entry), difference: None });
         }
-        if let (Some(other), Some(read)) = (&self.other, &view.dictionary) {
+        if let (Some(other), Some(read)) = (&self.other, &view.unit.dictionary) {
             // What is measured is another value at every reading.
             for difference in dump::differences(&other.dump, &read.dump).into_iter().filter(|found| found.setting) {
                 let index = u16::from_str_radix(&difference.index, 16).unwrap_or_default();
@@ -266,7 +266,7 @@ impl Dictionary {
         }
         lines::draw(frame, head, heading.into_iter().chain([Line::styled(heads, theme.quiet())]));
         if rows.is_empty() {
-            let text = match (view.product(), &view.dictionary) {
+            let text = match (view.product(), &view.unit.dictionary) {
                 (None, Some(_)) if self.only == Only::Deviations => {
                     "Compared with nothing: the unit has not said what it is, so its factory values are not known. Esc \
                      shows everything again."
@@ -323,11 +323,11 @@ impl Dictionary {
             Only::Differences => Some("only differences".into()),
         };
         let words = (!self.words.is_empty()).then(|| format!("with '{}'", visible::text(&self.words)));
-        let is_outdated = view.dictionary.as_ref().is_some_and(|read| read.is_outdated);
+        let is_outdated = view.unit.dictionary.as_ref().is_some_and(|read| read.is_outdated);
         let (mut compared, mut time) = (None, None);
-        let counted = match &view.dictionary {
+        let counted = match &view.unit.dictionary {
             _ if view.job == Some(Job::ReadDictionary) => {
-                Some(format!("reading: {} so far", format::grouped(view.entries_read)))
+                Some(format!("reading: {} so far", format::grouped(view.unit.entries_read)))
             }
             None if view.can_send() => Some("the manual's; V reads the unit's".to_owned()),
             None => view.product().map(|_| "the manual's".into()),
@@ -368,7 +368,7 @@ fn without_unit(view: &View) -> &'static str {
     match &view.link.state {
         LinkState::Closed | LinkState::Opening => "Not connected: press 1 to choose a port or an emulated unit.",
         LinkState::Lost(_) => "The link is lost: C connects again.",
-        LinkState::Open { .. } => "Nobody has read it in this recording up to here.",
+        LinkState::Open => "Nobody has read it in this recording up to here.",
     }
 }
 

@@ -158,7 +158,7 @@ impl Row<'_> {
     pub(super) fn line(&self, scene: Scene, is_chosen: bool, widths: &Widths) -> Line<'static> {
         let theme = scene.theme;
         let deviates = self.read.is_some_and(|read| read.deviates);
-        let was_read = scene.view.dictionary.is_some();
+        let was_read = scene.view.unit.dictionary.is_some();
         let mark = match (self.read, &self.difference) {
             (_, Some(_)) => "≠",
             (Some(_), None) if deviates => "*",

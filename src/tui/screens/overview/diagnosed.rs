@@ -13,7 +13,7 @@ const DIAGNOSED_COLUMNS: usize = 2 + 6 + 12;
 
 /// The channels' temperatures on the newest page of diagnostics: without a stream they are all there is to know.
 pub(super) fn values(scene: Scene, columns: u16) -> Vec<Line<'static>> {
-    let Some(at) = scene.view.monitor.diagnostics.at else { return Vec::new() };
+    let Some(at) = scene.view.unit.monitor.diagnostics.at else { return Vec::new() };
     let cell = |name: &String| Some(format!("  {name:<6}{:>12}", value(scene, name)?));
     let cells: Vec<String> = channels(scene).iter().filter_map(cell).collect();
     let time = format::time_of_day(scene.start_of_day, at);
@@ -27,12 +27,12 @@ pub(super) fn values(scene: Scene, columns: u16) -> Vec<Line<'static>> {
 /// What the unit's diagnostics say beside the channels: supply, cold junction, active errors.
 pub(super) fn beside_channels(scene: Scene, columns: u16) -> Option<Line<'static>> {
     let view = scene.view;
-    let at = view.monitor.diagnostics.at?;
+    let at = view.unit.monitor.diagnostics.at?;
     let of_channel =
-        |label: &str| view.monitor.stream.channels.iter().any(|channel| label.starts_with(channel.name.as_str()));
+        |label: &str| view.unit.monitor.stream.channels.iter().any(|channel| label.starts_with(channel.name.as_str()));
     let known = channels(scene);
     let said =
-        view.monitor.diagnostics.found.iter().filter(|found| {
+        view.unit.monitor.diagnostics.found.iter().filter(|found| {
             !of_channel(&found.label) && !known.iter().any(|name| found.label.starts_with(name.as_str()))
         });
     let said = said.filter_map(|found| {
@@ -61,6 +61,7 @@ fn channels(scene: Scene) -> &'static [String] {
 /// A channel's temperature on the newest page of diagnostics.
 fn value(scene: Scene, name: &str) -> Option<String> {
     let is_celsius = |found: &&Tracked| found.unit.as_deref().is_some_and(|unit| matches!(unit, "C" | "°C" | "degC"));
-    let found = scene.view.monitor.diagnostics.found.iter().filter(is_celsius).find(|found| found.label == name)?;
+    let found =
+        scene.view.unit.monitor.diagnostics.found.iter().filter(is_celsius).find(|found| found.label == name)?;
     Some(format!("{} °C", found.text(found.value?)))
 }

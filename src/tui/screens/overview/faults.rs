@@ -18,7 +18,7 @@ const KIND_COLUMNS: usize = 15;
 impl Overview {
     pub(super) fn faults(&self, scene: Scene, area: Rect) -> Vec<Line<'static>> {
         let theme = scene.theme;
-        let faults = &scene.view.monitor.faults;
+        let faults = &scene.view.unit.monitor.faults;
         let rows = fault_rows(scene);
         let room = usize::from(area.height.saturating_sub(1));
         let first = self.scrolled.min(rows.len().saturating_sub(room));
@@ -36,7 +36,7 @@ impl Overview {
         remark.extend((below > 0).then(|| format!("↓ {below} more, PgDn")));
         let mut shown = vec![lines::rule(theme, area.width, "Faults", &remark.join(", "))];
         if rows.is_empty() {
-            let word = if scene.view.monitor.stream.rows > 0 {
+            let word = if scene.view.unit.monitor.stream.rows > 0 {
                 "None seen."
             } else {
                 "None known: open and short circuits show in the stream."
@@ -50,7 +50,7 @@ impl Overview {
 
 /// All faults, one in a row.
 pub(super) fn fault_rows(scene: Scene) -> Vec<Line<'static>> {
-    let faults = &scene.view.monitor.faults;
+    let faults = &scene.view.unit.monitor.faults;
     // Lasting faults first: they are the ones to work on.
     let mut rows: Vec<Line> = faults.lasting().map(|fault| fault_row(scene, fault)).collect();
     rows.extend(over_shutdown(scene));
@@ -96,7 +96,7 @@ fn listed(scene: Scene) -> Vec<Line<'static>> {
 
 /// What to look at. Where no channel that is on has a reading, what they share is as likely as their sensors.
 fn to_check(scene: Scene, kind: Reading) -> &'static str {
-    let channels = &scene.view.monitor.stream.channels;
+    let channels = &scene.view.unit.monitor.stream.channels;
     let mut on =
         channels.iter().map(|channel| channel.reading).filter(|reading| *reading != Reading::Disabled).peekable();
     let is_of_all = kind == Reading::Error && on.peek().is_some() && on.all(|reading| reading == Reading::Error);

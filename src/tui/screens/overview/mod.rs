@@ -110,7 +110,7 @@ impl Overview {
         lines::draw(frame, upper, parts.unit);
         let (middle, rest) = lines::split(rest, parts.values.len() as u16);
         lines::draw(frame, middle, parts.values);
-        let stream = &scene.view.monitor.stream;
+        let stream = &scene.view.unit.monitor.stream;
         if let Some(channel) = stream.channels.get(self.chosen(stream)).filter(|_| parts.chart_rows > 0) {
             draw_chart(scene, channel, lines::split(rest, parts.chart_rows).0, frame);
         }
@@ -135,7 +135,7 @@ impl Overview {
             unit.pop();
         }
         let (_, rest) = lines::split(area, (unit.len() + values.len()) as u16);
-        let has_chart = area.height >= CHART_ROWS && !scene.view.monitor.stream.channels.is_empty();
+        let has_chart = area.height >= CHART_ROWS && !scene.view.unit.monitor.stream.channels.is_empty();
         let chart_rows = if has_chart { rest.height * 3 / 5 } else { 0 };
         Parts { unit, values, chart_rows, faults: lines::split(rest, chart_rows).1 }
     }
@@ -158,13 +158,13 @@ pub fn has_faults(scene: Scene) -> bool {
 
 /// Whether the values are those of now, so that nothing has to be said about them.
 fn is_current(scene: Scene) -> bool {
-    scene.view.monitor.stream.source.is_some() && scene.view.why_old().is_none()
+    scene.view.unit.monitor.stream.source.is_some() && scene.view.why_old().is_none()
 }
 
 /// Digits behind the point, as the product prints them.
 pub fn decimals(view: &View, source: Source) -> usize {
     // A row that has been understood is one of a product that we know, if the unit has named itself or not.
-    let channels = &view.monitor.stream.channels;
+    let channels = &view.unit.monitor.stream.channels;
     let has_these =
         |product: &&Product| product.stream.channels.iter().eq(channels.iter().map(|channel| &channel.name));
     view.product().or_else(|| Product::all().iter().find(has_these)).map_or_else(
@@ -191,7 +191,7 @@ pub fn without_values(scene: Scene) -> Vec<&'static str> {
             "Something talks, but nothing that is known. Press 3 to see what it says.",
             "Signs like ‹9b› mean another baud rate: the units have 115200, 8 data bits, no parity.",
         ],
-        (UnitState::Application, None) if !scene.view.stream_is_off => {
+        (UnitState::Application, None) if !scene.view.unit.stream_is_off => {
             vec!["The unit has sent no values so far.", "Press T to switch its stream on."]
         }
         (UnitState::Application, None) => {
@@ -207,7 +207,7 @@ pub fn without_values(scene: Scene) -> Vec<&'static str> {
 
 fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
     let (heading, canvas) = lines::split(area, 1);
-    let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
+    let (theme, stream) = (scene.theme, &scene.view.unit.monitor.stream);
     lines::draw(frame, heading, [lines::rule(theme, area.width, &format!("Trend of {}", channel.name), "")]);
     let source = stream.source.unwrap_or(Source::FieldValue);
     let samples: Vec<_> = channel.newest(usize::MAX).collect();

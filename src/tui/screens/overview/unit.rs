@@ -12,9 +12,9 @@ use crate::wire::stream::Source;
 pub(super) fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     let (theme, facts) = (scene.theme, &scene.view.facts);
     let title = scene.view.product().map(|product| product.title.clone()).unwrap_or_default();
-    let stream = match (facts.stream, scene.view.monitor.stream.period()) {
+    let stream = match (facts.stream, scene.view.unit.monitor.stream.period()) {
         (None, _) if facts.state == UnitState::Loader => "none, in the loader".to_owned(),
-        (None, _) if scene.view.stream_is_off => "off".to_owned(),
+        (None, _) if scene.view.unit.stream_is_off => "off".to_owned(),
         (None, _) => "no row so far".to_owned(),
         (Some(source), period) => {
             let source = match source {
@@ -27,12 +27,12 @@ pub(super) fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
     };
     let state = match facts.state {
         UnitState::Silent if scene.view.link.name.is_none() => Span::styled("not connected", theme.quiet()),
-        UnitState::Silent if scene.record.entry_count() > 0 && scene.view.monitor.stream.rows > 0 => {
+        UnitState::Silent if scene.record.entry_count() > 0 && scene.view.unit.monitor.stream.rows > 0 => {
             Span::styled("silent now", theme.warning())
         }
         UnitState::Silent => Span::styled("silent: nothing heard yet", theme.warning()),
         UnitState::Unknown => Span::styled("talks, in words not known", theme.warning()),
-        UnitState::Application if scene.view.viewing => Span::styled("view open, halted", theme.warning()),
+        UnitState::Application if scene.view.unit.viewing => Span::styled("view open, halted", theme.warning()),
         UnitState::Application => Span::styled("application runs", theme.good()),
         UnitState::Loader if scene.view.load.is_silent => Span::styled("silent: loader or no power", theme.warning()),
         UnitState::Loader => Span::styled("waits in its loader", theme.warning()),

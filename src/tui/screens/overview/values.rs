@@ -26,7 +26,7 @@ impl Overview {
     /// The values with their heading, and what has to be said of them below.
     pub(super) fn values(&self, scene: Scene, area: Rect) -> Vec<Line<'static>> {
         let columns = area.width;
-        let (theme, stream) = (scene.theme, &scene.view.monitor.stream);
+        let (theme, stream) = (scene.theme, &scene.view.unit.monitor.stream);
         let newest = stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
         let Some(source) = stream.source else {
             let mut shown = vec![lines::rule(theme, columns, "Values", "")];
@@ -111,7 +111,7 @@ fn value_row(
         false => String::new(),
     };
     let span = LEAST_SPAN[usize::from(source == Source::ProcessValue)];
-    let lasting = scene.view.monitor.faults.lasting().find(|fault| fault.channel == channel.name);
+    let lasting = scene.view.unit.monitor.faults.lasting().find(|fault| fault.channel == channel.name);
     // Since when is wanted before what was before; the list below may have no room for it.
     let since = lasting.map(|fault| format!("since {}", format::time_of_day(scene.start_of_day, fault.since)));
     let taken = since.as_ref().map_or(0, |since| since.len() + 2);
@@ -149,7 +149,7 @@ fn limits_line(scene: Scene, source: Source, channel: &str, has_columns: bool) -
     let reads = |how: &str| if view.can_send() { format!("{how}V reads them") } else { String::new() };
     let text = match (view.current_dictionary(), view.limits(channel)) {
         _ if source != Source::FieldValue => return Line::default(),
-        (None, _) if view.dictionary.is_some() => {
+        (None, _) if view.unit.dictionary.is_some() => {
             format!("  Limits: those read are from before the restart{}.", reads(", "))
         }
         (None, _) => format!("  Limits: not read so far{}.", reads(", ")),

@@ -246,7 +246,7 @@ impl Terminal {
     pub fn draw(&self, scene: Scene, area: Rect, frame: &mut Frame) {
         let (heading, _) = lines::split(area, 1);
         let (body, below) = body(scene.view, area);
-        if let Some(sending) = &scene.view.sending {
+        if let Some(sending) = &scene.view.unit.sending {
             lines::draw(frame, below, sending_rows(scene, sending, below.width));
         }
         let (name, following) = match self.mode {
@@ -302,7 +302,7 @@ impl Terminal {
 /// Where the lines or bytes stand, and below them what is being sent.
 fn body(view: &View, area: Rect) -> (Rect, Rect) {
     let (_, body) = lines::split(area, 1);
-    let below = if view.sending.is_some() { SENDING_ROWS } else { 0 };
+    let below = if view.unit.sending.is_some() { SENDING_ROWS } else { 0 };
     lines::split(body, body.height.saturating_sub(below))
 }
 
