@@ -26,6 +26,7 @@ pub mod unit;
 mod duplex;
 mod lines;
 mod outlet;
+mod recording_file;
 #[cfg(unix)]
 mod serial;
 pub mod socket;
