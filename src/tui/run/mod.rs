@@ -271,7 +271,7 @@ impl Console {
                     self.lose_link(failure)
                 }
                 // Who stopped us, and whatever was drawn meanwhile: it is our terminal again.
-                host::Input::Signal(number) if signal::continues(number) => {
+                host::Input::Signal(number) if signal::continues(&number) => {
                     match screen.retake().and_then(|()| self.draw_anew(screen)) {
                         Ok(()) => false,
                         Err(error) => self.end(Err(error)),
