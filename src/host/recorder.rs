@@ -339,7 +339,8 @@ pub(super) mod tests {
     fn a_recording_that_is_being_written_does_not_make_room() {
         let folder = tempfile::tempdir().expect("a folder");
         let limits = Limits { bytes: 10_000, files: 1, part_bytes: 500 };
-        let open = |stem: &str| series(folder.path().to_owned(), stem, header(), Instant::ZERO, limits).expect("opened");
+        let open =
+            |stem: &str| series(folder.path().to_owned(), stem, header(), Instant::ZERO, limits).expect("opened");
         let older = open("20260131T120000Z-u0-7");
         let newer = open("20260131T120001Z-u0-8");
         assert_eq!(names(folder.path()).len(), 2);
