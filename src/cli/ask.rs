@@ -13,6 +13,9 @@ pub fn somebody() -> bool {
     io::stdin().is_terminal() && io::stderr().is_terminal()
 }
 
+/// What reading the object dictionary may do to the unit.
+pub const READS_DICTIONARY: &str = "While the object dictionary is read, the unit may halt scanning and CAN";
+
 /// Asks before something is destroyed or halted, unless `--yes` has answered. `deed` says what is going to happen, as a
 /// sentence without its end.
 ///

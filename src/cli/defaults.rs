@@ -60,9 +60,9 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
     let unit = product.unwrap_or("the unit");
     let version = version.map(|version| format!(" V{version}")).unwrap_or_default();
     output.remark(&match restart_seen {
-        true => format!("axcon: the defaults are restored; {unit}{version} has started anew"),
+        true => format!("axcon: the defaults are restored; {unit}{version} has restarted"),
         false => format!(
-            "axcon: {unit}{version} has taken the Yes and shows its menu; whether it has started anew is not to be seen\n  \
+            "axcon: {unit}{version} has taken the Yes and shows its menu; whether it has restarted cannot be seen\n  \
              'axcon dictionary dump' shows its parameters"
         ),
     });

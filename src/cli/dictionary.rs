@@ -6,7 +6,7 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::Global;
-use super::ask::confirm;
+use super::ask::{READS_DICTIONARY, confirm};
 use super::error::{CliError, Kind};
 use super::files::Destination;
 use super::identify::PRE_OPERATIONAL;
@@ -126,7 +126,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 
 fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Output) -> Result<(), CliError> {
     if !link::is_recording(global) {
-        confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
+        confirm(READS_DICTIONARY, global, output)?;
     }
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
@@ -212,7 +212,7 @@ fn not_all(reading: &DictionaryReading, dump: &Dump, is_recorded: bool) -> CliEr
             visible::line(first.as_bytes()),
         ),
         WalkEnd::Restarted => {
-            format!("the unit started anew in the middle of its object dictionary; entries read: {entries}")
+            format!("the unit restarted in the middle of its object dictionary; entries read: {entries}")
         }
         WalkEnd::Whole | WalkEnd::Stopped | WalkEnd::Cancelled if is_recorded => {
             format!("the recording does not show the end of the object dictionary; entries read: {entries}")

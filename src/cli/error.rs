@@ -19,13 +19,13 @@ pub enum Kind {
     PortNone,
     /// There are several and none was named.
     PortAmbiguous,
-    /// The named port does not exist.
+    /// The named port does not exist, or is not a serial port.
     PortMissing,
     /// The system denies access.
     PortDenied,
     /// Another program has the port.
     PortBusy,
-    /// The port went away, or is not one.
+    /// The port went away.
     PortGone,
     /// The port does not do the line rate that was asked for.
     PortRate,

@@ -11,7 +11,7 @@ use crate::host::save::{self, SaveError};
 /// Reads a text of no more bytes than that: whatever a name leads to need not have an end.
 ///
 /// # Errors
-/// If it cannot be read, has more bytes, or is no text.
+/// If it cannot be read, has more bytes, or is not text.
 pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
     let mut bytes = Vec::new();
     File::open(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
@@ -20,7 +20,7 @@ pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
     }
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        io::Error::new(ErrorKind::InvalidData, format!("it is no text: byte {at} is no UTF-8"))
+        io::Error::new(ErrorKind::InvalidData, format!("it is not text: byte {at} is not UTF-8"))
     })
 }
 
@@ -206,7 +206,7 @@ mod tests {
         let full = vec![b'x'; 1 << 20];
         assert_eq!(read(&full).map(|text| text.len()), Ok(1 << 20));
         assert_eq!(read(&[&full[..], b"x"].concat()), Err("it is larger than 1 MiB".into()));
-        assert_eq!(read(b"ab\xff"), Err("it is no text: byte 2 is no UTF-8".into()));
+        assert_eq!(read(b"ab\xff"), Err("it is not text: byte 2 is not UTF-8".into()));
         assert!(read_text(folder.path(), 1).is_err(), "a folder");
     }
 

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use super::Global;
-use super::ask::confirm;
+use super::ask::{READS_DICTIONARY, confirm};
 use super::error::{CliError, Kind};
 use super::journal::Desk;
 use super::link;
@@ -79,7 +79,7 @@ struct Sources {
 /// If the link does not open, or nothing we know answers.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     if args.deep && !link::is_recording(global) {
-        confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
+        confirm(READS_DICTIONARY, global, output)?;
     }
     let mut talk = Talk::open(global, output)?;
     if talk.is_recorded() {

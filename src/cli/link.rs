@@ -136,9 +136,7 @@ pub fn recording(global: &Global) -> Result<Plan, CliError> {
 pub fn not_recorded_again(global: &Global) -> Result<(), CliError> {
     match &global.record {
         None => Ok(()),
-        Some(_) => {
-            Err(CliError::message(Kind::Usage, "a recording is not recorded again: --record has no meaning there"))
-        }
+        Some(_) => Err(CliError::message(Kind::Usage, "a recording is not recorded again, so --record does not apply")),
     }
 }
 
@@ -169,10 +167,10 @@ pub fn start_recording(
 /// What a failed link means to the user, and what helps.
 pub fn link_error(error: LinkError) -> CliError {
     let kind = match &error.cause {
-        Cause::Missing => Kind::PortMissing,
+        Cause::Missing | Cause::NotSerial { .. } => Kind::PortMissing,
         Cause::Denied { .. } => Kind::PortDenied,
         Cause::Busy { .. } => Kind::PortBusy,
-        Cause::NotSerial { .. } | Cause::Gone | Cause::Stuck { .. } | Cause::Io(_) => Kind::PortGone,
+        Cause::Gone | Cause::Stuck { .. } | Cause::Io(_) => Kind::PortGone,
         Cause::Network(error) => network_kind(error),
         // Not the command line: another port does the same rate, and nobody may have asked for it.
         Cause::Baud { .. } => Kind::PortRate,
@@ -208,7 +206,7 @@ pub fn link_error(error: LinkError) -> CliError {
             hints.push("plug the adapter in again; its name may be another one then: 'axcon ports'".to_owned())
         }
         Cause::Stuck { .. } => hints.push("unplug the adapter and plug it in again".to_owned()),
-        Cause::Baud { .. } => hints.push("the units have 115200: leave --baud away, or use another adapter".to_owned()),
+        Cause::Baud { .. } => hints.push("the units have 115200: leave out --baud, or use another adapter".to_owned()),
         Cause::Io(_) => {}
     }
     let mut refused = CliError::new(kind, error);
@@ -262,7 +260,7 @@ pub fn pump_error(error: PumpError) -> CliError {
         PumpError::Link(error) => link_error(error),
         PumpError::Send { .. } => CliError::new(Kind::PortGone, error),
         PumpError::Deadline => CliError::new(Kind::NoAnswer, error),
-        PumpError::Interrupted(_) => CliError::new(Kind::Interrupted, error),
+        PumpError::Interrupted => CliError::new(Kind::Interrupted, error),
         PumpError::Over => CliError::new(Kind::NoAnswer, error),
         PumpError::Recording(error) => recording_error(error),
     }
@@ -441,7 +439,7 @@ mod tests {
             (Cause::Denied { group: Some("dialout".into()) }, Kind::PortDenied, "-aG dialout"),
             (Cause::Busy { holder: Some(holder) }, Kind::PortBusy, "close picocom (process 7)"),
             (Cause::Busy { holder: None }, Kind::PortBusy, "fuser"),
-            (Cause::NotSerial { what: "a directory" }, Kind::PortGone, "axcon ports"),
+            (Cause::NotSerial { what: "a directory" }, Kind::PortMissing, "axcon ports"),
             (Cause::Gone, Kind::PortGone, "plug the adapter in again"),
             (Cause::Baud { asked: 3_000_000, set: 9_600 }, Kind::PortRate, "115200"),
         ] {

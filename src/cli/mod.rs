@@ -64,7 +64,7 @@ const EXIT_CODES: &str = "Exit codes:
   1    failed otherwise
   2    the command line makes no sense, or it destroys something and nobody said --yes
   3    the port: none, several, missing, denied, busy, gone, or not at this line rate
-  4    no answer in time
+  4    no answer in time, or a question that is not understood
   5    the image is refused: it has defects, cannot be read, or is not for this unit
   6    the unit refused, a wrong password above all
   7    the upload failed and the unit waits in its loader: send again
@@ -74,7 +74,7 @@ const EXIT_CODES: &str = "Exit codes:
 `stream` and `diagnostics` that were not told when to end (--count, --duration) are ended by an interrupt as is usual: 0
 once something has come.
 If `load` to several ports fails: the code that all failures share, else 1.
-A reader that closes our output is no failure; nor is an output that was closed before we began (>&-), which the system's
+A reader that closes our output is not a failure; nor is an output that was closed before we began (>&-), which the system's
 runtime replaces with /dev/null and nobody can see.";
 
 /// What every command understands.
@@ -238,7 +238,7 @@ fn all_ports(global: &Global, args: &[OsString]) -> Result<(), CliError> {
         .hint("name all links behind the command"))
 }
 
-/// Makes sure that no option for the link to a unit is given to a command that looks at none; a default in the environment
+/// Makes sure that no option for the link to a unit is given to a command that uses none; a default in the environment
 /// is given to all.
 fn all_of_use(cli: &Cli, matches: &ArgMatches) -> Result<(), CliError> {
     let Some((name, given)) = matches.subcommand() else { return Ok(()) };
@@ -249,7 +249,7 @@ fn all_of_use(cli: &Cli, matches: &ArgMatches) -> Result<(), CliError> {
     let is_given = |(id, _): &(&str, &str)| given.value_source(id) == Some(ValueSource::CommandLine);
     let Some((_, option)) = of_a_link.into_iter().find(is_given) else { return Ok(()) };
     let deed = given.subcommand_name().map(|deed| format!(" {deed}")).unwrap_or_default();
-    let message = format!("'axcon {name}{deed}' looks at no unit: {option} has no meaning there");
+    let message = format!("'axcon {name}{deed}' does not use a unit, so {option} does not apply");
     Err(CliError::message(error::Kind::Usage, message))
 }
 

@@ -19,7 +19,7 @@ pub struct Output {
     pub err: Remarks,
 }
 
-/// Where remarks go; whoever has something to say at once, in the middle of something else, has a copy.
+/// Where remarks go. Code that has something to say at once, in the middle of something else, has a copy.
 #[derive(Clone)]
 pub struct Remarks(Arc<Mutex<Box<dyn Write + Send>>>);
 
@@ -45,7 +45,7 @@ impl Write for Remarks {
     }
 }
 
-/// Whoever reads our output has enough. Not an error: the command ends with success.
+/// The reader of our output has enough. Not an error: the command ends with success.
 #[derive(Debug, thiserror::Error)]
 #[error("the reader of standard output has gone")]
 pub struct Closed;
@@ -65,7 +65,7 @@ impl Output {
             Some(named) if self.json && named != json => {
                 let name = named.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
                 let message = format!("--json and --format {name} contradict each other");
-                Err(CliError::message(Kind::Usage, message).hint("leave one of them away"))
+                Err(CliError::message(Kind::Usage, message).hint("leave out one of them"))
             }
             Some(named) => Ok(named),
             None if self.json => Ok(json),

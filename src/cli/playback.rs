@@ -42,7 +42,7 @@ impl Playback {
     ) -> Result<T, PumpError> {
         loop {
             match self.inputs.try_recv() {
-                Ok(Input::Signal(signal)) => return Err(PumpError::Interrupted(signal)),
+                Ok(Input::Signal(_)) => return Err(PumpError::Interrupted),
                 Ok(_) | Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
             }
             if let ControlFlow::Break(result) = look(session, self.now) {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use jiff::tz::TimeZone;
 use serde::Serialize;
 
-use super::ask::confirm;
+use super::ask::{READS_DICTIONARY, confirm};
 use super::error::{CliError, Kind};
 use super::files::Destination;
 use super::output::{Closed, Output};
@@ -87,7 +87,7 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
     let is_recording = link::is_recording(global);
     let mut out = Destination::admit(Some(&args.out), global.yes)?;
     if !is_recording && !args.no_dictionary {
-        confirm("While the object dictionary is read, the unit may halt scanning and CAN", global, output)?;
+        confirm(READS_DICTIONARY, global, output)?;
     }
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;

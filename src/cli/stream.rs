@@ -37,10 +37,10 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// End after N rows. Exit code 130 if an interrupt comes first, as with --duration; without both it is the normal end.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
     /// End S seconds after the first row.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// Leave the stream on.
     #[arg(long)]
@@ -563,10 +563,15 @@ fn json_value(channel: &str, source: Source, reading: Reading) -> ValueObject<'_
 }
 
 fn seconds(seconds: f64) -> Result<Duration, CliError> {
-    Duration::try_from_secs_f64(seconds).ok().filter(|duration| !duration.is_zero()).ok_or_else(|| {
-        CliError::message(Kind::Usage, format!("--duration {seconds} is not a length of time in seconds"))
+    let duration = Duration::try_from_secs_f64(seconds).ok();
+    duration.filter(|duration| !duration.is_zero() && *duration <= LONGEST).ok_or_else(|| {
+        let message = format!("--duration {seconds:?} is not between a nanosecond and a year, in seconds");
+        CliError::message(Kind::Usage, message)
     })
 }
+
+/// A stream for longer than this is one without --duration.
+const LONGEST: Duration = Duration::from_secs(366 * 24 * 3600);
 
 #[cfg(test)]
 mod tests {

@@ -140,14 +140,14 @@ impl Talk {
             });
             match step {
                 Ok(outcome) => return failed.map_or(Ok(Ended::Finished { outcome, interrupted }), Err),
-                Err(PumpError::Interrupted(_)) if !interrupted => {
+                Err(PumpError::Interrupted) if !interrupted => {
                     interrupted = true;
                     let now = self.now();
                     deadline = now + WINDING_UP;
                     // Never refused: it needs no job.
                     let _ = self.session.command(now, Command::Cancel);
                 }
-                Err(PumpError::Interrupted(_) | PumpError::Deadline) => return Err(abandoned()),
+                Err(PumpError::Interrupted | PumpError::Deadline) => return Err(abandoned()),
                 Err(error @ (PumpError::Link(_) | PumpError::Send { .. })) => {
                     let now = self.now();
                     self.session.link_lost(now);
@@ -213,7 +213,7 @@ impl Talk {
                 }
                 Ok(true)
             }
-            Err(PumpError::Interrupted(_)) => Ok(false),
+            Err(PumpError::Interrupted) => Ok(false),
             Err(error) => Err(link::pump_error(error)),
         }
     }
@@ -251,7 +251,7 @@ impl Talk {
             answer.try_recv().map_or(ControlFlow::Continue(()), ControlFlow::Break)
         });
         step.map_err(|error| match error {
-            PumpError::Interrupted(_) => CliError::interrupted(),
+            PumpError::Interrupted => CliError::interrupted(),
             error => link::pump_error(error),
         })
     }
@@ -425,7 +425,8 @@ impl Talk {
             }
             Outcome::NoAnswer { awaited, heard, .. } => (unanswered(*awaited), heard),
         };
-        let said = heard.map(|span| self.quoted(span)).filter(|said| !said.is_empty());
+        let message = error.to_string();
+        let said = heard.map(|span| self.quoted(span)).filter(|said| !said.is_empty() && !message.contains(said));
         Err(match said {
             Some(said) => {
                 CliError { hints: [vec![format!("the unit said: \"{said}\"")], error.hints].concat(), ..error }

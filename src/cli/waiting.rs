@@ -63,7 +63,7 @@ mod tests {
         let done = begin(sender.clone(), || "yes").map_err(|error| error.to_string()).expect("a thread");
         assert_eq!(end(&inputs, &done).ok(), Some("yes"));
         let (never, undone) = sync_channel::<&str>(1);
-        sender.send(Input::Wake).and_then(|()| sender.send(Input::Signal(15))).expect("there is room");
+        sender.send(Input::Wake).and_then(|()| sender.send(Input::Signal(15.into()))).expect("there is room");
         let error = end(&inputs, &undone).expect_err("a signal");
         assert_eq!(error.kind, Kind::Interrupted);
         drop(never);

@@ -1,4 +1,4 @@
-//! A host and a port number, as they stand behind the scheme of a network link.
+//! A host and a port number, as they follow the scheme of a network link.
 
 use std::fmt;
 use std::net::Ipv6Addr;
@@ -17,38 +17,38 @@ pub enum AddressError {
     /// Nothing before the colon, or nothing at all.
     #[error("no host is named")]
     NoHost,
-    /// No colon, or nothing behind it.
-    #[error("'{host}' has no port number behind it")]
+    /// No colon, or nothing after it.
+    #[error("'{host}' has no port number after it")]
     NoPort {
         /// The host.
         host: String,
     },
-    /// Something else than a number from 1 to 65535.
-    #[error("'{port}' is no port number (1 to 65535)")]
+    /// Anything but a number from 1 to 65535.
+    #[error("'{port}' is not a port number (1 to 65535)")]
     BadPort {
-        /// What stood there.
+        /// What was there.
         port: String,
     },
     /// A character that no name has.
-    #[error("'{host}' is no host name")]
+    #[error("'{host}' is not a host name")]
     BadHost {
-        /// What stood there.
+        /// What was there.
         host: String,
     },
     /// A user's name and password before the host.
-    #[error("a user name ('{user}') and a password have no meaning here: write HOST:PORT")]
+    #[error("a user name ('{user}') and a password do not apply here: write HOST:PORT")]
     User {
         /// The name, not the password.
         user: String,
     },
     /// An IPv6 address whose last group could be a port.
-    #[error("the IPv6 address in '{text}' has to stand in brackets, e.g. [::1]:2000")]
+    #[error("the IPv6 address in '{text}' has to be in brackets, e.g. [::1]:2000")]
     Bare {
         /// What was written.
         text: String,
     },
-    /// Something in brackets that is no IPv6 address, or no closing one.
-    #[error("'{text}' is no IPv6 address in brackets, e.g. [::1]:2000")]
+    /// Something in brackets that is not an IPv6 address, or no closing one.
+    #[error("'{text}' is not an IPv6 address in brackets, e.g. [::1]:2000")]
     BadBrackets {
         /// What was written.
         text: String,
@@ -146,21 +146,21 @@ mod tests {
         for (text, complaint) in [
             ("", "no host is named"),
             (":2000", "no host is named"),
-            ("bench", "'bench' has no port number behind it"),
-            ("bench:", "'bench' has no port number behind it"),
-            ("[::1]", "'::1' has no port number behind it"),
-            ("bench:0", "'0' is no port number (1 to 65535)"),
-            ("bench:65536", "'65536' is no port number (1 to 65535)"),
-            ("bench:+20", "'+20' is no port number (1 to 65535)"),
-            ("bench:2000/", "'2000/' is no port number (1 to 65535)"),
-            ("bench:telnet", "'telnet' is no port number (1 to 65535)"),
-            ("me@bench:2000", "'me@bench' is no host name"),
-            ("u:secret@bench:2", "a user name ('u') and a password have no meaning here: write HOST:PORT"),
-            ("a bench:2000", "'a bench' is no host name"),
-            ("::1:2000", "the IPv6 address in '::1:2000' has to stand in brackets, e.g. [::1]:2000"),
-            ("[bench]:2000", "'[bench]:2000' is no IPv6 address in brackets, e.g. [::1]:2000"),
-            ("[::1:2000", "'[::1:2000' is no IPv6 address in brackets, e.g. [::1]:2000"),
-            ("[::1]2000", "'[::1]2000' is no IPv6 address in brackets, e.g. [::1]:2000"),
+            ("bench", "'bench' has no port number after it"),
+            ("bench:", "'bench' has no port number after it"),
+            ("[::1]", "'::1' has no port number after it"),
+            ("bench:0", "'0' is not a port number (1 to 65535)"),
+            ("bench:65536", "'65536' is not a port number (1 to 65535)"),
+            ("bench:+20", "'+20' is not a port number (1 to 65535)"),
+            ("bench:2000/", "'2000/' is not a port number (1 to 65535)"),
+            ("bench:telnet", "'telnet' is not a port number (1 to 65535)"),
+            ("me@bench:2000", "'me@bench' is not a host name"),
+            ("u:secret@bench:2", "a user name ('u') and a password do not apply here: write HOST:PORT"),
+            ("a bench:2000", "'a bench' is not a host name"),
+            ("::1:2000", "the IPv6 address in '::1:2000' has to be in brackets, e.g. [::1]:2000"),
+            ("[bench]:2000", "'[bench]:2000' is not an IPv6 address in brackets, e.g. [::1]:2000"),
+            ("[::1:2000", "'[::1:2000' is not an IPv6 address in brackets, e.g. [::1]:2000"),
+            ("[::1]2000", "'[::1]2000' is not an IPv6 address in brackets, e.g. [::1]:2000"),
         ] {
             let error = text.parse::<Address>().expect_err(text);
             assert_eq!(error.to_string(), complaint, "{text}");

@@ -1,10 +1,11 @@
 //! The recordings that are there.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::recorder::ENDING;
+use super::recording_file;
 use super::replay::{Recording, RecordingError};
 use crate::record::Header;
 use crate::time::Duration;
@@ -81,7 +82,7 @@ pub fn look(path: PathBuf) -> Option<Listed> {
 fn content(path: &Path) -> Result<Content, String> {
     let header = Recording::open(path).map_err(reason)?.header().clone();
     let length = length(path).ok().flatten();
-    Ok(Content { header, length, is_being_written: is_being_written(path) })
+    Ok(Content { header, length, is_being_written: recording_file::is_being_written(path) })
 }
 
 /// Why a recording cannot be read, for where its name stands already.
@@ -93,12 +94,6 @@ fn reason(error: RecordingError) -> String {
         RecordingError::File { error, .. } => error.to_string(),
         RecordingError::Content { error, .. } => format!("line {}: {}", error.line, error.what),
     }
-}
-
-/// Whoever writes a recording holds a lock on it, which ends with the process however that ends. Where locks do not work
-/// nobody can say.
-fn is_being_written(path: &Path) -> bool {
-    File::open(path).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
 /// The moment of the last event: a recording's lines are `[seconds, kind, text]`.
@@ -117,6 +112,7 @@ fn length(path: &Path) -> io::Result<Option<Duration>> {
 mod tests {
     use super::*;
     use crate::endpoint::Secrecy;
+    use crate::host::recording_file::Existing;
     use crate::record::{Cast, Direction};
     use crate::time::Instant;
 
@@ -154,8 +150,7 @@ mod tests {
     fn a_recording_is_being_written_as_long_as_its_writer_holds_it() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("20260131T120000Z-a-1.cast");
-        let file = File::create(&path).expect("a file");
-        file.try_lock_shared().expect("nobody else has it");
+        let file = recording_file::create(&path, Existing::Stays).expect("created");
         let cast = Cast::begin(file, &Header::default(), Instant::ZERO).expect("begun");
         let is_being_written = || {
             let content = look(path.clone()).expect("there").content.expect("a recording");

@@ -37,7 +37,7 @@ pub enum LinkSpec {
     Emulated(&'static Product),
     /// A recording: what was said, read only.
     Replay(PathBuf),
-    /// A raw socket, behind which somebody has a serial port.
+    /// A raw socket, which leads to a serial port elsewhere.
     Tcp(Address),
     /// A remote serial port (RFC 2217).
     Rfc2217(Address),
@@ -220,7 +220,7 @@ pub struct Options {
     pub baud: u32,
 }
 
-/// An open link. Dropping it closes the port, within [`CLOSE_PATIENCE`] and little more, whatever the other side does.
+/// An open link. Dropping it closes the port, within [`CLOSE_PATIENCE`] and a moment more, whatever the other side does.
 #[derive(Debug)]
 pub struct Connection {
     id: LinkId,
@@ -282,7 +282,7 @@ impl Connection {
                 let dialled = Connection::dial(spec, options, clock)?;
                 Connection::over(spec, dialled, options, clock, inputs)
             }
-            // There is no line: who can do with a recording opens it as one.
+            // There is no line: a command that can do with a recording opens it as one.
             LinkSpec::Replay(_) => Err(LinkError {
                 port: spec.to_string(),
                 operation: Operation::Open,
@@ -477,7 +477,7 @@ mod tests {
             assert_eq!(read(text).map(|link| link.to_string()), Ok(shown.to_owned()));
         }
         let error = read("tcp://bench").expect_err("no port").to_string();
-        assert_eq!(error, "'bench' has no port number behind it: such a link is tcp://HOST:PORT");
+        assert_eq!(error, "'bench' has no port number after it: such a link is tcp://HOST:PORT");
     }
 
     #[test]

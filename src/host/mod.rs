@@ -26,6 +26,7 @@ pub mod unit;
 mod duplex;
 mod lines;
 mod outlet;
+mod recording_file;
 #[cfg(unix)]
 mod serial;
 pub mod socket;
@@ -42,6 +43,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use crate::endpoint::Arrived;
 use crate::time::{Duration, Instant};
 use link::LinkError;
+use signal::Caught;
 
 /// What the world did, on the one channel of a program's loop.
 #[derive(Debug)]
@@ -62,8 +64,8 @@ pub enum Input {
         /// Why.
         error: LinkError,
     },
-    /// The process got a signal (its number).
-    Signal(i32),
+    /// The process got a signal.
+    Signal(Caught),
     /// Bytes from standard input, where it is read as such.
     Typed(Vec<u8>),
     /// Standard input has ended.
@@ -240,7 +242,7 @@ mod tests {
     fn bytes_come_first_each_piece_with_its_time_and_none_from_behind_the_loss_of_the_port() {
         let (sender, inputs) = channel();
         let mut inbox = Inbox::new(inputs);
-        for input in [bytes(1, "a"), Input::Wake, bytes(2, "b"), gone(FIRST), Input::Signal(2), bytes(3, "c")] {
+        for input in [bytes(1, "a"), Input::Wake, bytes(2, "b"), gone(FIRST), Input::Signal(2.into()), bytes(3, "c")] {
             sender.send(input).expect("there is room");
         }
         let arrived: Vec<(Instant, Vec<u8>)> =
@@ -249,7 +251,7 @@ mod tests {
         let mut next = || inbox.next(Duration::ZERO);
         assert!(matches!(next(), Ok(Some(Input::Wake))));
         assert!(matches!(next(), Ok(Some(Input::Gone { .. }))));
-        assert!(matches!(next(), Ok(Some(Input::Signal(2)))));
+        assert!(matches!(next(), Ok(Some(Input::Signal(signal))) if signal.number() == 2));
         assert!(matches!(next(), Ok(None)), "bytes are taken by the other way");
         assert_eq!(inbox.arrived().len(), 1);
         assert!(matches!(inbox.next(Duration::ZERO), Ok(None)));
@@ -280,12 +282,12 @@ mod tests {
     fn what_a_closed_link_has_left_is_forgotten_and_a_signal_is_not() {
         let (sender, inputs) = channel();
         let mut inbox = Inbox::new(inputs);
-        for input in [bytes(1, "a"), Input::Signal(15)] {
+        for input in [bytes(1, "a"), Input::Signal(15.into())] {
             sender.send(input).expect("there is room");
         }
         inbox.forget(FIRST);
         assert_eq!(inbox.arrived(), []);
-        assert!(matches!(inbox.next(Duration::ZERO), Ok(Some(Input::Signal(15)))));
+        assert!(matches!(inbox.next(Duration::ZERO), Ok(Some(Input::Signal(signal))) if signal.number() == 15));
     }
 
     #[test]

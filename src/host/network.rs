@@ -32,7 +32,7 @@ pub enum NetworkError {
         after: Duration,
     },
     /// The connection does not come about for another reason.
-    #[error("the connection does not come about ({0})")]
+    #[error("cannot connect ({0})")]
     Unreachable(io::Error),
     /// The other side has hung up instead of setting up its port.
     #[error("the other side closed the connection{}", said.as_ref().map(|said| format!(", saying '{said}'")).unwrap_or_default())]

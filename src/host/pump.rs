@@ -43,9 +43,9 @@ pub enum PumpError {
     /// The deadline is over.
     #[error("no end in time")]
     Deadline,
-    /// A signal came (its number).
+    /// A signal came.
     #[error("interrupted")]
-    Interrupted(i32),
+    Interrupted,
     /// The recording that was played has ended.
     #[error("the recording has ended")]
     Over,
@@ -105,7 +105,7 @@ impl Pump {
                     }
                     return Err(PumpError::Link(error));
                 }
-                Ok(Some(Input::Signal(signal))) => return Err(PumpError::Interrupted(signal)),
+                Ok(Some(Input::Signal(_))) => return Err(PumpError::Interrupted),
                 Ok(Some(Input::Bytes { .. } | Input::Typed(_) | Input::TypedEnd | Input::Wake) | None) => {}
                 // The connection's threads hold the other end as long as it lives.
                 Err(Closed) => return Err(self.send_error(SendError::Gone)),
@@ -134,8 +134,8 @@ impl Pump {
         let until = self.clock.now() + time;
         while self.clock.now() < until {
             self.inbox.arrived();
-            if let Ok(Some(Input::Signal(signal))) = self.inbox.next(self.clock.until(until)) {
-                return Err(PumpError::Interrupted(signal));
+            if let Ok(Some(Input::Signal(_))) = self.inbox.next(self.clock.until(until)) {
+                return Err(PumpError::Interrupted);
             }
         }
         Ok(())

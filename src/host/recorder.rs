@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::clock::Clock;
 use super::link::Connection;
+use super::recording_file::{self, Existing};
 use crate::endpoint::Secrecy;
 use crate::record::{Cast, Direction, Header, Record, Tally};
 use crate::time::{Duration, Instant};
@@ -152,12 +153,6 @@ impl Recorder {
         self.write(at, |open| open.cast.mark(at, text));
     }
 
-    /// The cable is back: what follows from now on is another record, of the same conversation.
-    pub fn resume(&mut self, at: Instant, text: &str) {
-        self.followed = 0;
-        self.mark(at, text);
-    }
-
     /// Records bytes; secret ones by their number only.
     fn push(&mut self, at: Instant, direction: Direction, secrecy: Secrecy, bytes: &[u8]) {
         self.write(at, |open| {
@@ -245,28 +240,8 @@ fn series(folder: PathBuf, stem: &str, header: Header, begun: Instant, limits: L
 /// Recordings of one name at most: as many links as one program could possibly open within a second.
 const MOST_NAMESAKES: u32 = 1000;
 
-/// What becomes of a file that is there already.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Existing {
-    /// The user has named it.
-    IsReplaced,
-    /// It is another recording.
-    Stays,
-}
-
 fn part(path: &Path, header: &Header, begun: Instant, existing: Existing) -> io::Result<Cast<File>> {
-    let mut options = File::options();
-    options.write(true).create_new(existing == Existing::Stays).create(true).truncate(true);
-    #[cfg(unix)]
-    {
-        // What a unit says is its owner's business.
-        use std::os::unix::fs::OpenOptionsExt;
-        options.mode(0o600);
-    }
-    let file = options.open(path)?;
-    // Tells other sessions that this one is being written. Where locks do not work, its age protects it well enough.
-    let _ = file.try_lock_shared();
-    Cast::begin(file, header, begun)
+    Cast::begin(recording_file::create(path, existing)?, header, begun)
 }
 
 /// Deletes the oldest recordings until a full part more fits. Their names begin with the time, so their order is their
@@ -284,8 +259,7 @@ fn make_room(folder: &Path, limits: Limits) -> io::Result<()> {
         if bytes + limits.part_bytes <= limits.bytes && files < limits.files {
             break;
         }
-        let written = File::open(&path).is_ok_and(|file| file.try_lock().is_err());
-        if !written && fs::remove_file(&path).is_ok() {
+        if !recording_file::is_being_written(&path) && fs::remove_file(&path).is_ok() {
             bytes -= size;
             files -= 1;
         }
@@ -359,6 +333,20 @@ pub(super) mod tests {
             ["00-notes.txt", "20200102T000000Z-a-1.cast", "20200103T000000Z-a-1.cast", "20260131T120000Z-u0-7.cast"]
         );
         drop(open);
+    }
+
+    #[test]
+    fn a_recording_that_is_being_written_does_not_make_room() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let limits = Limits { bytes: 10_000, files: 1, part_bytes: 500 };
+        let open =
+            |stem: &str| series(folder.path().to_owned(), stem, header(), Instant::ZERO, limits).expect("opened");
+        let older = open("20260131T120000Z-u0-7");
+        let newer = open("20260131T120001Z-u0-8");
+        assert_eq!(names(folder.path()).len(), 2);
+        drop((older, newer));
+        drop(open("20260131T120002Z-u0-9"));
+        assert_eq!(names(folder.path()), ["20260131T120002Z-u0-9.cast"]);
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub fn admit(path: &Path, overwrite: bool) -> Result<(), SaveError> {
     match fs::metadata(path) {
         Ok(found) if !found.is_file() => Err(SaveError::NotAFile),
         Ok(_) if !overwrite => Err(SaveError::Exists),
+        // A symbolic link that leads nowhere.
+        Err(_) if !overwrite && fs::symlink_metadata(path).is_ok() => Err(SaveError::Exists),
         Ok(_) | Err(_) => Ok(()),
     }
 }
@@ -68,10 +70,30 @@ pub fn save(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), SaveError>
             Ok(replaced) => fs::set_permissions(&beside, replaced.permissions()),
             Err(_) => Ok(()),
         })
-        .and_then(|()| fs::rename(&beside, &place));
+        .and_then(|()| if overwrite { fs::rename(&beside, &place) } else { put(&beside, &place) });
     written.map_err(|error| {
         let _ = fs::remove_file(&beside);
-        error.into()
+        match error.kind() {
+            io::ErrorKind::AlreadyExists => SaveError::Exists,
+            _ => error.into(),
+        }
+    })
+}
+
+/// Gives a file its name, unless there is one of that name, which another process may have made a moment ago.
+fn put(beside: &Path, place: &Path) -> io::Result<()> {
+    match fs::hard_link(beside, place) {
+        Ok(()) => fs::remove_file(beside),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(error),
+        Err(_) => put_without_links(beside, place),
+    }
+}
+
+/// The same where the file system has no hard links.
+fn put_without_links(beside: &Path, place: &Path) -> io::Result<()> {
+    File::create_new(place)?;
+    fs::rename(beside, place).inspect_err(|_| {
+        let _ = fs::remove_file(place);
     })
 }
 
@@ -118,6 +140,21 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
     }
 
+    #[test]
+    fn what_another_process_has_put_there_meanwhile_stays() {
+        for put in [put, put_without_links] {
+            let folder = tempfile::tempdir().expect("a folder");
+            let (place, beside) = (folder.path().join("x.S"), folder.path().join("x.S.7.part"));
+            fs::write(&beside, b"ours").expect("written");
+            put(&beside, &place).expect("nothing is there");
+            assert_eq!(fs::read(&place).expect("there"), b"ours");
+            assert!(!beside.exists());
+            fs::write(&beside, b"later").expect("written");
+            assert_eq!(put(&beside, &place).map_err(|error| error.kind()), Err(io::ErrorKind::AlreadyExists));
+            assert_eq!(fs::read(&place).expect("there"), b"ours");
+        }
+    }
+
     #[cfg(unix)]
     #[test]
     fn a_link_stays_a_link_and_rights_stay_as_they_were() {
@@ -132,5 +169,7 @@ mod tests {
         assert!(link.is_symlink());
         assert_eq!(fs::read(&path).expect("there"), b"two");
         assert_eq!(fs::metadata(&path).expect("there").permissions().mode() & 0o777, 0o640);
+        fs::remove_file(&path).expect("removed");
+        assert!(matches!(admit(&link, false), Err(SaveError::Exists)), "a link that leads nowhere");
     }
 }

@@ -5,6 +5,7 @@
 //! and the descriptor stays non-blocking, so that a writer can keep a deadline. Opening raises DTR and RTS in every
 //! driver, which many USB devices wait for.
 
+use std::convert::Infallible;
 use std::fs;
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
@@ -38,6 +39,8 @@ pub struct Lines {
     reader: Option<JoinHandle<()>>,
     writer: Option<JoinHandle<()>>,
     written: Receiver<()>,
+    /// Disconnected when no break is under way. The first half is copied to the threads that send one.
+    breaks: (Option<SyncSender<Infallible>>, Receiver<Infallible>),
 }
 
 /// Bytes read at once: Linux hands out no more than 4 KiB of a terminal's bytes at a time.
@@ -75,19 +78,27 @@ pub fn open(
             let _ = done.try_send(());
         })
         .map_err(system)?;
-    let lines = Lines { port, stopper: Some(stopper), reader: Some(reader), writer: Some(writer), written };
+    let (breaking, ended) = sync_channel(0);
+    let breaks = (Some(breaking), ended);
+    let lines = Lines { port, stopper: Some(stopper), reader: Some(reader), writer: Some(writer), written, breaks };
     Ok((lines, outgoing))
 }
 
 impl Lines {
     /// Sends a break, from a thread: the system waits for its end.
     pub fn send_break(&self) -> io::Result<()> {
-        let port = self.port.clone();
-        thread::Builder::new().name("break".into()).spawn(move || tcsendbreak(&*port)).map(drop)
+        let (port, breaking) = (self.port.clone(), self.breaks.0.clone());
+        let send = move || {
+            let _ = tcsendbreak(&*port);
+            drop((port, breaking));
+        };
+        thread::Builder::new().name("break".into()).spawn(send).map(drop)
     }
 
-    /// Ends the threads: what is queued may leave for this long, then everything stops.
+    /// Ends the threads: what is queued, and what the driver has, may leave for this long, then everything stops.
     pub fn close(&mut self, patience: Duration) {
+        let begun = Clock::start();
+        let left = || patience.saturating_sub(begun.now().since_start());
         match self.written.recv_timeout(patience) {
             Ok(()) | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
         }
@@ -102,7 +113,11 @@ impl Lines {
         let discard = || {
             let _ = tcflush(&*discarded, QueueSelector::OFlush);
         };
-        empty(drain, discard, patience);
+        empty(drain, discard, left());
+        self.breaks.0 = None;
+        let _ = self.breaks.1.recv_timeout(left());
+        // A break or a drain that the driver does not end keeps the port open, and with it our lock.
+        let _ = rustix::fs::flock(&self.port, FlockOperation::NonBlockingUnlock);
         // The host of a pseudo-terminal keeps the device open, and with it this lock.
         let _ = ioctl_tiocnxcl(&self.port);
     }
@@ -119,9 +134,12 @@ fn empty(drain: impl FnOnce() + Send + 'static, discard: impl FnOnce(), patience
     if draining.is_err() || drained.recv_timeout(patience).is_err() {
         discard();
         // The thread has the port open, which is to be free when this returns.
-        let _ = drained.recv_timeout(patience);
+        let _ = drained.recv_timeout(DISCARDED);
     }
 }
+
+/// How long a drain may take to notice that there is nothing left to drain.
+const DISCARDED: Duration = Duration::from_millis(50);
 
 /// What both threads have.
 struct Worker {
@@ -241,7 +259,7 @@ fn configure(port: &OwnedFd, baud: u32) -> Result<(), Cause> {
     settings.control_modes -= ControlModes::PARENB | ControlModes::CSTOPB | ControlModes::CRTSCTS;
     settings.input_modes -= InputModes::IXOFF | InputModes::IXANY;
     settings.set_speed(baud).map_err(cause)?;
-    // A former user may have left the output stopped. That state is the terminal's; taking IXON away ends it, but only
+    // A former user may have left the output stopped. That state is the terminal's; removing IXON ends it, but only
     // if IXON was there.
     settings.input_modes |= InputModes::IXON;
     apply(port, &settings)?;

@@ -66,7 +66,7 @@ impl Screen {
         }
         restore_on_panic();
         take_screen()?;
-        let terminal = Terminal::new(CrosstermBackend::new(stdout())).inspect_err(|_| restore())?;
+        let terminal = Terminal::new(CrosstermBackend::new(stdout())).inspect_err(|_| give_back())?;
         Ok(Screen { terminal, has_mouse: false })
     }
 
@@ -90,7 +90,7 @@ impl Screen {
     /// # Errors
     /// If the terminal refuses.
     pub fn suspend(&mut self) -> io::Result<()> {
-        restore();
+        give_back();
         #[cfg(unix)]
         rustix::process::kill_current_process_group(rustix::process::Signal::TSTP)?;
         self.retake()
@@ -101,7 +101,7 @@ impl Screen {
     /// # Errors
     /// If the terminal refuses.
     pub fn retake(&mut self) -> io::Result<()> {
-        restore();
+        give_back();
         self.has_mouse = false;
         take_screen()?;
         // Not `clear`: that asks the terminal for the cursor, whose answer the key thread would take.
@@ -112,7 +112,7 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        restore();
+        give_back();
     }
 }
 
@@ -159,7 +159,7 @@ impl Drop for KeptTerminal {
 
 impl Drop for RawMode {
     fn drop(&mut self) {
-        restore();
+        give_back();
     }
 }
 
@@ -211,20 +211,21 @@ pub fn size() -> Option<(usize, usize)> {
 fn take_screen() -> io::Result<()> {
     enable_raw_mode()?;
     TAKEN.store(SCREEN, Ordering::SeqCst);
-    execute!(stdout(), EnterAlternateScreen, EnableBracketedPaste).inspect_err(|_| restore())
+    execute!(stdout(), EnterAlternateScreen, EnableBracketedPaste).inspect_err(|_| give_back())
 }
 
 /// Gives back what was taken. Harmless if nothing was.
-fn restore() {
+pub(super) fn give_back() {
     let taken = TAKEN.swap(NOTHING, Ordering::SeqCst);
+    // First, since this succeeds even on a terminal that takes no bytes.
+    if taken != NOTHING {
+        let _ = disable_raw_mode();
+    }
     if taken == SCREEN {
         let mut out = stdout();
         let _ = out.write_all(MOUSE_OFF.as_bytes());
         let _ = queue!(out, DisableBracketedPaste, LeaveAlternateScreen, Show);
         let _ = out.flush();
-    }
-    if taken != NOTHING {
-        let _ = disable_raw_mode();
     }
 }
 
@@ -237,7 +238,7 @@ fn restore_on_panic() {
         let report = Arc::new(panic::take_hook());
         panic::set_hook(Box::new(move |info| {
             let taken = TAKEN.load(Ordering::SeqCst) != NOTHING;
-            restore();
+            give_back();
             report(info);
             if taken && thread::current().id() != owner {
                 std::process::exit(PANIC_EXIT_CODE);

@@ -384,6 +384,22 @@ fn no_key_is_pressed_on_what_has_not_shown_itself_behind_a_cable_that_is_back() 
 }
 
 #[test]
+fn a_signal_ends_a_program_that_is_blocked_in_a_read() {
+    let world = World::new();
+    let made = world.run(&["stream", "--port", "emu:axrtd8co", "--count", "1", "--record", "rows.cast"], b"");
+    assert_eq!(made.code, Some(0), "{}", made.err);
+    let recording = fs::read(world.path("rows.cast")).expect("a recording");
+    let mut running = world.start(&["stream", "--port", "replay:/dev/stdin"]);
+    running.input(&recording);
+    running.wait_out(",fv,");
+    // The second one shortens the wait for a loop that does not look.
+    running.signal(rustix::process::Signal::TERM);
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    running.signal(rustix::process::Signal::TERM);
+    assert_eq!(running.wait().code, Some(130));
+}
+
+#[test]
 fn a_cable_that_stays_away_is_exit_code_3() {
     let world = World::new();
     let link = world.path("unit");

@@ -94,10 +94,11 @@ pub fn run(args: Args, _global: &Global, output: &mut Output) -> Result<(), CliE
     let products = products(&args)?;
     let faults = faults(&args.faults, &products)?;
     let scenario = args.scenario.as_deref().map(read_scenario).transpose()?;
+    // Dropped after `happened`: dropping a unit waits for its thread, which may be waiting to say that it has failed.
+    let mut units = Vec::new();
     let (news, happened) = std::sync::mpsc::sync_channel(NEWS);
     // Signals first: an interrupt in between would leave links behind.
-    let signals = listen_for_signals(news.clone())?;
-    let mut units = Vec::new();
+    let _signals = listen_for_signals(news.clone())?;
     for (place, product) in products.into_iter().enumerate() {
         units.push(start(&args, place, product, scenario.as_ref(), &faults[place], news.clone(), output)?);
     }
@@ -105,9 +106,7 @@ pub fn run(args: Args, _global: &Global, output: &mut Output) -> Result<(), CliE
         announce(place, running, "", output)?;
     }
     listen_for_lines(news.clone())?;
-    let end = serve(&args, &mut units, &news, &happened, output);
-    drop(signals);
-    end
+    serve(&args, &mut units, &news, &happened, output)
 }
 
 /// The products of all units, in their order.

@@ -60,13 +60,13 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if let (Some(file), [_, _, ..]) = (&global.record, global.ports.as_slice()) {
         let message = format!("several units cannot be recorded to one file, {}", files::shown(file));
         return Err(CliError::message(Kind::Usage, message)
-            .hint("leave --record away: each upload has its own recording in the state directory"));
+            .hint("leave out --record: each upload has its own recording in the state directory"));
     }
     let name = files::shown(&args.image);
     let expected = args.product.map(|product| product.name.as_str());
     let report = image_cli::read_for(&args.image, &image_cli::targets_with(args.loader), expected, &args.allow)?;
     let Some(image) = report.image() else {
-        return refuse(&report, &name, output);
+        return refuse(&report, &name, global.port(), output);
     };
     if image.identity().is_none() && !args.allow.contains(&DefectId::NoIdentity) {
         let message =
@@ -210,7 +210,7 @@ fn consent(
 }
 
 fn not_confirmed() -> CliError {
-    CliError::message(Kind::NeedsYes, "not confirmed; nothing has been sent")
+    CliError::message(Kind::NeedsYes, "not confirmed; nothing has been uploaded")
 }
 
 /// Does what was ordered and shows how far it is. The note is written when the unit has been found to be the right one.
@@ -256,7 +256,17 @@ fn find_product(talk: &mut Talk, args: &Args, global: &Global, output: &mut Outp
         );
         return Ok(());
     }
-    output.remark("axcon: the unit's menu does not name it; its object dictionary is asked");
+    if global.yes {
+        output.remark("axcon: the unit's menu does not name it; its object dictionary is asked");
+    } else {
+        let question = format!(
+            "The unit's menu does not name it; its object dictionary is asked. {}. Type yes: ",
+            ask::READS_DICTIONARY
+        );
+        if !ask::is_yes(&question, Some(&mut *talk), output)? {
+            return Err(not_confirmed().hint("--product NAME says what the unit is without asking it"));
+        }
+    }
     // What it showed is among the facts then; if it would not, the upload says what is missing.
     talk.ask(Command::ReadDictionary).map(|_| ())
 }

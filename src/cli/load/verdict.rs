@@ -68,11 +68,7 @@ pub fn planned(
     if !output.json {
         return Ok(());
     }
-    let state = match unit.map(|(facts, _)| facts.state) {
-        Some(UnitState::Loader) => UnitNow::Loader,
-        Some(_) => UnitNow::Application,
-        None => UnitNow::Unknown,
-    };
+    let state = unit.map_or(UnitNow::Unknown, |(facts, _)| as_it_is(facts.state));
     let version = unit.and_then(|(facts, _)| facts.version.as_ref());
     output.object(&LoadObject {
         port: unit.map(|(_, port)| port),
@@ -87,10 +83,11 @@ pub fn planned(
 }
 
 /// The image has errors: report, nothing else.
-pub fn refuse(report: &Report, name: &str, output: &mut Output) -> Result<(), CliError> {
+pub fn refuse(report: &Report, name: &str, port: Option<&str>, output: &mut Output) -> Result<(), CliError> {
     let written = if output.json {
         let identity = report.facts.identity.as_ref();
         output.object(&LoadObject {
+            port,
             exit_code: Kind::ImageRefused.exit_code(),
             verdict: "refused",
             product: identity.map(|identity| identity.product.as_str()),
@@ -129,11 +126,7 @@ pub fn would_be_refused(
         port: Some(port),
         exit_code: Kind::ImageRefused.exit_code(),
         verdict: verdict_name(Verdict::Refused),
-        unit: unit_name(match facts.state {
-            UnitState::Loader => UnitNow::Loader,
-            UnitState::Application => UnitNow::Application,
-            UnitState::Silent | UnitState::Unknown => UnitNow::Unknown,
-        }),
+        unit: unit_name(as_it_is(facts.state)),
         product: Some(product),
         version_before: facts.version.as_ref().map(|known| known.value.to_string()),
         what: &what,
@@ -259,6 +252,15 @@ fn verdict_name(verdict: Verdict) -> &'static str {
         Verdict::NoAnswer | Verdict::Failed => "failed",
         Verdict::WrongApplication => "wrong-application",
         Verdict::Interrupted => "interrupted",
+    }
+}
+
+/// What a unit is while nothing has been done to it.
+fn as_it_is(state: UnitState) -> UnitNow {
+    match state {
+        UnitState::Loader => UnitNow::Loader,
+        UnitState::Application => UnitNow::Application,
+        UnitState::Silent | UnitState::Unknown => UnitNow::Unknown,
     }
 }
 

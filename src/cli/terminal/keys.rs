@@ -63,7 +63,7 @@ enum Stage {
 }
 
 impl Keys {
-    /// A file is being sent, or no longer.
+    /// A file is being sent, or no longer: also if the one that was named cannot be.
     pub fn set_sending(&mut self, sending: bool) {
         self.sending = sending;
     }
@@ -107,7 +107,13 @@ impl Keys {
                     b'\r' | b'\n' => {
                         let name = String::from_utf8_lossy(name).trim().to_owned();
                         self.stage = Stage::Typing;
-                        deeds.push(if name.is_empty() { Deed::Cancel } else { Deed::SendFile(name.into()) });
+                        if name.is_empty() {
+                            deeds.push(Deed::Cancel);
+                        } else {
+                            // What was typed or pasted with the name must not get ahead of the file.
+                            self.sending = true;
+                            deeds.push(Deed::SendFile(name.into()));
+                        }
                     }
                     ESCAPE | CANCEL => {
                         self.stage = Stage::Typing;
@@ -150,9 +156,18 @@ mod tests {
         keys.press("\u{14}fa.Ä".as_bytes());
         assert_eq!(keys.press(b"\x7f"), [Deed::Naming("a.".into())]);
         assert_eq!(keys.press(b"S\r"), [Deed::Naming("a.S".into()), Deed::SendFile("a.S".into())]);
+        keys.set_sending(false);
         keys.press(b"\x14fx");
         assert_eq!(keys.press(b"\x1b"), [Deed::Cancel]);
         assert_eq!(keys.press(b"m"), [Deed::Send(b"m".to_vec())], "and the next key is the unit's again");
+    }
+
+    #[test]
+    fn what_is_pasted_with_the_name_of_a_file_does_not_reach_the_unit() {
+        let mut keys = Keys::default();
+        let deeds = keys.press(b"m\x14fx\rDDD\x03");
+        assert_eq!(deeds.first(), Some(&Deed::Send(b"m".to_vec())));
+        assert_eq!(deeds[deeds.len() - 2..], [Deed::SendFile("x".into()), Deed::Cancel]);
     }
 
     #[test]

@@ -93,11 +93,8 @@ const LONG_HOLD: Duration = Duration::from_secs(2);
 /// If the port does not open or goes away, or a signal ends the command.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     if output.json {
-        return Err(CliError::message(
-            Kind::Usage,
-            "a terminal shows the bytes that come: --json has no meaning there",
-        )
-        .hint("'axcon stream --json' and 'axcon diagnostics --json' write what the unit says as objects"));
+        return Err(CliError::message(Kind::Usage, "a terminal shows the bytes that come, so --json does not apply")
+            .hint("'axcon stream --json' and 'axcon diagnostics --json' write what the unit says as objects"));
     }
     let look = match (args.raw, args.hex) {
         (true, _) => Look::Raw,

@@ -67,7 +67,7 @@ impl Sending {
             }
             Ok(_) | Err(_) => {}
         }
-        let file = File::open(path).map_err(|error| failed(path, error))?;
+        let file = File::open(path).map_err(|error| CliError { kind: Kind::Usage, ..failed(path, error) })?;
         Ok(Sending { path: path.to_owned(), file, new_line, after_return: false, sent: 0 })
     }
 

@@ -337,7 +337,7 @@ impl Console {
                 self.lose_link(failure);
             }
             // Whoever stopped us, and whatever was drawn meanwhile: it is our terminal again.
-            host::Input::Signal(number) if signal::continues(number) => {
+            host::Input::Signal(number) if signal::continues(&number) => {
                 if let Err(error) = canvas.retake().and_then(|()| self.redraw(canvas)) {
                     self.end(Err(error));
                 }

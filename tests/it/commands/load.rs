@@ -488,6 +488,22 @@ fn a_unit_whose_menu_does_not_name_it_is_asked_for_its_product_code_before_an_up
 }
 
 #[test]
+fn a_units_object_dictionary_is_not_read_before_an_upload_unless_the_user_agrees() {
+    let mut bench = Bench::new();
+    bench.power_up_as("axtc4co", &["--dialect", "42"]);
+    let mut args = vec!["load", "new.S", "--password-file", "pw", "--record", "it.cast", "--port", "u0"];
+    args.extend(FAST);
+    let ran = bench.world.run(&args, b"no\n");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("may halt scanning and CAN. Type yes"), "{}", ran.err);
+    assert!(ran.err.contains("--product NAME"), "{}", ran.err);
+    let recording = fs::read_to_string(bench.world.path("it.cast")).expect("a recording");
+    let sent: Vec<&str> = recording.lines().filter(|line| line.contains(r#", "i", "#)).collect();
+    assert!(!sent.is_empty(), "{recording}");
+    assert!(!sent.iter().any(|line| line.to_lowercase().contains(r#""v""#)), "{sent:?}");
+}
+
+#[test]
 fn an_upload_that_nobody_answers_leaves_no_note_that_another_unit_would_be_judged_by() {
     let bench = Bench::new();
     let silent = crate::support::puppet::Puppet::silent();

@@ -360,12 +360,12 @@ fn what_is_no_text_on_standard_input_ends_no_emulator() {
 fn an_option_that_would_be_ignored_is_refused() {
     let world = World::new();
     for (args, complaint) in [
-        (&["ports", "--port", "u0"][..], "'axcon ports' looks at no unit: --port has no meaning there"),
-        (&["--port", "u0", "ports"], "'axcon ports' looks at no unit: --port has no meaning there"),
-        (&["eds", "axtc4co", "--record", "it.cast"], "'axcon eds' looks at no unit: --record has no meaning there"),
-        (&["image", "info", "x.S", "--baud", "9600"], "'axcon image info' looks at no unit: --baud"),
-        (&["dictionary", "diff", "a", "b", "--port", "u0"], "'axcon dictionary diff' looks at no unit: --port"),
-        (&["terminal", "--json", "--port", "u0"], "--json has no meaning there"),
+        (&["ports", "--port", "u0"][..], "'axcon ports' does not use a unit, so --port does not apply"),
+        (&["--port", "u0", "ports"], "'axcon ports' does not use a unit, so --port does not apply"),
+        (&["eds", "axtc4co", "--record", "it.cast"], "'axcon eds' does not use a unit, so --record does not apply"),
+        (&["image", "info", "x.S", "--baud", "9600"], "'axcon image info' does not use a unit, so --baud"),
+        (&["dictionary", "diff", "a", "b", "--port", "u0"], "'axcon dictionary diff' does not use a unit, so --port"),
+        (&["terminal", "--json", "--port", "u0"], "--json does not apply"),
         (&["stream", "--format", "csv", "--json", "--port", "u0"], "--json and --format csv contradict each other"),
         (&["diagnostics", "--json", "--format", "text", "--port", "u0"], "--json and --format text contradict"),
         (&["dictionary", "dump", "--json", "--format", "dcf", "--port", "u0"], "--json and --format dcf contradict"),

@@ -12,9 +12,9 @@ fn what_is_no_port_is_refused_with_its_kind_and_exit_code() {
     fs::write(world.path("file"), "").expect("a file");
     for (port, kind, message) in [
         ("missing", "port-missing", "cannot open missing: there is no such port"),
-        (".", "port-gone", "cannot open .: a directory, not a serial port"),
-        ("file", "port-gone", "cannot open file: a regular file, not a serial port"),
-        ("/dev/null", "port-gone", "cannot open /dev/null: some other device, not a serial port"),
+        (".", "port-missing", "cannot open .: a directory, not a serial port"),
+        ("file", "port-missing", "cannot open file: a regular file, not a serial port"),
+        ("/dev/null", "port-missing", "cannot open /dev/null: some other device, not a serial port"),
     ] {
         let ran = world.run(&["identify", "--json", "--port", port], b"");
         assert_eq!(ran.code, Some(3), "{port}: {}", ran.err);
