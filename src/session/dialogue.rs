@@ -18,7 +18,7 @@ const ANSWER: Duration = Duration::from_secs(3);
 pub(super) struct Dialogue {
     asked: Option<Asked>,
     until: Instant,
-    /// Lines since the menu was asked for, which nobody has understood and which are its titles if it comes.
+    /// Lines since the menu was asked for that were not understood, and are its titles if it comes.
     before_menu: u64,
 }
 
@@ -50,7 +50,7 @@ impl Dialogue {
         self.until = now + ANSWER;
     }
 
-    /// Whether a line that nobody has understood belongs to what was asked for.
+    /// Whether a line that was not understood belongs to what was asked for.
     pub(super) fn owns(&mut self, at: Instant, line: &str) -> bool {
         let is_soon = at <= self.until;
         match self.asked.filter(|_| is_soon) {

@@ -211,7 +211,7 @@ pub enum Event {
         /// Its lines, as printed.
         lines: Vec<Text>,
     },
-    /// In a recording: somebody has walked through the object dictionary, to its end or not.
+    /// In a recording: a walk through the object dictionary, to its end or not.
     Overheard {
         /// When its last entry came.
         at: Instant,
@@ -284,7 +284,7 @@ pub enum Outcome {
     Cancelled(Job),
     /// An upload has ended, well or not.
     Loaded(Box<LoadReport>),
-    /// A file has been sent as it is, as far as it came; what the unit has made of it nobody knows.
+    /// A file has been sent as it is, as far as it came; what the unit has made of it is not known.
     FileSent {
         /// Bytes that have left.
         sent: usize,
@@ -349,7 +349,7 @@ pub enum FileEnd {
 pub enum WalkEnd {
     /// To its end.
     Whole,
-    /// No further: the unit answered no more, or nobody went on.
+    /// No further: the unit stopped answering, or the user did not go on.
     #[default]
     Stopped,
     /// As far as the user wanted.
@@ -370,7 +370,7 @@ pub struct DictionaryReading {
     pub entries: Vec<ReadEntry>,
     /// How far the walk came.
     pub end: WalkEnd,
-    /// Lines of the view with a number in them that nobody understood: neither an entry nor otherwise known.
+    /// Lines of the view with a number in them that were not understood: neither an entry nor otherwise known.
     pub unrecognised_lines: u64,
 }
 
@@ -394,7 +394,7 @@ pub struct ReadEntry {
     pub span: Span,
     /// What of the text says the value, where something does.
     pub numeral: Option<String>,
-    /// Something says a value, and nobody can be certain which: this unit prints hexadecimal numbers without a mark.
+    /// The text says a value, but which one is uncertain: this unit prints hexadecimal numbers without a mark.
     pub doubtful: bool,
     /// Whether the product's manual has it.
     pub known: bool,
@@ -403,7 +403,7 @@ pub struct ReadEntry {
 /// What is known of the unit, and from where.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
-    /// Who is talking.
+    /// What is talking.
     pub state: UnitState,
     /// Product name.
     pub product: Option<Known<String>>,
@@ -468,7 +468,7 @@ pub enum Origin {
     Diagnostics,
 }
 
-/// Who is talking at the other end.
+/// What is talking at the other end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UnitState {
     /// Nothing has been heard yet.

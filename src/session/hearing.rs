@@ -205,7 +205,7 @@ impl Session {
         self.keys.question() == Some(MenuKey::Load)
     }
 
-    /// No sign of the stream has come for so long that it has stopped.
+    /// After long enough without a sign of the stream, it has stopped.
     pub(super) fn look_at_stream(&mut self) {
         if self.toggled.is_over(self.dated) {
             self.stream_stopped();

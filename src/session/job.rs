@@ -1,4 +1,4 @@
-//! What the jobs have in common: what they are told, and what they can do.
+//! What jobs have in common: the signals they get, and what they can do.
 
 use std::collections::VecDeque;
 
@@ -10,7 +10,7 @@ use crate::endpoint::{Secrecy, Transmit};
 use crate::time::Instant;
 use crate::wire::{Message, Prompt, Text};
 
-/// What a job is told.
+/// What a job is notified of.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Signal<'a> {
     /// It begins.
@@ -40,11 +40,11 @@ pub(super) struct Desk<'a> {
     /// Words without a line end, the last thing the unit has printed: perhaps a question. `None` for signs alone, like the
     /// `>` of a command line.
     pub(super) pending: Option<&'a Text>,
-    /// Set when what the unit prints from now on is an answer, and no part of the line before.
+    /// Set when what the unit prints from now on is an answer, and not part of a line it has fallen silent in.
     pub(super) cut: bool,
     /// Set when the job has read something from what it was told, and no recogniser had.
     pub(super) understood: bool,
-    /// The line it is told of has been counted as not understood.
+    /// The line it has been given has been counted as not understood.
     pub(super) counted: bool,
     /// Bytes received so far: text that begins here or later is newer than this moment.
     pub(super) received: u64,

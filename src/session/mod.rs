@@ -299,7 +299,7 @@ impl Session {
         self.pass_to(now);
         if text == LINK_LOST {
             self.link_lost(now);
-            // It says again what it says, once it is back; until then nobody knows.
+            // Rows will show whether it still streams, once the link is back.
             self.stream_stopped();
         } else if text.starts_with(LINK_BACK) {
             self.link_back(now);

@@ -97,7 +97,7 @@ impl Transmitter {
     }
 
     /// A job has ended whose first piece was `begun` and whose last words begin with piece `last`. If earlier pieces of it
-    /// still wait, nobody listens for their answers any more, so they are withdrawn; and if none has left, there is nothing
+    /// still wait, their answers are of no use any more, so they are withdrawn; and if none has left, there is nothing
     /// its last words could end.
     pub(super) fn withdraw_job(&mut self, begun: u64, last: u64) {
         let is_late = |waiting: &Waiting| waiting.sender == Sender::Job && waiting.number < last;

@@ -39,7 +39,7 @@ pub(super) fn recognise(text: &str, words: &Words) -> Option<Prompt> {
         Some(_) => return None,
         None => {}
     }
-    // The echo of the key may stand before it: "lPassword:".
+    // The echo of the key may come before it: "lPassword:".
     if words.iter().any(|word| ["password", "passcode", "pwd"].iter().any(|asked| word.contains(asked))) {
         return Some(Prompt::Password);
     }
@@ -69,7 +69,7 @@ pub(super) fn asks_password_behind_load(text: &str) -> bool {
     if super::boot::recognise(text, &words).is_some() || words.has_any(&ABOUT_SOMETHING_ELSE) {
         return false;
     }
-    // The echo of the key may stand before it: "lPW:".
+    // The echo of the key may come before it: "lPW:".
     words.iter().any(|word| SECRETS.iter().any(|name| word == *name || word.strip_prefix('l') == Some(name)))
 }
 

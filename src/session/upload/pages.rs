@@ -1,7 +1,7 @@
 //! Where a loader that keeps one page stops its sender.
 //!
 //! The product's file says how many words a page has, which is a belief: no manual does, and the parts that may be in
-//! these units have pages of other sizes. As long as the loader stops us where it should, the belief stands, and only
+//! these units have pages of other sizes. As long as the loader stops us where it should, the assumption holds, and only
 //! records that cross are awaited. As soon as it does not, or does elsewhere, every record is awaited until one size of
 //! page explains all that was seen; if none does, that goes on to the end of the file, slow and safe.
 
@@ -18,9 +18,9 @@ const PROOF: u32 = 2;
 pub(super) enum Pages {
     /// So many words each.
     Words(u32),
-    /// Nobody knows: any of these, by what was seen so far, and this many holds were seen.
+    /// Not known: any of these, by what was seen so far, and this many holds were seen.
     Watched { possible: Vec<u32>, holds: u32 },
-    /// It stops nobody, whatever its pages are.
+    /// It never stops its sender, whatever its pages are.
     Unheld,
 }
 

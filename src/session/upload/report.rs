@@ -47,7 +47,7 @@ impl Progress {
     pub fn eta(&self) -> Option<Duration> {
         let rest = self.bytes_total.saturating_sub(self.bytes) as f64;
         let rate = self.rate();
-        // Less than a character a second is a unit that holds us: nobody knows for how long.
+        // Less than a character a second is a unit that holds us, for an unknown time.
         (rate >= 1.0).then(|| Duration::from_secs_f64(rest / rate))
     }
 }

@@ -137,6 +137,8 @@ impl Upload {
             Ok(false) => self.deadline = transfer.deadline(),
             Ok(true) => {
                 self.mark = desk.received;
+                // What follows the dots of the records on their line is newer than the end record all the same.
+                desk.cut = true;
                 self.stage = Stage::Finish { until: desk.now + LONGEST_RETURN };
                 self.deadline = Some(desk.now + NEW_BANNER);
                 let ends = transfer.may_wait_in_a_record();

@@ -25,7 +25,7 @@ const LONGEST_HOLD: Duration = Duration::from_secs(4);
 /// The same, if nothing at all has been heard since the crossing before: a unit that lost its power is worth a moment,
 /// and not one more record, since what comes back may be its menu.
 const SIGN_OF_LIFE: Duration = Duration::from_millis(1500);
-/// How long after each record a hold may take while nobody knows where the loader stops its sender: an adapter of 20 ms
+/// How long after each record a hold may take while it is not known where the loader stops its sender: an adapter of 20 ms
 /// there and back, and a busy computer.
 const WATCHED: Duration = Duration::from_millis(120);
 /// Words that may leave, from the header on, without any sign of life: the largest pages of such parts have 512, and twice

@@ -12,7 +12,7 @@
 //!   [`WINDOW`] characters are on their way without that, so the ring cannot overflow whatever an adapter shows late; and
 //!   after the header, while all of the flash is erased, and before the end record nothing is. Should an
 //!   acknowledgement be missing, a record is lost, or its acknowledgement is, or the loader has taken two in one hold, as
-//!   it does if it writes more slowly than the line is. Nobody can say which record it was, so everything is sent once
+//!   it does if it writes more slowly than the line is. Which record it was cannot be told, so everything is sent once
 //!   more from the header on, one record at a time.
 //!
 //! That the XOFF may be shown late by an adapter (16 ms are 184 characters) does not matter either way: it is awaited,
@@ -70,7 +70,7 @@ pub(super) struct Transfer {
     unheard_words: u32,
     /// Everything is being sent once more, one record at a time.
     again: bool,
-    /// How far it had come the first time, as long as nobody has answered the second: a unit without power takes no header
+    /// How far it had come the first time, as long as the second has not been answered: a unit without power takes no header
     /// either, and what was taken stays taken until the loader erases it.
     before: Option<Reached>,
     /// How long it may erase after the header.
@@ -111,7 +111,7 @@ impl Transfer {
     /// Lets go what may go now. Gives `Ok(true)` once the end record has been let go.
     ///
     /// # Errors
-    /// If the loader holds us too long, or nobody seems to be there.
+    /// If the loader holds us too long, or seems to be gone.
     pub(super) fn advance(&mut self, now: Instant, transmitter: &mut Transmitter) -> Result<bool, Stall> {
         if self.begun.is_none() {
             self.begun = Some(now);
@@ -171,7 +171,7 @@ impl Transfer {
     }
 
     /// Whether sending record by record may help against an overrun: a loader that keeps pages of another size than
-    /// believed gets records while it has no place for them.
+    /// assumed gets records while it has no place for them.
     pub(super) fn may_go_slower(&self) -> bool {
         matches!(self.pace, Pace::Pages(_)) && !self.again
     }
@@ -239,7 +239,7 @@ impl Transfer {
         self.deadline
     }
 
-    /// How far it has come; the first time, as long as nobody has answered the second.
+    /// How far it has come; the first time, as long as the second has not been answered.
     pub(super) fn reached(&self) -> Reached {
         self.before.unwrap_or_else(|| self.way.reached())
     }
