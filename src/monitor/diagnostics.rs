@@ -27,7 +27,7 @@ pub struct Tracked {
     pub label: String,
     /// As printed, where there is one.
     pub unit: Option<String>,
-    /// Digits behind the point, as printed.
+    /// Digits after the point, as printed.
     pub decimals: usize,
     /// On the newest page; `None` if it is not there any more.
     pub value: Option<f64>,
@@ -56,7 +56,7 @@ impl Diagnostics {
         for quantity in found {
             let Some(value) = quantity.value else { continue };
             let same = |tracked: &Tracked| {
-                // Two of one name stand on a page one after the other.
+                // Two with one name are on a page one after the other.
                 tracked.value.is_none() && tracked.label == quantity.label && tracked.unit == quantity.unit
             };
             match self.found.iter().position(same) {

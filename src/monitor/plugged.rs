@@ -1,4 +1,4 @@
-//! Process values that stand for having none.
+//! Process values that stand for having no value.
 //!
 //! The stream of an AXRTD8CO has words for an open and a shorted sensor and for a channel that is off, but none for a failed
 //! converter among process values: there it prints the number that object 7130h has then. With another scaling each of these

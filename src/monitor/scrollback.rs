@@ -51,12 +51,12 @@ pub struct Scrollback {
     to_unit: Writer,
 }
 
-/// Where the line of one direction stands.
+/// The line of one direction.
 #[derive(Debug)]
 struct Writer {
     /// Number of the line under construction.
     line: Option<u64>,
-    /// The last byte ended a line as CR: an LF behind it belongs to it.
+    /// The last byte ended a line as CR: an LF after it belongs to it.
     after_return: bool,
     /// Makes characters of the bytes.
     visible: Visible,
@@ -106,7 +106,7 @@ impl Scrollback {
         self.lines.iter()
     }
 
-    /// Number of the line behind the newest, counted since the start.
+    /// Number of the line after the newest, counted since the start.
     pub fn end(&self) -> u64 {
         self.dropped + self.lines.len() as u64
     }
@@ -126,7 +126,7 @@ impl Scrollback {
                 // What is typed after this line belongs below it.
                 self.to_unit.line = None;
             }
-            // Flow control may stand anywhere, also between CR and LF: it is no text.
+            // Flow control may come anywhere, even between CR and LF: it is not text.
             XON | XOFF => self.from_unit.after_return = follows_return,
             _ => self.write(at, Direction::FromUnit, byte),
         }
@@ -174,7 +174,7 @@ impl Scrollback {
         self.writer_mut(direction).line = None;
     }
 
-    /// The line under construction, begun if there is none.
+    /// The line under construction; a new one if there is none.
     fn line(&mut self, at: Instant, direction: Direction) -> &mut TextLine {
         let open = self.writer(direction).line.and_then(|number| number.checked_sub(self.dropped));
         let position = match open {

@@ -17,7 +17,7 @@ pub const KEPT_MARKS: usize = 100;
 
 /// Times between rows that are remembered, to know the usual one.
 const KEPT_GAPS: usize = 9;
-/// A curve is interrupted where no row came for so many halves of a period ...
+/// A curve is interrupted where no row came for this many halves of a period ...
 const GAP_HALF_PERIODS: u32 = 5;
 /// ... but not before this time: rows of a fast stream come in bunches.
 const GAP_AT_LEAST: Duration = Duration::from_millis(200);
@@ -126,7 +126,7 @@ impl Stream {
         if !same {
             let marks = std::mem::take(&mut self.marks);
             *self = Stream { source: Some(row.source), marks, set: self.set, ..Stream::default() };
-            // Nobody will say any more that it is over.
+            // No row will ever say that they are over.
             faults.end_all(at, |fault| !names.contains(&fault.channel));
             self.channels = names.iter().cloned().map(Channel::new).collect();
         }
@@ -147,7 +147,7 @@ impl Stream {
         for (channel, &reading) in self.channels.iter_mut().zip(&row.readings) {
             channel.has_plugged = has_plugged;
             channel.read(at, reading, gap_since);
-            // It is not known to be a fault, nor that one is over.
+            // This shows neither a fault nor that one is over.
             if channel.plugged().is_none() {
                 faults.note(&channel.name, Some(reading).filter(|reading| reading.is_fault()), at);
             }
@@ -164,7 +164,7 @@ impl Stream {
         self.set
     }
 
-    /// A repetition time was set; `None` if nobody knows any more which.
+    /// A repetition time was set; `None` if it is not known any more which.
     pub fn set_period(&mut self, period: Option<Duration>) {
         if self.set != period {
             self.set = period;
@@ -202,7 +202,7 @@ impl Stream {
     fn take_gap(&mut self, gap: Duration) {
         let unlike = |one: Duration, other: Duration| one > other * 2 || other > one * 2;
         if self.median().is_some_and(|usual| unlike(gap, usual)) {
-            // One of another length is an outage or a row that came late, a second like it is another setting.
+            // A single unusual gap is an outage or a late row; a second one like it shows another setting.
             let Some(before) = self.odd.replace(gap).filter(|before| !unlike(*before, gap)) else { return };
             self.gaps.clear();
             self.gaps.push_back(before);
@@ -238,7 +238,7 @@ impl Stream {
         }
     }
 
-    /// Starts minimum, maximum and mean of every channel anew.
+    /// Restarts minimum, maximum and mean of every channel.
     pub fn restart_extremes(&mut self) {
         for channel in &mut self.channels {
             let value = channel.reading.value().filter(|_| channel.plugged().is_none());
@@ -348,7 +348,7 @@ impl Channel {
         first.into_iter().chain(self.history.front().map(|sample| sample.at)).min()
     }
 
-    /// What the channel read at a moment: its newest sample not behind it.
+    /// What the channel read at a moment: its newest sample that is not later.
     pub fn at(&self, moment: Instant) -> Option<(Instant, Reading)> {
         let behind = self.history.partition_point(|sample| sample.at <= moment);
         let sample = behind.checked_sub(1).and_then(|place| self.history.get(place))?;
@@ -357,7 +357,7 @@ impl Channel {
 }
 
 impl Sample {
-    /// What it is in a curve: behind a gap, the gap first.
+    /// What it is in a curve: after a gap, the gap first.
     fn points(&self) -> impl Iterator<Item = (Instant, Option<f64>)> {
         let gap = self.after_gap.then_some((self.at, None));
         gap.into_iter().chain([(self.at, self.reading.value())])
@@ -412,7 +412,7 @@ impl Faults {
         }
     }
 
-    /// One that lasts is not forgotten, however old: it would begin anew with the next row. There is one of a channel.
+    /// A fault that lasts is not forgotten, however old: it would begin again with the next row. A channel has one at most.
     fn forget_oldest(&mut self) {
         if self.kept.len() > KEPT_FAULTS
             && let Some(oldest) = self.kept.iter().rposition(|fault| fault.until.is_some())
@@ -442,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_of_a_channel_that_is_gone_is_not_there_for_ever() {
+    fn a_fault_ends_with_its_channel() {
         let mut monitor = Monitor::default();
         row(&mut monitor, 1000, with_first(Reading::Open));
         let fewer = Row { source: Source::FieldValue, readings: vec![Reading::Value(1.0)] };
@@ -502,7 +502,7 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_has_a_gap_where_rows_did_not_come_and_where_the_unit_was_away() {
+    fn a_curve_has_a_gap_where_rows_are_missing_and_where_the_unit_was_away() {
         let mut monitor = Monitor::default();
         for millis in [0, 1000, 2000, 3000, 5400, 7901, 8900, 9900] {
             if millis == 9900 {
@@ -516,7 +516,7 @@ mod tests {
         };
         let channel = &monitor.stream.channels[0];
         let all = channel.samples(Instant::ZERO, Instant::from_millis(9900));
-        assert_eq!(gaps(all), [7901, 9900], "2.4 periods are none, 2.501 are one");
+        assert_eq!(gaps(all), [7901, 9900], "2.4 periods are not a gap, 2.501 are");
         assert_eq!(gaps(channel.newest(2).collect()), [9900]);
     }
 
@@ -526,7 +526,7 @@ mod tests {
         let second = Some(Duration::from_secs(1));
         for millis in [0, 1000, 2000, 3000, 33_000, 34_000] {
             row(&mut monitor, millis, with_first(Reading::Value(20.0)));
-            assert_eq!(monitor.stream.period(), second.filter(|_| millis > 0), "{millis}: an outage is no period");
+            assert_eq!(monitor.stream.period(), second.filter(|_| millis > 0), "{millis}: an outage is not a period");
         }
         for millis in [34_200, 34_400] {
             row(&mut monitor, millis, with_first(Reading::Value(20.0)));

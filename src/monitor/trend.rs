@@ -1,6 +1,6 @@
 //! Hours of a channel's values in bounded memory.
 //!
-//! The newest samples are kept as they came ([`super::stream::KEPT_SAMPLES`]); behind them stands this: the extremes and
+//! The newest samples are kept as they came ([`super::stream::KEPT_SAMPLES`]). This keeps the rest: the extremes and
 //! the mean of equal stretches of time. When there is no room for another stretch, each two become one, so that the
 //! whole time since the beginning is always there, at no less than half of [`MOST_STRETCHES`] points.
 
@@ -15,7 +15,7 @@ const FIRST_LENGTH: Duration = Duration::from_millis(250);
 #[derive(Debug, Default)]
 pub struct Trend {
     begun: Option<Instant>,
-    /// Length of a stretch is [`FIRST_LENGTH`] doubled so often.
+    /// The length of a stretch is [`FIRST_LENGTH`], doubled this often.
     doublings: u32,
     stretches: Vec<Stretch>,
 }

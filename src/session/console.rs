@@ -1,11 +1,12 @@
-//! Talks with the firmware: switching the stream (T).
+//! Talks with the firmware: switching the stream on and off (T).
 //!
-//! Questions are answered by what they offer. Where a question is not understood the job leaves the dialogue, with
-//! Enter and no answer, and says what it was waiting for; it never guesses. A unit may take the Enter for a value that it
-//! offers itself, and stream: then it is switched off again.
+//! Questions are answered by what they offer. A question that is not understood is left with Enter and no answer, and the
+//! job says what it was waiting for; it never guesses. A unit may take the Enter for a value of its own, and stream: then
+//! the stream is switched off again.
 
 use super::event::{Awaited, Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
+use super::leaving::Leaving;
 use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
@@ -13,29 +14,36 @@ use crate::wire::{Message, Prompt, SourceKeys, Text, visible};
 
 /// How long a unit may take to ask or to answer.
 pub(super) const ANSWER: Duration = Duration::from_millis(1500);
-/// How long a single key may go without a reaction before Enter is sent behind it.
+/// How long a single key may go without a reaction before Enter is sent after it.
 const KEY_ALONE: Duration = Duration::from_millis(400);
 /// How long after T a line without a question means "switched off".
 pub(super) const NO_QUESTION: Duration = Duration::from_millis(400);
-/// How long after T rows may still come that were on their way: those an adapter and the unit's own buffer held.
+/// How long after T rows may still arrive that were on their way: those an adapter and the unit's own buffer held.
 pub(super) const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
 /// How often T is pressed to switch the stream off: it may be lost on the line.
 const MOST_TOGGLES: u32 = 3;
-/// How long behind the repetition time the unit may refuse it, or ask for it once more.
+/// How long after the repetition time the unit may refuse it, or ask for it once more.
 const TAKEN: Duration = Duration::from_millis(600);
 /// No values come for 3 s after power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO): rows may take that long.
 pub(super) const FIRST_VALUES: Duration = Duration::from_secs(6);
-/// How long behind a question that was left its unit may ask another one, or begin to stream all the same.
+/// How long after a question has been left the unit may ask another one, or begin to stream all the same.
 const LEFT: Duration = Duration::from_millis(2500);
-/// Questions that are left one behind the other.
-const MOST_LEFT: u32 = 3;
+/// What leaves a question of the stream's.
+const ENTER: &[u8] = b"\r";
+
+const ON_CANCELLED: Outcome = Outcome::Cancelled(Job::StreamOn);
+const OFF_CANCELLED: Outcome = Outcome::Cancelled(Job::StreamOff);
 
 /// Switches the stream on.
 #[derive(Debug)]
 pub(super) struct StreamOn {
     source: Source,
     period: Duration,
+    /// The first T has switched off a stream that was on.
     was_on: bool,
+    /// A stream was known to be on when the job began.
+    found_on: bool,
+    is_cancelled: bool,
     stage: OnStage,
     deadline: Option<Instant>,
     heard: Option<Span>,
@@ -43,24 +51,33 @@ pub(super) struct StreamOn {
     question: Option<String>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 enum OnStage {
-    /// T is out: a question says that the stream was off, its absence that it was on and is off now.
+    /// T has been sent: a question says that the stream was off, its absence that it was on and is off now.
     Toggled,
-    /// The key for the source is out.
+    /// The key for the source has been sent.
     Source { enter_sent: bool },
-    /// The period is out; whether the unit has asked for it once more.
+    /// The period has been sent; whether the unit has asked for it once more.
     Period { again: bool },
     /// Nobody has refused it: the stream is on, and its first row proves that.
     Row,
-    /// A question was not understood and has been left, as this many before it.
-    Left { awaited: Awaited, questions: u32, heard: Option<Span> },
+    /// A question was not understood, or is not wanted any more.
+    Leaving(Leaving),
 }
 
 impl StreamOn {
     pub(super) fn new(source: Source, period: Duration) -> Self {
-        let stage = OnStage::Toggled;
-        StreamOn { source, period, was_on: false, stage, deadline: None, heard: None, question: None }
+        StreamOn {
+            source,
+            period,
+            was_on: false,
+            found_on: false,
+            is_cancelled: false,
+            stage: OnStage::Toggled,
+            deadline: None,
+            heard: None,
+            question: None,
+        }
     }
 
     fn toggle(&mut self, desk: &mut Desk<'_>) {
@@ -71,7 +88,8 @@ impl StreamOn {
 
     fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.heard = Some(text.span);
-        match (self.stage, message) {
+        match (&mut self.stage, message) {
+            (OnStage::Toggled, Message::Prompt(_)) if self.is_cancelled => self.leave(desk, ON_CANCELLED),
             (OnStage::Toggled, Message::Prompt(Prompt::Source(keys))) => {
                 desk.send(key_for(self.source, *keys).encode_utf8(&mut [0; 4]).as_bytes());
                 self.stage = OnStage::Source { enter_sent: false };
@@ -83,51 +101,57 @@ impl StreamOn {
                 self.stage = OnStage::Period { again: false };
                 self.deadline = Some(desk.now + TAKEN);
             }
-            (OnStage::Period { .. }, Message::Prompt(Prompt::Period)) => {
-                self.stage = OnStage::Period { again: true };
-            }
+            (OnStage::Period { again }, Message::Prompt(Prompt::Period)) => *again = true,
             (OnStage::Row, Message::Prompt(Prompt::Period)) => {
-                desk.leave_dialogue();
-                return Some(self.refused(desk));
+                let refused = self.refused(desk);
+                self.leave(desk, refused);
             }
-            (OnStage::Toggled, Message::Prompt(_)) => return self.give_up(desk),
+            (OnStage::Toggled, Message::Prompt(_)) => return self.give_up(Awaited::SourceQuestion, desk),
             // It has taken the Enter for its own values. One that streamed before does so again, as it was found.
-            (OnStage::Left { .. }, Message::Row(_)) if !self.was_on => {
+            (OnStage::Leaving(leaving), Message::Row(_)) if !self.was_on => {
                 desk.send(b"t");
                 desk.facts.stream = None;
-                return Some(self.left());
+                return Some(leaving.then());
             }
+            (OnStage::Leaving(leaving), _) => leaving.heard(message),
             (OnStage::Toggled, Message::Row(_)) => {}
             (OnStage::Toggled, _) => {
                 let soon = desk.now + NO_QUESTION;
                 self.deadline = self.deadline.map(|deadline| deadline.min(soon));
             }
             (OnStage::Period { .. } | OnStage::Row, Message::Row(row)) if row.source == self.source => {
-                return Some(Outcome::StreamRuns { was_on: self.was_on });
+                return Some(self.ended(Outcome::StreamRuns { was_on: self.was_on }));
             }
-            (OnStage::Period { .. } | OnStage::Row, Message::Refusal) => return Some(self.refused(desk)),
+            // It may ask once more now.
+            (OnStage::Period { .. } | OnStage::Row, Message::Refusal) => {
+                let refused = self.refused(desk);
+                self.stage = OnStage::Leaving(Leaving::if_asked(ENTER, LEFT, desk.now + NO_QUESTION, refused));
+            }
             _ => {}
         }
         None
     }
 
     fn tick(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        match self.stage {
-            OnStage::Toggled if desk.pending.is_none() && !self.was_on => {
+        match &mut self.stage {
+            // It was on. To set it, or to have it as it was, it is switched on again.
+            OnStage::Toggled if desk.pending.is_none() && !self.was_on && (self.found_on || !self.is_cancelled) => {
                 self.was_on = true;
                 self.toggle(desk);
                 None
             }
-            OnStage::Source { enter_sent: false } => {
-                desk.send(b"\r");
-                self.stage = OnStage::Source { enter_sent: true };
+            OnStage::Source { enter_sent: enter_sent @ false } => {
+                desk.send(ENTER);
+                *enter_sent = true;
                 self.deadline = Some(desk.now + ANSWER);
                 None
             }
             OnStage::Period { again: true } if desk.pending.is_some() => {
-                desk.leave_dialogue();
-                Some(self.refused(desk))
+                let refused = self.refused(desk);
+                self.leave(desk, refused);
+                None
             }
+            OnStage::Period { .. } if self.is_cancelled => Some(self.ended(Outcome::Done(Job::StreamOn))),
             OnStage::Period { .. } => {
                 desk.facts.stream = Some(self.source);
                 desk.events.push_back(Event::FactsChanged);
@@ -135,14 +159,18 @@ impl StreamOn {
                 self.deadline = Some(desk.now + FIRST_VALUES + self.period * 2);
                 None
             }
-            OnStage::Left { awaited, questions, heard } if desk.pending.is_some() && questions < MOST_LEFT => {
-                desk.leave_dialogue();
-                self.stage = OnStage::Left { awaited, questions: questions + 1, heard };
-                self.deadline = Some(desk.now + LEFT);
+            OnStage::Leaving(leaving) => leaving.time_is_up(desk),
+            OnStage::Toggled => self.give_up(Awaited::SourceQuestion, desk),
+            OnStage::Source { .. } => self.give_up(Awaited::PeriodQuestion, desk),
+            OnStage::Row => {
+                desk.facts.stream = None;
+                let no_answer = self.no_answer(Awaited::Row, desk);
+                if desk.pending.is_none() {
+                    return Some(no_answer);
+                }
+                self.leave(desk, no_answer);
                 None
             }
-            OnStage::Left { .. } => Some(self.left()),
-            OnStage::Toggled | OnStage::Source { enter_sent: true } | OnStage::Row => self.give_up(desk),
         }
     }
 
@@ -154,40 +182,45 @@ impl StreamOn {
         Outcome::Refused { job: Job::StreamOn, reason, heard: self.heard }
     }
 
-    /// Whether the unit has a question open.
-    fn is_asked(&self) -> bool {
-        !matches!(self.stage, OnStage::Period { again: false } | OnStage::Row | OnStage::Left { .. })
+    fn no_answer(&self, awaited: Awaited, desk: &Desk<'_>) -> Outcome {
+        let heard = desk.pending.map(|text| text.span).or(self.heard);
+        Outcome::NoAnswer { job: Job::StreamOn, awaited, heard }
     }
 
-    fn give_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let awaited = match self.stage {
-            OnStage::Source { .. } => Awaited::PeriodQuestion,
-            OnStage::Toggled | OnStage::Left { .. } => Awaited::SourceQuestion,
-            OnStage::Period { .. } | OnStage::Row => {
-                desk.facts.stream = None;
-                Awaited::Row
-            }
-        };
-        let heard = desk.pending.map(|text| text.span).or(self.heard);
-        if !self.is_asked() {
-            return Some(Outcome::NoAnswer { job: Job::StreamOn, awaited, heard });
+    /// Leaves what the unit asks, if it asks anything. Nothing more is awaited of a unit that has said nothing at all.
+    fn give_up(&mut self, awaited: Awaited, desk: &mut Desk<'_>) -> Option<Outcome> {
+        let no_answer = self.no_answer(awaited, desk);
+        if desk.pending.is_none() && self.heard.is_none() {
+            desk.leave_dialogue();
+            return Some(self.ended(no_answer));
         }
-        desk.leave_dialogue();
-        self.stage = OnStage::Left { awaited, questions: 1, heard };
-        if heard.is_none() {
-            return Some(self.left());
-        }
-        self.deadline = Some(desk.now + LEFT);
+        self.leave(desk, no_answer);
         None
     }
 
-    /// How it ended, of a question that was left.
-    fn left(&self) -> Outcome {
-        let (awaited, heard) = match self.stage {
-            OnStage::Left { awaited, heard, .. } => (awaited, heard),
-            _ => (Awaited::SourceQuestion, self.heard),
-        };
-        Outcome::NoAnswer { job: Job::StreamOn, awaited, heard }
+    fn leave(&mut self, desk: &mut Desk<'_>, then: Outcome) {
+        self.stage = OnStage::Leaving(Leaving::begin(ENTER, LEFT, desk, self.ended(then)));
+    }
+
+    fn ended(&self, outcome: Outcome) -> Outcome {
+        if self.is_cancelled { ON_CANCELLED } else { outcome }
+    }
+
+    fn cancel(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.is_cancelled = true;
+        match &mut self.stage {
+            // What the unit makes of what has been sent shows within a moment.
+            OnStage::Toggled | OnStage::Period { .. } => None,
+            OnStage::Row if desk.pending.is_none() => Some(ON_CANCELLED),
+            OnStage::Source { .. } | OnStage::Row => {
+                self.leave(desk, ON_CANCELLED);
+                None
+            }
+            OnStage::Leaving(leaving) => {
+                leaving.end_as(ON_CANCELLED);
+                None
+            }
+        }
     }
 }
 
@@ -195,24 +228,23 @@ impl Work for StreamOn {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
             Signal::Begin => {
+                self.found_on = desk.facts.stream.is_some();
                 self.toggle(desk);
                 None
             }
             Signal::Heard(text, message) => self.heard(text, message, desk),
-            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
+            Signal::Tick if self.deadline().is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
-            Signal::Cancel => {
-                if self.is_asked() {
-                    desk.leave_dialogue();
-                }
-                Some(Outcome::Cancelled(Job::StreamOn))
-            }
-            Signal::LinkLost => Some(Outcome::Cancelled(Job::StreamOn)),
+            Signal::Cancel => self.cancel(desk),
+            Signal::LinkLost => Some(ON_CANCELLED),
         }
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.deadline
+        match &self.stage {
+            OnStage::Leaving(leaving) => Some(leaving.due()),
+            _ => self.deadline,
+        }
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {
@@ -224,87 +256,132 @@ impl Work for StreamOn {
     }
 }
 
-/// Switches the stream off. Silence alone does not show that it is: a unit without power is silent as well.
+/// Switches the stream off. Silence alone does not show that it is off: a unit without power is silent as well.
 #[derive(Debug, Default)]
 pub(super) struct StreamOff {
+    stage: OffStage,
     toggled_at: Instant,
     toggles: u32,
-    /// Somebody is there: something has come since the first T.
+    /// Something has come since the first T: a unit is there.
     heard: bool,
-    /// The menu has been asked for, to see whether somebody is.
-    asked: bool,
+    is_cancelled: bool,
     deadline: Option<Instant>,
+}
+
+#[derive(Debug, Default)]
+enum OffStage {
+    /// T has been sent.
+    #[default]
+    Toggled,
+    /// Nothing has come. The menu has been asked for, to see whether a unit is there.
+    AskedMenu,
+    /// T has opened a question.
+    Leaving(Leaving),
 }
 
 impl StreamOff {
     fn toggle(&mut self, desk: &mut Desk<'_>) {
         desk.send(b"t");
+        self.stage = OffStage::Toggled;
         self.toggled_at = desk.now;
         self.toggles += 1;
         self.deadline = Some(desk.now + ANSWER);
     }
+
+    fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.heard = true;
+        match (&mut self.stage, message) {
+            (OffStage::Toggled | OffStage::AskedMenu, Message::Prompt(_)) => {
+                desk.facts.stream = None;
+                self.leave(desk, Outcome::Done(Job::StreamOff));
+            }
+            (OffStage::Toggled, Message::Row(_)) if desk.now < self.toggled_at + ROWS_ON_THEIR_WAY => {}
+            // The key was lost, or the Enter that left the question has switched the stream on.
+            (OffStage::Leaving(_), Message::Row(_)) if self.toggles < MOST_TOGGLES => self.toggle(desk),
+            (OffStage::Leaving(leaving), Message::Row(_)) if !self.is_cancelled => {
+                leaving.end_as(still_on(Some(text.span)));
+            }
+            (OffStage::Toggled | OffStage::AskedMenu, Message::Row(_)) => {
+                if self.is_cancelled || self.toggles == MOST_TOGGLES {
+                    return Some(self.ended(still_on(Some(text.span))));
+                }
+                self.toggle(desk);
+            }
+            (OffStage::Leaving(leaving), _) => leaving.heard(message),
+            (OffStage::Toggled | OffStage::AskedMenu, _) => {
+                let soon = desk.now + NO_QUESTION;
+                self.deadline = self.deadline.map(|deadline| deadline.min(soon));
+            }
+        }
+        None
+    }
+
+    fn tick(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match (&mut self.stage, desk.pending) {
+            (OffStage::Leaving(leaving), _) => leaving.time_is_up(desk),
+            (_, Some(text)) => {
+                let span = text.span;
+                self.leave(desk, still_on(Some(span)));
+                None
+            }
+            (_, None) if self.heard => {
+                desk.facts.stream = None;
+                Some(self.ended(Outcome::Done(Job::StreamOff)))
+            }
+            (OffStage::Toggled, None) if self.is_cancelled => {
+                desk.leave_dialogue();
+                Some(self.ended(still_on(None)))
+            }
+            (OffStage::Toggled, None) => {
+                desk.send(b"m");
+                self.stage = OffStage::AskedMenu;
+                self.deadline = Some(desk.now + ANSWER);
+                None
+            }
+            (OffStage::AskedMenu, None) => Some(self.ended(still_on(None))),
+        }
+    }
+
+    fn leave(&mut self, desk: &mut Desk<'_>, then: Outcome) {
+        self.stage = OffStage::Leaving(Leaving::begin(ENTER, LEFT, desk, self.ended(then)));
+    }
+
+    fn ended(&self, outcome: Outcome) -> Outcome {
+        if self.is_cancelled { OFF_CANCELLED } else { outcome }
+    }
+}
+
+fn still_on(heard: Option<Span>) -> Outcome {
+    Outcome::NoAnswer { job: Job::StreamOff, awaited: Awaited::StreamOff, heard }
 }
 
 impl Work for StreamOff {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
-        self.heard |= matches!(signal, Signal::Heard(..));
         match signal {
             Signal::Begin => {
                 self.toggle(desk);
                 None
             }
-            // A question: it was off already, and shall stay so.
-            Signal::Heard(_, Message::Prompt(_)) => {
-                desk.leave_dialogue();
-                desk.facts.stream = None;
-                Some(Outcome::Done(Job::StreamOff))
-            }
-            Signal::Heard(_, Message::Row(_)) if desk.now < self.toggled_at + ROWS_ON_THEIR_WAY => None,
-            Signal::Heard(_, Message::Row(_)) if self.toggles < MOST_TOGGLES => {
-                self.toggle(desk);
-                None
-            }
-            Signal::Heard(text, Message::Row(_)) => {
-                let awaited = Awaited::StreamOff;
-                Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: Some(text.span) })
-            }
-            Signal::Heard(..) => {
-                let soon = desk.now + NO_QUESTION;
-                self.deadline = self.deadline.map(|deadline| deadline.min(soon));
-                None
-            }
-            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => match desk.pending {
-                Some(text) => {
-                    desk.leave_dialogue();
-                    let awaited = Awaited::StreamOff;
-                    Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: Some(text.span) })
-                }
-                None if self.heard => {
-                    desk.facts.stream = None;
-                    Some(Outcome::Done(Job::StreamOff))
-                }
-                None if !self.asked => {
-                    desk.send(b"m");
-                    self.asked = true;
-                    self.deadline = Some(desk.now + ANSWER);
-                    None
-                }
-                None => {
-                    let awaited = Awaited::StreamOff;
-                    Some(Outcome::NoAnswer { job: Job::StreamOff, awaited, heard: None })
-                }
-            },
+            Signal::Heard(text, message) => self.heard(text, message, desk),
+            Signal::Tick if self.deadline().is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
+            // What T has done shows within a moment.
             Signal::Cancel => {
-                desk.leave_dialogue();
-                Some(Outcome::Cancelled(Job::StreamOff))
+                self.is_cancelled = true;
+                if let OffStage::Leaving(leaving) = &mut self.stage {
+                    leaving.end_as(OFF_CANCELLED);
+                }
+                None
             }
-            Signal::LinkLost => Some(Outcome::Cancelled(Job::StreamOff)),
+            Signal::LinkLost => Some(OFF_CANCELLED),
         }
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.deadline
+        match &self.stage {
+            OffStage::Leaving(leaving) => Some(leaving.due()),
+            _ => self.deadline,
+        }
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {

@@ -16,6 +16,7 @@ mod hearing;
 mod identify;
 mod job;
 mod keys;
+mod leaving;
 mod overheard;
 mod pages;
 mod password;

@@ -12,7 +12,7 @@ use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::{LoaderText, MenuKey, Message};
 
-/// How soon behind a walk that has left the view another one begins that reads what was lost on the line.
+/// How soon after a walk has left the view another one begins to read what was lost on the line.
 const ANOTHER_WALK: Duration = Duration::from_secs(2);
 
 /// Reads the entries of the object dictionary that somebody walked through.
@@ -21,13 +21,13 @@ pub(super) struct Dictionary {
     collector: Collector,
     /// When the last entry came.
     at: Instant,
-    /// The menu came back behind entries, and since when it has been there: the walk was ended in order.
+    /// When the menu came back after entries: the walk was ended in order.
     left: Option<Instant>,
-    /// What was read before the unit started anew or its link was lost, and when its last entry came.
+    /// What was read before the unit restarted or its link was lost, and when its last entry came.
     before: Option<(Instant, DictionaryReading)>,
     /// Whether the view is open, once a key has shown that the recording holds keys.
     viewing: Option<bool>,
-    /// A key that has the menu printed was sent then: what says the product's name is no banner.
+    /// When a key was sent that prints the menu: what shows the product's name is then not a banner.
     asked_at: Option<Instant>,
     heard: Option<Span>,
 }
@@ -51,8 +51,8 @@ impl Dictionary {
         self.collector.has_all() || (self.left.is_some() && self.collector.product.is_none())
     }
 
-    /// The same where only the end of the recording tells. One that had everything goes before what has come of a later
-    /// one.
+    /// The same where the outcome has to wait for the end of the recording. A walk that had everything counts for more than
+    /// part of a later one.
     fn keep(&mut self) {
         if let Some(ended) = self.break_off() {
             let is_better =
@@ -61,7 +61,7 @@ impl Dictionary {
         }
     }
 
-    /// Whether the unit shows by this that it has started anew. In the view an object may be called like the product.
+    /// Whether this shows that the unit has restarted. In the view an object may have the product's name.
     fn is_start(&self, message: &Message, now: Instant) -> bool {
         match message {
             Message::Loader(LoaderText::Header | LoaderText::Waiting) | Message::FirstStart => true,
@@ -74,12 +74,12 @@ impl Dictionary {
         }
     }
 
-    /// When nobody walks through the view once more for the lines that were lost: who does begins at once.
+    /// When it is too late for a second walk for the lines that were lost: that one begins at once.
     fn due(&self) -> Option<Instant> {
         self.left.map(|left| left + ANOTHER_WALK)
     }
 
-    /// Whether this ends the walk under way, so that what follows is none of it.
+    /// Whether this ends the walk under way, so that what follows does not belong to it.
     fn is_broken_by(&self, signal: Signal<'_>, now: Instant) -> bool {
         match signal {
             Signal::LinkLost => true,
@@ -209,7 +209,7 @@ impl Work for Diagnostics {
     }
 }
 
-/// Everything that goes by: dictionaries that were walked through, pages that came.
+/// Everything that goes by: walks through the dictionary, pages of diagnostics.
 pub(super) struct Everything {
     dictionary: Dictionary,
     diagnostics: Diagnostics,
@@ -264,7 +264,7 @@ mod tests {
     use crate::endpoint::Endpoint;
     use crate::session::{Command, Session};
 
-    /// What a recording has to tell: what was sent (`>`), remarks (`!`) and what came, each so many milliseconds behind the
+    /// What a recording has to tell: what was sent (`>`), remarks (`!`) and what came, each with the milliseconds since the
     /// one before.
     type Story<'a> = &'a [(u64, &'a str)];
 
@@ -293,8 +293,8 @@ mod tests {
         format!("{}{}", entries.join(" "), if reading.is_complete() { "" } else { " ..." })
     }
 
-    /// The dictionaries that were walked through, to whoever listens to everything: when the last entry came, which ones,
-    /// and whether that is all; and the one that the job for it gives.
+    /// The walks through the dictionary as the job that listens to everything reports them: when the last entry came, which
+    /// ones, and whether that is all; and the reading that the job for the dictionary gives.
     fn readings(story: Story<'_>) -> (Vec<(u64, String)>, Option<String>) {
         let (events, _) = played(story, Command::Overhear);
         let overheard = events.iter().filter_map(|event| match event {
@@ -318,7 +318,7 @@ mod tests {
     const BANNER: &str = "AXTC4CO V1.1.0\r\n";
 
     #[test]
-    fn a_walk_is_over_when_its_menu_is_back_and_one_behind_it_at_once_belongs_to_it() {
+    fn a_walk_is_over_when_its_menu_is_back_and_one_right_after_it_belongs_to_it() {
         let walk = [(0, ">v"), (50, FIRST), (400, ">\r"), (50, SECOND), (400, ">x"), (50, MENU)];
         assert_eq!(readings(&walk), (vec![(500, "6126:01 6126:02".into())], Some("6126:01 6126:02".into())));
         let again = [&walk[..], &[(1_900, ">v"), (50, THIRD), (400, ">x"), (50, MENU)]].concat();
@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn an_entry_that_is_called_like_the_product_is_no_banner() {
+    fn an_entry_with_the_products_name_is_not_a_banner() {
         let story = [
             (0, ">v"),
             (50, FIRST),
@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_looks_for_what_is_not_there_is_told_what_was_there_last() {
+    fn where_nothing_is_found_the_last_thing_heard_is_reported() {
         let (events, _) =
             played(&[(0, "hello 5\r\n"), (50, "AXTC4CO V1.1.0\r\n")], Command::Diagnostics { pages: None });
         let Some(Event::Finished(Outcome::NoAnswer { awaited: Awaited::Page, heard, .. })) = events.last() else {

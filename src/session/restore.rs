@@ -2,26 +2,31 @@
 //! 4.1.2).
 //!
 //! Only the banner shows that the unit has reset itself. Many a menu names product and version as a banner does, and a
-//! unit that restores nothing may print its menu behind the Yes; so the menu is asked for once more, and only what is more
-//! than that is a banner.
+//! unit that restores nothing may print its menu after the Yes; so the menu is requested afterwards, and only what it does
+//! not show is a banner.
 
 use std::collections::BTreeSet;
 
 use super::console::ANSWER;
 use super::event::{Awaited, Job, Outcome};
 use super::job::{Desk, Signal, Work};
+use super::leaving::Leaving;
 use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::{Message, Prompt, Text, complains, visible};
 
 /// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
 const RESET: Duration = Duration::from_secs(10);
-/// Silence that ends a banner, or a menu: a unit that starts may pause between its lines.
+/// Silence that ends a banner, a menu or a refusal: a unit that starts may pause between its lines.
 const QUIET: Duration = Duration::from_millis(1000);
-/// How long either may go on: other text may come without end.
+/// How long a banner or a menu may go on: other text may come without end.
 const LONGEST: Duration = Duration::from_secs(5);
-/// Different lines that are looked at of a banner and of a menu.
+/// Different lines of a banner and of a menu that are looked at.
 const MOST_LINES: usize = 500;
+/// How often Yes is given: a unit may ask whether the user is sure.
+const MOST_YES: u32 = 2;
+/// What leaves a question. A bare Enter is a Yes to many of them: `[Y/n]`.
+const NO: &[u8] = b"No\r";
 
 /// The job.
 #[derive(Debug, Default)]
@@ -31,26 +36,31 @@ pub(super) struct RestoreDefaults {
     /// When the text that is being heard has to have ended.
     ends: Instant,
     heard: Option<Span>,
-    /// Where in the record the answer to the Yes begins.
+    /// How often Yes has been given.
+    confirmed: u32,
+    is_cancelled: bool,
+    /// Where in the record the answer to the last Yes begins.
     from: u64,
     /// What the unit says before its banner that sounds like a failure.
     failure: Option<(String, Span)>,
-    /// Lines since the Yes, and lines of the menu behind them: their letters.
+    /// The letters of the lines since the last Yes, and of those of the menu after them.
     since: BTreeSet<String>,
     menu: BTreeSet<String>,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Debug, Default)]
 enum Stage {
-    /// D is out.
+    /// D has been sent.
     #[default]
     Asked,
-    /// Yes is out.
+    /// Yes has been sent.
     Confirmed,
     /// A product has been named: the banner goes on, or a menu does.
     Banner,
-    /// M is out, to know what is no banner.
+    /// M has been sent, to know what is not a banner.
     Menu,
+    /// A question is not answered with Yes.
+    Leaving(Leaving),
 }
 
 impl RestoreDefaults {
@@ -60,24 +70,33 @@ impl RestoreDefaults {
         self.deadline = Some(desk.now + within);
     }
 
-    fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
+    fn confirm(&mut self, desk: &mut Desk<'_>) {
+        desk.send(b"Yes\r");
+        self.confirmed += 1;
+        self.from = desk.received;
+        self.failure = None;
+        self.since.clear();
+        self.listen(Stage::Confirmed, RESET, desk);
+    }
+
+    fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) {
         self.heard = Some(text.span);
-        match (self.stage, message) {
-            (Stage::Asked, Message::Prompt(Prompt::ConfirmDefaults)) => {
-                desk.send(b"Yes\r");
-                self.from = desk.received;
-                self.listen(Stage::Confirmed, RESET, desk);
-            }
+        match (&mut self.stage, message) {
+            (Stage::Leaving(leaving), _) => leaving.heard(message),
+            (Stage::Asked, Message::Prompt(Prompt::ConfirmDefaults)) => self.confirm(desk),
+            (Stage::Asked, Message::Refusal) => self.failed(&text.text, text.span, desk),
             (Stage::Asked, _) | (_, Message::Row(_)) => {}
-            (Stage::Confirmed, Message::Refusal) => {
-                return Some(refused("the unit did not restore its defaults".into(), self.heard));
-            }
+            (Stage::Confirmed, Message::Refusal) => self.failed(&text.text, text.span, desk),
             (Stage::Confirmed, _) => {
-                // The question may stand before it, unless a row of the stream has parted them.
+                // The question may come before it, unless a row of the stream has parted them.
                 let question = self.from.saturating_sub(text.span.start) as usize;
                 let said = text.text.get(question..).filter(|said| !said.is_empty()).unwrap_or(&text.text);
-                if *message == Message::Text && tells_of_failure(said) {
-                    self.failure.get_or_insert((visible::line(said.trim().as_bytes()), text.span));
+                match message {
+                    Message::Prompt(Prompt::ConfirmDefaults) if self.asks_again(said) => return self.confirm(desk),
+                    Message::Text if tells_of_failure(said) => {
+                        self.failure.get_or_insert((quoted(said), text.span));
+                    }
+                    _ => {}
                 }
                 note(&mut self.since, said);
                 if matches!(message, Message::Software(name) if name.product.is_some()) {
@@ -93,47 +112,109 @@ impl RestoreDefaults {
                 self.deadline = Some((desk.now + QUIET).min(self.ends));
             }
         }
-        None
+    }
+
+    /// Whether this asks for another Yes that the user would give. The echo of the first one, or a sentence with a yes in
+    /// it, is not a question, and the letters of a Yes are keys of the menu.
+    fn asks_again(&self, said: &str) -> bool {
+        let is_question = said.trim_end().ends_with([':', '?', '>', ')', ']']);
+        is_question && self.confirmed < MOST_YES && self.failure.is_none() && !self.is_cancelled
+    }
+
+    /// The unit says no, and may have something to ask after that.
+    fn failed(&mut self, said: &str, span: Span, desk: &Desk<'_>) {
+        self.failure.get_or_insert((quoted(said), span));
+        let soon = desk.now + QUIET;
+        self.deadline = self.deadline.map(|deadline| deadline.min(soon));
     }
 
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let no_answer = |awaited, heard| Some(Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard });
+        let is_silent = self.heard.is_none() && desk.pending.is_none();
         let failure = self.failure.take();
-        match self.stage {
-            Stage::Asked => {
-                let heard = desk.pending.map(|text| text.span).or(self.heard);
-                self.decline(desk);
-                no_answer(Awaited::DefaultsQuestion, heard)
+        match &mut self.stage {
+            Stage::Asked if is_silent => {
+                desk.send(NO);
+                Some(self.no_answer(Awaited::DefaultsQuestion, desk))
             }
-            Stage::Confirmed | Stage::Banner if failure.is_some() => {
-                let (said, span) = failure.unzip();
-                let reason = format!("behind the Yes the unit says \"{}\"", said.unwrap_or_default());
-                Some(refused(reason, span))
-            }
-            Stage::Confirmed => no_answer(Awaited::Banner, desk.pending.map(|text| text.span).or(self.heard)),
-            Stage::Banner => {
-                desk.send(b"m");
-                self.listen(Stage::Menu, ANSWER, desk);
-                None
-            }
+            Stage::Asked => match failure {
+                Some((said, span)) => {
+                    let reason = format!("the unit does not ask for the Yes, but says \"{said}\"");
+                    self.end_without_question(refused(reason, span), desk)
+                }
+                // The line of a question may have an end.
+                None => {
+                    let no_answer = self.no_answer(Awaited::DefaultsQuestion, desk);
+                    self.leave(desk, no_answer);
+                    None
+                }
+            },
+            Stage::Confirmed if self.is_cancelled => self.end_without_question(CANCELLED, desk),
+            Stage::Confirmed | Stage::Banner => match failure {
+                Some((said, span)) => {
+                    let reason = format!("after the Yes the unit says \"{said}\"");
+                    self.end_without_question(refused(reason, span), desk)
+                }
+                None if matches!(self.stage, Stage::Banner) => {
+                    desk.send(b"m");
+                    self.listen(Stage::Menu, ANSWER, desk);
+                    None
+                }
+                None => {
+                    let no_answer = self.no_answer(Awaited::Banner, desk);
+                    self.end_without_question(no_answer, desk)
+                }
+            },
             Stage::Menu if self.since.is_subset(&self.menu) => Some(Outcome::DefaultsTaken),
             Stage::Menu => Some(Outcome::Done(Job::RestoreDefaults)),
+            Stage::Leaving(leaving) => leaving.time_is_up(desk),
         }
     }
 
-    /// Leaves a question that is not understood. A bare Enter is a Yes to many a question: `[Y/n]`.
-    fn decline(&self, desk: &mut Desk<'_>) {
-        if self.stage == Stage::Asked {
-            desk.send(b"No\r");
+    fn no_answer(&self, awaited: Awaited, desk: &Desk<'_>) -> Outcome {
+        let heard = desk.pending.map(|text| text.span).or(self.heard);
+        Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard }
+    }
+
+    /// Ends the job so once no question is open.
+    fn end_without_question(&mut self, outcome: Outcome, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if desk.pending.is_none() {
+            return Some(outcome);
         }
+        self.leave(desk, outcome);
+        None
+    }
+
+    fn leave(&mut self, desk: &mut Desk<'_>, then: Outcome) {
+        self.stage = Stage::Leaving(Leaving::begin(NO, ANSWER, desk, then));
+    }
+
+    fn cancel(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match &mut self.stage {
+            Stage::Asked => self.leave(desk, CANCELLED),
+            // Whether the unit asks once more shows within a moment.
+            Stage::Confirmed => {
+                self.is_cancelled = true;
+                let soon = desk.now + ANSWER;
+                self.deadline = self.deadline.map(|deadline| deadline.min(soon));
+            }
+            Stage::Banner | Stage::Menu => return Some(CANCELLED),
+            Stage::Leaving(leaving) => leaving.end_as(CANCELLED),
+        }
+        None
     }
 }
 
-fn refused(reason: String, heard: Option<Span>) -> Outcome {
-    Outcome::Refused { job: Job::RestoreDefaults, reason, heard }
+const CANCELLED: Outcome = Outcome::Cancelled(Job::RestoreDefaults);
+
+fn refused(reason: String, span: Span) -> Outcome {
+    Outcome::Refused { job: Job::RestoreDefaults, reason, heard: Some(span) }
 }
 
-/// Keeps a line by its letters: numbers in a menu may have changed since. The echo of what was sent is none.
+fn quoted(said: &str) -> String {
+    visible::line(said.trim().as_bytes())
+}
+
+/// Keeps a line by its letters: numbers in a menu may have changed since. The echo of what was sent is not kept.
 fn note(lines: &mut BTreeSet<String>, line: &str) {
     let letters: String = line.chars().filter(|letter| letter.is_alphabetic()).collect();
     if letters.len() > 1 && !letters.eq_ignore_ascii_case("yes") && lines.len() < MOST_LINES {
@@ -141,15 +222,15 @@ fn note(lines: &mut BTreeSet<String>, line: &str) {
     }
 }
 
-/// Whether a line behind the Yes tells that nothing has come of it: "Not done", "Restoring failed", "EEPROM write error".
-/// That errors have been cleared is none.
+/// Whether a line after the Yes tells that nothing has come of it: "Not done", "Restoring failed", "EEPROM write error".
+/// That errors have been cleared is not a failure.
 fn tells_of_failure(line: &str) -> bool {
     let lower = line.to_lowercase();
     let words: Vec<&str> =
         lower.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
     let clears = ["clear", "erase", "reset"].iter().any(|word| lower.contains(word));
     let done = ["done", "restored", "changed", "saved", "stored", "written", "successful", "ok", "possible", "reset"];
-    // "Do not switch off" is none.
+    // "Do not switch off" is not a failure.
     let is_not_done = |pair: &[&str]| pair[0] == "not" && done.contains(&pair[1]);
     let fails = |word: &&str| matches!(*word, "cannot" | "unable") || word.starts_with("fail");
     words.windows(2).any(is_not_done) || words.iter().any(fails) || (!clears && complains(line))
@@ -163,19 +244,22 @@ impl Work for RestoreDefaults {
                 self.listen(Stage::Asked, ANSWER, desk);
                 None
             }
-            Signal::Heard(text, message) => self.heard(text, message, desk),
-            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.time_is_up(desk),
-            Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
-            Signal::Cancel => {
-                self.decline(desk);
-                Some(Outcome::Cancelled(Job::RestoreDefaults))
+            Signal::Heard(text, message) => {
+                self.heard(text, message, desk);
+                None
             }
-            Signal::LinkLost => Some(Outcome::Cancelled(Job::RestoreDefaults)),
+            Signal::Tick if self.deadline().is_some_and(|deadline| deadline <= desk.now) => self.time_is_up(desk),
+            Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
+            Signal::Cancel => self.cancel(desk),
+            Signal::LinkLost => Some(CANCELLED),
         }
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.deadline
+        match &self.stage {
+            Stage::Leaving(leaving) => Some(leaving.due()),
+            _ => self.deadline,
+        }
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {

@@ -1,14 +1,14 @@
 //! A file that goes to the unit as it is, as a terminal program sends it.
 //!
 //! Its bytes go out as if typed, a little ahead of the line, under the same flow control and into the same record. Nobody
-//! knows what the unit makes of them: what is told is how much has left, and that is true at any moment.
+//! knows what the unit makes of them: what is reported is how much has left, and that is true at any moment.
 
 use super::event::{Event, FileEnd, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::time::{Duration, Instant};
 
-/// How long the unit may hold the file until the user is told what is waited for: writing a page of flash takes it some
-/// 30 ms, and who looks at a number that stands still wonders behind some seconds.
+/// How long the unit may hold the file before the user is told what is being waited for: writing a page of flash takes it
+/// some 30 ms, and a number that does not move for some seconds makes anybody wonder.
 const LONG_HOLD: Duration = Duration::from_secs(3);
 /// Bytes that wait for the line at most: some pieces, so that it never runs dry, and little to call back.
 const AHEAD: usize = 256;
@@ -18,9 +18,9 @@ pub(super) struct SendFile {
     bytes: Vec<u8>,
     /// Bytes handed to the transmitter.
     handed: usize,
-    /// Bytes that have left the line's queue, as last told.
+    /// Bytes that have left the line's queue, as last reported.
     told: usize,
-    /// The hold at hand has been told of.
+    /// The user has been told of the current hold.
     hold_told: bool,
     deadline: Option<Instant>,
 }
@@ -31,21 +31,21 @@ impl SendFile {
     }
 
     /// Bytes that have left. What waits in the queue is the file's last part: what was typed before goes first.
-    fn left(&self, desk: &Desk<'_>) -> usize {
+    fn sent(&self, desk: &Desk<'_>) -> usize {
         self.handed.saturating_sub(desk.transmitter.waiting())
     }
 
     fn go_on(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let left = self.left(desk);
-        if left != self.told {
-            self.told = left;
-            desk.events.push_back(Event::FileProgress { sent: left, total: self.bytes.len() });
+        let sent = self.sent(desk);
+        if sent != self.told {
+            self.told = sent;
+            desk.events.push_back(Event::FileProgress { sent, total: self.bytes.len() });
         }
-        if left == self.bytes.len() {
+        if sent == self.bytes.len() {
             // The last piece is let go; it needs its time on the line.
             let free_at = desk.transmitter.free_at();
             if free_at <= desk.now {
-                return Some(self.ended(FileEnd::Whole, left));
+                return Some(self.ended(FileEnd::Whole, sent));
             }
             self.deadline = Some(free_at);
             return None;
@@ -55,7 +55,7 @@ impl SendFile {
         desk.typed.extend_from_slice(&self.bytes[self.handed..end]);
         self.handed = end;
         self.deadline = match desk.transmitter.held_since() {
-            // The line asks for more as long as something waits; when the last piece has left nobody says so.
+            // The line asks for more as long as something waits, but does not say when the last piece has left.
             None => {
                 self.hold_told = false;
                 let waiting = desk.transmitter.waiting() + desk.typed.len();
@@ -65,7 +65,7 @@ impl SendFile {
             Some(since) if desk.now < since + LONG_HOLD => Some(since + LONG_HOLD),
             Some(since) => {
                 self.hold_told = true;
-                desk.events.push_back(Event::FileHeld { since, sent: left, total: self.bytes.len() });
+                desk.events.push_back(Event::FileHeld { since, sent, total: self.bytes.len() });
                 None
             }
         };
@@ -82,7 +82,7 @@ impl Work for SendFile {
         match signal {
             Signal::Begin | Signal::Tick | Signal::Hold(_) => self.go_on(desk),
             Signal::Cancel => {
-                let sent = self.left(desk);
+                let sent = self.sent(desk);
                 desk.transmitter.clear();
                 Some(self.ended(FileEnd::Cancelled, sent))
             }

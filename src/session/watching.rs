@@ -1,5 +1,5 @@
-//! Pages of diagnostics that no job here has asked for, in a live session: somebody has pressed S by hand, or had before
-//! we came. What is known of them holds for the job as well.
+//! Pages of diagnostics that no job has asked for, in a live session: somebody has pressed S by hand, or had before we
+//! came. What is known of them holds for the job as well.
 
 use super::Session;
 use super::event::{Event, Job};
@@ -21,7 +21,7 @@ pub(super) enum Saw<'a> {
 }
 
 impl Session {
-    /// Whether pages are listened for: in a recording its jobs do that, and what a loader says is no page.
+    /// Whether pages are listened for: in a recording its jobs do that, and what a loader says is not a page.
     fn watches(&self) -> bool {
         !self.passive && self.recognises && !matches!(self.job(), Some(Job::Load | Job::SendFile))
     }
@@ -42,9 +42,9 @@ impl Session {
         let is_due = self.watching_due().is_some_and(|due| due <= self.now);
         match saw {
             Saw::Tick if !is_due => return,
-            // Of what a flood is made of nothing is on a page.
+            // Floods are made of rows, and no row is on a page.
             Saw::Heard(_, Message::Row(_)) => return,
-            // An entry of the view is no line of a page.
+            // An entry of the view is not a line of a page.
             Saw::Heard(..) if self.job() == Some(Job::ReadDictionary) => return,
             _ => {}
         }
@@ -64,7 +64,7 @@ impl Session {
         if (self.facts.diagnostics, self.facts.unrecognised_lines) != before {
             self.events.push_back(Event::FactsChanged);
         }
-        // The job has pages of its own, of which it reads each to its end.
+        // The job assembles pages of its own.
         if self.job() == Some(Job::Diagnostics) {
             return;
         }

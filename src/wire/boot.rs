@@ -24,7 +24,7 @@ pub enum LoaderText {
     Error(LoaderError),
     /// It starts over and wants the header record again.
     Restarting,
-    /// It believes the file has been taken. Proves only that the terminator arrived.
+    /// It says that it has taken the file. Proves only that the terminator arrived.
     Loaded,
     /// It hands over to the application.
     Started,
@@ -114,7 +114,7 @@ pub(super) fn recognise(line: &str, words: &Words) -> Option<LoaderText> {
 
 /// `Error # 0004`, `error #4`, `Error: 0001`: the word first, then nothing but its number or its bits.
 fn error(line: &str, words: &Words) -> Option<LoaderError> {
-    // Progress marks may stand before it on the same line.
+    // Progress marks may come before it on the same line.
     if words.get(0) != Some("error") || words.iter().count() > 3 {
         return None;
     }
@@ -129,7 +129,7 @@ fn error(line: &str, words: &Words) -> Option<LoaderError> {
     }
 }
 
-/// Whether somebody who takes records says in words of his own that something is wrong.
+/// Whether a loader says in words of its own that something is wrong.
 pub fn complains(text: &str) -> bool {
     let words = Words::of(text);
     // "No errors", "0 errors", "Errors: 0" is what a loader says that counts them. "Error 0" is a number like any other.

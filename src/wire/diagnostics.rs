@@ -1,8 +1,9 @@
 //! Pages of diagnostics, which S shows every second (AXTC4CO manual, section 4.1.4).
 //!
 //! What a page shows is lost with the manual's figures, so nothing is expected of it: wherever a line puts a number
-//! behind words, that is a quantity with its label. The page itself stays as printed.
+//! after words, that is a quantity with its label. The page itself stays as printed.
 
+use super::units::unit;
 use super::words::Words;
 
 /// A number on a page, and what the page calls it.
@@ -10,30 +11,24 @@ use super::words::Words;
 pub struct Quantity {
     /// The words before it. A further quantity with one word or none, `raw`, is one of what was named before it.
     pub label: String,
-    /// The number; `None` where nobody can say which it is: `24,061` may be 24 and a bit, or many thousands.
+    /// The number; `None` where it is not certain: `24,061` may be 24 and a bit, or many thousands.
     pub value: Option<f64>,
-    /// Digits behind its point, as printed: `70.0` says more than `70`.
+    /// Digits after its point, as printed: `70.0` says more than `70`.
     pub decimals: usize,
-    /// The unit behind it, as printed, if the word behind it is one.
+    /// The unit after it, as printed, if the next word is one.
     pub unit: Option<String>,
 }
 
-/// Units as pages write them, in lower case, `µ` as `u`.
-const UNITS: [&str; 22] = [
-    "v", "mv", "uv", "a", "ma", "c", "°c", "degc", "deg", "f", "°f", "ohm", "ohms", "Ω", "ms", "s", "us", "%", "hz",
-    "kbit/s", "kbps", "w",
-];
-
-/// Digits behind the point that are shown again at most: no unit measures more, and an exponent may say anything.
+/// Digits after the point that are shown again at most: no unit measures more, and an exponent may say anything.
 const MOST_DECIMALS: usize = 12;
 
 /// Quantities of one line a page may have; a line is not longer than the framer lets it be.
 const MOST_QUANTITIES: usize = 64;
 
-/// The quantities a line shows, in its order. A time like `0:01:02` and an address are none.
+/// The quantities a line shows, in its order. A time like `0:01:02` and an address are not quantities.
 pub fn quantities(line: &str) -> Vec<Quantity> {
     let mut found: Vec<Quantity> = Vec::new();
-    // What numbers without a name of their own are of, and whether it stands in a cell without a number.
+    // What numbers without a name of their own are about.
     let mut name = Name::default();
     for cell in line.split(is_cell_border) {
         if found.len() < MOST_QUANTITIES {
@@ -70,7 +65,7 @@ fn of_cell(cell: &str, name: &mut Name, found: &mut Vec<Quantity>) {
             None => words.next_if(|(next, _)| is_unit(next)).map(|(unit, _)| unit.to_owned()),
         };
         if label.is_empty() && name.words.is_empty() {
-            // A number that nothing names is no quantity, but may be part of a name: `2 Supply`.
+            // A number that nothing names is not a quantity, but may be part of a name: `2 Supply`.
             label.push(word);
             continue;
         }
@@ -101,7 +96,7 @@ fn is_cell_border(sign: char) -> bool {
     matches!(sign, '|' | '\u{2500}'..='\u{259F}')
 }
 
-/// The words of a cell, and whether an equals sign stands before each. A comma within a number belongs to it.
+/// The words of a cell, and whether an equals sign comes before each. A comma within a number belongs to it.
 fn words(cell: &str) -> Vec<(&str, bool)> {
     let mut words = Vec::new();
     let mut start = 0;
@@ -151,7 +146,7 @@ fn bare(word: &str) -> &str {
     word.trim_end_matches([':', '.']).trim_start_matches([':', '.'])
 }
 
-/// A decimal number, the digits behind its point, and a unit that is glued to it: `24.1V`. With a comma it has a value
+/// A decimal number, the digits after its point, and a unit that is glued to it: `24.1V`. With a comma it has a value
 /// only if the comma can be nothing but a decimal one, as before an exponent.
 fn number(word: &str) -> Option<(Option<f64>, usize, Option<&str>)> {
     let end = word.find(|c: char| !matches!(c, '0'..='9' | '.' | ',' | '+' | '-')).unwrap_or(word.len());
@@ -164,8 +159,8 @@ fn number(word: &str) -> Option<(Option<f64>, usize, Option<&str>)> {
     let is_decimal_comma = commas == 1 && !digits.contains('.') && digits.contains(['e', 'E']);
     let point = digits.replace(',', ".");
     let value: Option<f64> = match commas {
-        0 => Some(digits.parse().ok()?),
-        _ if is_decimal_comma => Some(point.parse().ok()?),
+        0 => finite(digits)?,
+        _ if is_decimal_comma => finite(&point)?,
         // Signs within it, as in a range, are no number at all.
         _ if digits[1..].contains(['+', '-']) => return None,
         _ => None,
@@ -182,7 +177,13 @@ fn number(word: &str) -> Option<(Option<f64>, usize, Option<&str>)> {
     }
 }
 
-/// Length of an exponent behind the digits of a mantissa. One without a sign and a point before it may be hexadecimal.
+/// A number, and its value if it is not too large to have one; `None` if it is not a number.
+fn finite(digits: &str) -> Option<Option<f64>> {
+    digits.parse().ok().map(|value: f64| Some(value).filter(|value| value.is_finite()))
+}
+
+/// Length of an exponent after the digits of a mantissa. One without a sign, after digits without a point, may be
+/// hexadecimal.
 fn exponent(mantissa: &str, rest: &str) -> usize {
     let Some(power) = rest.strip_prefix(['e', 'E']) else { return 0 };
     let signed = usize::from(power.starts_with(['+', '-']));
@@ -191,9 +192,9 @@ fn exponent(mantissa: &str, rest: &str) -> usize {
     if is_one { 1 + signed + digits } else { 0 }
 }
 
+/// Whether a word is a unit. On a page `min` begins the smallest value.
 fn is_unit(word: &str) -> bool {
-    let word = word.to_lowercase().replace(['µ', 'μ'], "u");
-    UNITS.iter().any(|unit| *unit == word || unit.to_lowercase() == word)
+    unit(word).is_some_and(|unit| unit.name != "min")
 }
 
 #[cfg(test)]
@@ -224,6 +225,8 @@ mod tests {
             ),
             ("7.300;  66.123;  81.685;  24.546", vec![]),
             ("275 ; 89.947", vec![]),
+            ("RTD1 10.0 kohm raw 5", vec![quantity("RTD1", 10.0, Some("kohm")), quantity("RTD1 raw", 5.0, None)]),
+            ("TC1 24.5 min 20.0 C", vec![quantity("TC1", 24.5, None), quantity("TC1 min", 20.0, Some("C"))]),
             ("1  24.5 C", vec![quantity("1", 24.5, Some("C"))]),
             ("Active Errors              0", vec![quantity("Active Errors", 0.0, None)]),
             ("Cold junction (°C) -12.5", vec![quantity("Cold junction °C", -12.5, None)]),
@@ -274,6 +277,8 @@ mod tests {
             ("Supply 24.1, cold 23.5", vec![quantity("Supply", 24.1, None), quantity("Supply cold", 23.5, None)]),
             ("Errors 1,2-4", vec![]),
             ("Code 1E5", vec![]),
+            ("Supply 1.0e999 V", vec![unknown("Supply", Some("V"))]),
+            ("Supply -1,0e999 V", vec![unknown("Supply", Some("V"))]),
         ];
         for (line, expected) in table {
             assert_eq!(read(line), expected, "{line:?}");

@@ -2,7 +2,8 @@
 //!
 //! A chunk may end anywhere. Lines end with CR, LF, CR LF or LF CR, or where the cursor is moved; Xon and Xoff are
 //! lifted out, since they are about the line and not in it; colours and other escape sequences are left out of the
-//! text. Every byte belongs to the span of what it is part of: the framer copies, it never takes away.
+//! text, unless a line end cuts them off. Every byte belongs to the span of what it is part of: the framer copies, it
+//! never takes away.
 //!
 //! What has no line end yet is the [`Framer::pending`] text. Whether that is a prompt is a question of time, and the
 //! session's.
@@ -15,6 +16,8 @@ pub const LONGEST_LINE: usize = 1024;
 
 /// Bytes of an escape sequence at most; what goes on longer is taken as text.
 const LONGEST_ESCAPE: usize = 64;
+
+const ESC: u8 = 0x1B;
 
 /// What a chunk held.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,7 +40,8 @@ pub struct Text {
 /// Makes lines of chunks.
 #[derive(Debug, Default)]
 pub struct Framer {
-    /// Bytes of the current line that are text.
+    /// Bytes of the current line that are text, and at its end those of a string in an escape sequence: text as well,
+    /// should its end not come.
     line: Vec<u8>,
     /// Where the current line began.
     start: u64,
@@ -55,10 +59,10 @@ enum Escape {
     Begun,
     /// Within `ESC [ ...`, this many bytes long.
     Control(usize),
-    /// Within `ESC ] ...` and the like, which end with BEL or ESC \.
+    /// Within `ESC ] ...` and the like, which end with BEL or ESC \, this many bytes long.
     String(usize),
     /// After an ESC within such a string.
-    StringEnd,
+    StringEnd(usize),
 }
 
 impl Framer {
@@ -78,25 +82,24 @@ impl Framer {
             if byte == XON || byte == XOFF {
                 out(Item::Hold(byte == XOFF));
             } else if self.in_escape(byte) {
-                if moves_cursor(self.escape, byte) {
-                    self.end_line(at, &mut out);
-                }
-                self.escape = self.escape.after(byte);
+                self.escape_byte(at, byte, &mut out);
             } else {
+                self.escape = Escape::None;
                 self.text_byte(at, byte, &mut out);
             }
         }
     }
 
-    /// Ends the current line here, without a line end: what comes next answers something we have sent, and is no part
-    /// of the prompt before it.
+    /// Ends the current line here, without a line end: what comes next answers something we have sent, and is not
+    /// part of the prompt before it.
     pub fn cut(&mut self, mut out: impl FnMut(Item)) {
         self.end_line(self.offset, &mut out);
     }
 
     /// Text since the last line end, if it is not blank.
     pub fn pending(&self) -> Option<Text> {
-        let text = clean(&self.line);
+        let shown = self.line.len().saturating_sub(self.escape.string_length());
+        let text = clean(&self.line[..shown]);
         (!text.trim().is_empty()).then_some(Text { span: Span { start: self.start, end: self.offset }, text })
     }
 
@@ -105,7 +108,7 @@ impl Framer {
         if self.escape != Escape::None {
             return 0;
         }
-        let room = LONGEST_LINE - self.line.len();
+        let room = LONGEST_LINE.saturating_sub(self.line.len());
         let bytes = &bytes[..bytes.len().min(room)];
         bytes.iter().position(|&byte| byte < b' ' || byte == 0x7F).unwrap_or(bytes.len())
     }
@@ -121,9 +124,32 @@ impl Framer {
         }
     }
 
+    /// Whether a byte is one of an escape sequence. A line end never is: an ESC may be what noise has made of another byte,
+    /// and would take the end of the line with it.
     fn in_escape(&self, byte: u8) -> bool {
-        const ESC: u8 = 0x1B;
-        self.escape != Escape::None || byte == ESC
+        byte == ESC || (self.escape != Escape::None && !matches!(byte, b'\r' | b'\n'))
+    }
+
+    fn escape_byte(&mut self, at: u64, byte: u8, out: &mut impl FnMut(Item)) {
+        if moves_cursor(self.escape, byte) {
+            self.end_line(at, out);
+        }
+        let before = self.escape;
+        self.escape = before.after(byte);
+        match (before, self.escape) {
+            _ if before.ends_string(byte) => {
+                self.line.truncate(self.line.len().saturating_sub(before.string_length()));
+            }
+            (Escape::String(_), Escape::String(_)) => {
+                if self.line.is_empty() {
+                    self.start = at;
+                }
+                self.line.push(byte);
+            }
+            // It goes on for too long.
+            (Escape::String(_), Escape::None) => self.text_byte(at, byte, out),
+            _ => {}
+        }
     }
 
     fn text_byte(&mut self, at: u64, byte: u8, out: &mut impl FnMut(Item)) {
@@ -169,10 +195,25 @@ impl Escape {
             (Escape::Control(length), 0x20..=0x3F) if length < LONGEST_ESCAPE => Escape::Control(length + 1),
             (Escape::Control(_), _) => Escape::None,
             (Escape::String(_), 0x07) => Escape::None,
-            (Escape::String(_), 0x1B) => Escape::StringEnd,
+            (Escape::String(length), ESC) => Escape::StringEnd(length),
             (Escape::String(length), _) if length < LONGEST_ESCAPE => Escape::String(length + 1),
-            (Escape::String(_) | Escape::StringEnd, _) => Escape::None,
+            // Another sequence begins in the middle of it.
+            (Escape::StringEnd(_), byte) if byte != b'\\' => Escape::Begun.after(byte),
+            (Escape::String(_) | Escape::StringEnd(_), _) => Escape::None,
         }
+    }
+
+    /// Bytes of the string that has begun.
+    fn string_length(self) -> usize {
+        match self {
+            Escape::String(length) | Escape::StringEnd(length) => length,
+            Escape::None | Escape::Begun | Escape::Control(_) => 0,
+        }
+    }
+
+    /// Whether this byte ends a string as it should.
+    fn ends_string(self, byte: u8) -> bool {
+        matches!((self, byte), (Escape::String(_), 0x07) | (Escape::StringEnd(_), b'\\'))
     }
 }
 
@@ -184,8 +225,8 @@ fn moves_cursor(escape: Escape, byte: u8) -> bool {
     )
 }
 
-/// Bytes as text: tabs as two blanks, since what parts columns is more than one; NUL and BEL, which old devices send between words, left out; any other control
-/// character is damage, and shows as what is not UTF-8 does.
+/// Bytes as text: tabs as two blanks, since more than one part columns; NUL and BEL, which old devices send between words,
+/// left out; any other control character is damage, and shows as what is not UTF-8 does.
 fn clean(bytes: &[u8]) -> String {
     if bytes.iter().all(|byte| matches!(byte, b' '..=b'~')) {
         return String::from_utf8_lossy(bytes).into_owned();
@@ -266,12 +307,29 @@ mod tests {
     }
 
     #[test]
+    fn an_escape_sequence_never_swallows_a_line_end() {
+        for begun in ["\x1b", "\x1b(", "\x1b[", "\x1b[1;3", "\x1b]", "\x1bP"] {
+            for end in ["\r", "\n", "\r\n"] {
+                let text = format!("one{begun}{end}two{end}");
+                assert_eq!(lines(text.as_bytes()), ["one", "two"], "{text:?}");
+            }
+        }
+        // What was taken for a string is text: it may be all that a loader says.
+        assert_eq!(lines(b"\x1bPError # 0004\rRestarting.\r"), ["Error # 0004", "Restarting."]);
+        assert_eq!(lines(b"a\x1b]0;title\x1b[1mb\x1b]0;title\x07c\r"), ["a0;titlebc"]);
+        let (items, pending) = frame(&[b"Password: \x1b]0;title"]);
+        assert_eq!((items, pending.map(|text| text.text).as_deref()), (vec![], Some("Password: ")));
+    }
+
+    #[test]
     fn a_line_without_end_is_cut_and_a_string_without_end_given_up() {
         assert_eq!(lines(&[b'x'; LONGEST_LINE * 2 + 1]).len(), 2);
         let mut endless = b"\x1b]0;".to_vec();
         endless.extend([b'y'; 200]);
         endless.extend(b"\r\n");
         assert_eq!(lines(&endless).len(), 1);
+        let long = [vec![b'x'; LONGEST_LINE - 1], endless].concat();
+        assert_eq!(lines(&long).concat().len(), long.len() - 4, "all but the sequence's beginning and the line end");
     }
 
     proptest! {

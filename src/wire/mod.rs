@@ -12,6 +12,7 @@ mod menu;
 mod network;
 mod prompt;
 pub mod stream;
+mod units;
 pub mod visible;
 mod words;
 
@@ -41,7 +42,7 @@ pub enum Message {
     Software(SoftwareName),
     /// One or more of the CANopen network variables.
     Network(Network),
-    /// A question, recognised once the unit has fallen silent behind it.
+    /// A question, recognised once the unit has fallen silent after it.
     Prompt(Prompt),
     /// The unit refuses what was typed: wrong password, invalid entry, not in this state.
     Refusal,
@@ -115,7 +116,7 @@ impl Vocabulary<'_> {
         })
     }
 
-    /// Whether a text without a line end asks for the password; `behind_load` if it answers an L, behind which more words
+    /// Whether a text without a line end asks for the password; `behind_load` if it answers an L, after which more words
     /// can mean nothing else. Asked with every byte that comes, so cheap where it does not.
     pub fn asks_password(&self, text: &str, behind_load: bool) -> bool {
         let speaks_of_it = text
@@ -126,7 +127,7 @@ impl Vocabulary<'_> {
             || (behind_load && prompt::asks_password_behind_load(text))
     }
 
-    /// What a text without a line end asks for, once the unit has fallen silent behind it.
+    /// What a text without a line end asks for, once the unit has fallen silent after it.
     pub fn prompt(&self, text: &str) -> Option<Prompt> {
         prompt::recognise(text, &words::Words::of(text))
     }

@@ -1,7 +1,7 @@
 //! The CANopen network variables that a unit shows with its menu (AXTC4CO manual, section 4.1).
 //!
 //! Which these are and how they are worded is unknown. A number belongs to the label directly before it or to the unit
-//! directly behind it; one that only stands on the same line may be anything: a time, an index of a table of bit rates.
+//! directly after it; one that is only on the same line may be anything: a time, an index of a table of bit rates.
 
 use super::words::{Words, number};
 
@@ -54,7 +54,7 @@ fn has(words: &[&str], beginnings: &[&str]) -> bool {
     words.iter().any(|word| beginnings.iter().any(|beginning| word.starts_with(beginning)))
 }
 
-/// The number directly behind `Node-ID`, `node`, or where the line speaks of a network, `id`.
+/// The number directly after `Node-ID`, `node`, or where the line speaks of a network, `id`.
 fn node_id(words: &[&str]) -> Option<u8> {
     let speaks_of_network = has(words, &["network", "can", "nmt"]);
     let is_label = |word: &str| match word {
@@ -84,8 +84,8 @@ fn is_time(word: &str) -> bool {
     matches!(word, "ms" | "s" | "sec" | "us" | "min")
 }
 
-/// What a unit of bit rates behind the number at `at` multiplies it with, in thousandths: `kbit`, `k`, `Mbit`, `bit/s`.
-/// It may be glued to the number. `Baud` behind a small number is the next label, as in `ID=10 Baud=4`.
+/// The factor, in thousandths, of a unit of bit rates after the number at `at`: `kbit`, `k`, `Mbit`, `bit/s`. It may be
+/// glued to the number. `Baud` after a small number is the next label, as in `ID=10 Baud=4`.
 fn rate_unit(words: &[&str], at: usize) -> Option<(u64, u64)> {
     let word = *words.get(at)?;
     let digits = word.trim_end_matches(|c: char| c.is_ascii_alphabetic());
@@ -105,8 +105,8 @@ fn rate_unit(words: &[&str], at: usize) -> Option<(u64, u64)> {
     Some((value, thousandths))
 }
 
-/// The bit rate: the number with a unit of one, or the one directly behind what calls it so. If several are named, only
-/// one that is called so is believed: the others may be limits.
+/// The bit rate: the number with such a unit, or the one directly after a name for it. If there are several, only one with
+/// a name counts: the others may be limits.
 fn can_kbps(words: &[&str]) -> Option<u16> {
     if has(words, &["rs", "serial", "uart", "115200"]) {
         return None;
@@ -150,7 +150,7 @@ fn is_called_rate(before: &[&str]) -> bool {
     is_name && !among_names
 }
 
-/// The state: what is called so, or stands alone. What a unit is told to do later is none.
+/// The state: what is called so, or is the only one on the line. What a unit is set to do later is not its state.
 fn nmt_state(words: &[&str]) -> Option<NmtState> {
     // Object 5555h is called so; it says nothing of the present state.
     if words.windows(2).any(|pair| pair[0].ends_with("start") && pair[1] == "in")
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_stands_on_the_same_line_is_no_network_variable() {
+    fn what_is_only_on_the_same_line_is_not_a_network_variable() {
         for line in [
             "RS-232: 115200 baud",
             "Node-ID: 300",
@@ -272,10 +272,17 @@ mod tests {
         }
 
         #[test]
-        fn words_in_any_order_are_read_without_complaint(
+        fn words_in_any_order_give_nothing_but_what_they_say(
             line in "((node|id|7f|125|10|baud|rate|kbit|s|state|pre|operational|stopped|is|é|[0-9]{1,22}k?)[ :=]){0,12}"
         ) {
-            let _ = read(&line);
+            let network = read(&line).unwrap_or_default();
+            if let Some(node_id) = network.node_id {
+                let spelled = [node_id.to_string(), format!("{node_id:x}")];
+                prop_assert!((1..=127).contains(&node_id) && spelled.iter().any(|digits| line.contains(digits)), "{node_id}");
+            }
+            prop_assert!(network.can_kbps.is_none_or(|kbps| RATES.contains(&kbps.into())), "{:?}", network);
+            let names_state = line.contains("operational") || line.contains("stopped");
+            prop_assert!(network.nmt_state.is_none() || names_state, "{:?}", network);
         }
     }
 }

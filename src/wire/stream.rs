@@ -31,7 +31,7 @@ pub struct FieldFormat {
     pub open: String,
     /// Word for a short circuit, where the product has one.
     pub short: Option<String>,
-    /// Word for a value that the unit has not for another reason, where the product has one.
+    /// Word for a value that is missing for another reason, where the product has one.
     pub error: Option<String>,
 }
 
@@ -206,7 +206,7 @@ impl Row {
         line
     }
 
-    /// A word among such rows: `2026-01-31T12:00:00.123Z,mark 1,,,,,`, as many fields as rows of so many channels have.
+    /// A word among such rows: `2026-01-31T12:00:00.123Z,mark 1,,,,,`, with as many fields as rows of that many channels.
     pub fn csv_note(time: &str, text: &str, channels: usize) -> String {
         format!("{time},{text}{}\n", ",".repeat(channels))
     }
@@ -230,7 +230,7 @@ impl FieldFormat {
         // A number fills its field, or is too wide for it and then has no blank in front.
         let number = field.trim_start();
         let fills = length == width || (length > width && number.len() == field.len());
-        // No digits behind the point means no point either.
+        // No digits after the point means no point either.
         let fraction = number.split_once('.').map(|(_, digits)| digits.len());
         let plain = number.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-' || byte == b'.');
         if !fills || !plain || fraction != Some(self.decimals).filter(|&decimals| decimals > 0) {

@@ -1,4 +1,4 @@
-//! A line as words: what recognition goes by, whatever stands between them.
+//! A line as words: what recognition goes by, whatever is between them.
 
 /// The words of a line, in lower case: letters, digits, and the points within numbers.
 #[derive(Debug)]

@@ -9,6 +9,7 @@ mod dialects;
 #[cfg(unix)]
 mod eds;
 mod emulator;
+mod endings;
 mod faults;
 mod foreigner;
 #[cfg(unix)]

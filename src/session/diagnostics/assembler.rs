@@ -4,8 +4,10 @@ use crate::session::job::Desk;
 use crate::time::{Duration, Instant};
 use crate::wire::{Text, diagnostics};
 
-/// Silence that ends a page: lines follow each other within a millisecond, an adapter adds some 20.
-const QUIET: Duration = Duration::from_millis(200);
+/// Silence that ends a page: most units print all of one within milliseconds, but some measure between two lines.
+const QUIET: Duration = Duration::from_millis(400);
+/// How long a page may take: the next one begins a second after it.
+const LONGEST: Duration = Duration::from_millis(900);
 /// How long a text without a line end must stay as it is to count as a page's last line, and neither as a row of the
 /// stream under way nor as the half of a line that a busy computer has got to.
 const STILL: Duration = Duration::from_millis(300);
@@ -19,12 +21,25 @@ pub(in crate::session) struct Page {
     pub(in crate::session) at: Instant,
     /// Its lines, as printed.
     pub(in crate::session) lines: Vec<Text>,
+    /// What has ended it.
+    pub(in crate::session) end: PageEnd,
+}
+
+/// What shows that a page is complete.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::session) enum PageEnd {
+    /// Nothing more has come for a while.
+    Silence,
+    /// Lines go on, for longer than a page takes.
+    Time,
 }
 
 /// The page under construction.
 #[derive(Debug, Default)]
 pub(in crate::session) struct Assembler {
     lines: Vec<Text>,
+    /// When its first line came, and its last.
+    begun: Instant,
     at: Instant,
     /// When the page counts as complete.
     due: Option<Instant>,
@@ -37,11 +52,14 @@ pub(in crate::session) struct Assembler {
 impl Assembler {
     /// A line that may be part of a page.
     pub(in crate::session) fn line(&mut self, text: &Text, now: Instant) {
+        if self.due.is_none() {
+            self.begun = now;
+        }
         if self.lines.len() < MOST_LINES {
             self.lines.push(text.clone());
         }
         self.at = now;
-        self.due = Some(now + QUIET);
+        self.due = Some((now + QUIET).min(self.begun + LONGEST));
         self.unended = None;
     }
 
@@ -57,9 +75,10 @@ impl Assembler {
 
     /// Nothing has followed for a while: what has come is a page if it shows numbers.
     pub(in crate::session) fn complete(&mut self, desk: &mut Desk<'_>) -> Option<Page> {
+        let end = if desk.now < self.at + QUIET { PageEnd::Time } else { PageEnd::Silence };
         let unended = desk.pending.map(|text| text.span.end);
         let looked_at = std::mem::replace(&mut self.unended, unended);
-        if unended.is_some() && looked_at.is_none() {
+        if unended.is_some() && looked_at.is_none() && end == PageEnd::Silence {
             self.due = Some(desk.now + STILL);
             return None;
         }
@@ -80,11 +99,11 @@ impl Assembler {
             }
         }
         let has_numbers = lines.iter().any(|line| !diagnostics::quantities(&line.text).is_empty());
-        has_numbers.then_some(Page { at: self.at, lines })
+        has_numbers.then_some(Page { at: self.at, lines, end })
     }
 }
 
-/// Takes the echo of the key off the first line of a page: the key was sent as `s`, and no label is written like `sSUP`.
+/// Takes the echo of the key off the first line of a page: the key was sent as `s`, and no label looks like `sSUP`.
 fn without_echo(line: &mut Text) {
     let is_echo = |rest: &str| rest.starts_with(|first: char| first.is_uppercase() || !first.is_ascii());
     if line.text.strip_prefix('s').is_some_and(is_echo) {

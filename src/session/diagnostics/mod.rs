@@ -1,12 +1,12 @@
 //! Reading diagnostics: S switches pages on that come every second, and off again (AXTC4CO manual, section 4.1.4).
 //!
-//! The key only toggles, and nothing a unit prints is known to say which way. So the pages themselves are the evidence:
-//! what comes in one go, has numbers in it and comes again. Pages that come already are joined; when it is enough, S
+//! The key only toggles, and no text of a unit is known to say which way. So the pages themselves are the evidence: what
+//! comes in one go, has numbers in it and comes again. Pages that come already are simply read; once there are enough, S
 //! is pressed until they have stopped.
 
 mod assembler;
 
-pub(super) use assembler::{Assembler, Page};
+pub(super) use assembler::{Assembler, Page, PageEnd};
 
 use super::event::{Awaited, Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
@@ -16,17 +16,16 @@ use crate::wire::{Message, Prompt};
 
 /// How long to look for pages that come already: one comes every second.
 const WATCH: Duration = Duration::from_millis(1300);
-/// How long the first page may take: a unit has no values for up to 5 s behind its power-up (AXRTD8CO manual,
+/// How long the first page may take: a unit has no values for up to 5 s after its power-up (AXRTD8CO manual,
 /// section 1.1).
 pub(super) const FIRST_PAGE: Duration = Duration::from_millis(6500);
-/// When it is looked, behind the key, how much has come: a unit that has said something by each of them and by the end goes
-/// on talking.
+/// How long after the key it is noted how much has come: a unit that has said something more each time goes on talking.
 const LOOKS: [Duration; 2] = [Duration::from_millis(1500), Duration::from_millis(4000)];
 /// How long the next page may take.
 const NEXT_PAGE: Duration = Duration::from_millis(2500);
-/// Time without a page behind the key that stops them.
+/// Time without a page after the key that stops them.
 pub(super) const STOPPED: Duration = Duration::from_millis(1500);
-/// A page that comes so soon behind that key was under way before it.
+/// A page that comes this soon after that key was under way before it.
 pub(super) const UNDER_WAY: Duration = Duration::from_millis(700);
 /// How long the rest of the menu may take.
 const MENU: Duration = Duration::from_millis(300);
@@ -43,30 +42,30 @@ pub(super) struct Diagnostics {
     page: Assembler,
     deadline: Option<Instant>,
     heard: Option<Span>,
-    /// Something has come since the key was pressed last.
+    /// Something has come since the key was last pressed.
     answered: bool,
     /// When the key was pressed, whether rows of a stream came already, and the bytes that had been received at each look.
     asked_at: Instant,
     streamed: bool,
     looks: Vec<u64>,
-    /// Pages that nobody here has asked for come, and all that is wanted is that they stop.
+    /// Pages come that no job has asked for, and all that is wanted is that they stop.
     only_stops: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 enum Stage {
     /// Pages may come already.
     Watching,
-    /// The key is out.
+    /// The key has been pressed.
     Asked,
-    /// What the key has switched on is no page that can be read, and has been switched off again.
+    /// What the key has switched on cannot be read as pages, and has been switched off again.
     NotUnderstood,
     /// Pages come.
     Reading,
-    /// The key is out that stops them, pressed so often.
-    Stopping { presses: u32, at: Instant, cancelled: bool },
-    /// They have stopped, and nothing else has come: the menu is asked for, to see whether somebody is there.
-    AskingForMenu { cancelled: bool },
+    /// The key that stops them has been pressed, this often and then last.
+    Stopping { presses: u32, at: Instant, then: Outcome },
+    /// They have stopped, and nothing else has come: the menu is asked for, to see whether a unit is there.
+    AskingForMenu { then: Outcome },
 }
 
 impl Diagnostics {
@@ -91,35 +90,28 @@ impl Diagnostics {
         Diagnostics { only_stops: true, ..Diagnostics::new(None) }
     }
 
-    /// Nothing has followed for a while: what has come may be a page.
+    /// What has come may be a page.
     fn page_complete(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let page = self.page.complete(desk)?;
-        match self.stage {
-            Stage::Stopping { at, .. } if desk.now.since(at) < UNDER_WAY => {
+        match &self.stage {
+            Stage::Stopping { at, .. } if page.at.since(*at) < UNDER_WAY => {
                 self.deadline = Some(desk.now + STOPPED);
-                None
             }
             // The key was lost, or went the other way.
-            Stage::Stopping { presses: MOST_STOPS, .. } => {
-                let awaited = Awaited::DiagnosticsOff;
-                Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
-            }
-            Stage::Stopping { presses, cancelled, .. } => {
-                self.stop(desk, presses + 1, cancelled);
-                None
-            }
-            Stage::AskingForMenu { .. } | Stage::NotUnderstood => None,
+            Stage::Stopping { presses: MOST_STOPS, .. } => return Some(self.no_answer(Awaited::DiagnosticsOff)),
+            Stage::Stopping { presses, then, .. } => self.stop(desk, presses + 1, then.clone()),
+            Stage::AskingForMenu { .. } | Stage::NotUnderstood => {}
             Stage::Watching | Stage::Asked | Stage::Reading => {
                 self.stage = Stage::Reading;
                 self.deadline = Some(desk.now + NEXT_PAGE);
                 self.taken += 1;
                 desk.events.push_back(Event::Page { at: page.at, lines: page.lines });
                 if self.wanted.is_some_and(|wanted| self.taken >= wanted) {
-                    self.stop(desk, 1, false);
+                    self.stop(desk, 1, DONE);
                 }
-                None
             }
         }
+        None
     }
 
     fn switch_on(&mut self, desk: &mut Desk<'_>) {
@@ -137,62 +129,74 @@ impl Diagnostics {
         !self.streamed && all.windows(2).all(|pair| pair[0] < pair[1])
     }
 
-    fn stop(&mut self, desk: &mut Desk<'_>, presses: u32, cancelled: bool) {
+    /// Stops the pages, and ends the job so once they have stopped.
+    fn stop(&mut self, desk: &mut Desk<'_>, presses: u32, then: Outcome) {
         desk.send(b"s");
-        self.stage = Stage::Stopping { presses, at: desk.now, cancelled };
+        self.stage = Stage::Stopping { presses, at: desk.now, then };
         self.deadline = Some(desk.now + STOPPED);
         self.answered = false;
     }
 
+    fn tick(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if self.page.due().is_some_and(|due| due <= desk.now)
+            && let Some(outcome) = self.page_complete(desk)
+        {
+            return Some(outcome);
+        }
+        // What is awaited may be on its way: a page takes a second at most.
+        let is_over = self.page.due().is_none() && self.deadline.is_some_and(|deadline| deadline <= desk.now);
+        if is_over { self.time_is_up(desk) } else { None }
+    }
+
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        let job = Job::Diagnostics;
-        match self.stage {
-            Stage::Watching => {
-                self.switch_on(desk);
-                None
-            }
+        match &self.stage {
+            // What looked like a page before the key was not one, or somebody has stopped them.
+            Stage::Reading if self.taken == 1 => self.switch_on(desk),
+            Stage::Watching => self.switch_on(desk),
             Stage::Asked if self.looks.len() < LOOKS.len() => {
                 self.looks.push(desk.received);
                 self.deadline = Some(self.asked_at + LOOKS.get(self.looks.len()).copied().unwrap_or(FIRST_PAGE));
-                None
             }
             Stage::Asked if self.goes_on(desk) => {
                 desk.send(b"s");
                 self.stage = Stage::NotUnderstood;
                 self.deadline = Some(desk.now + STOPPED);
-                None
             }
-            Stage::NotUnderstood => Some(Outcome::NoAnswer { job, awaited: Awaited::Page, heard: self.heard }),
+            Stage::NotUnderstood => return Some(self.no_answer(Awaited::Page)),
             Stage::Asked => {
                 if desk.pending.is_some() {
                     desk.leave_dialogue();
                 }
-                Some(Outcome::NoAnswer { job, awaited: Awaited::Page, heard: self.heard })
+                return Some(self.no_answer(Awaited::Page));
             }
-            // What looked like a page before the key was none, or somebody has stopped them.
-            Stage::Reading if self.taken == 1 => {
-                self.switch_on(desk);
-                None
+            // They may only be late.
+            Stage::Reading => {
+                let late = self.no_answer(Awaited::NextPage);
+                self.stop(desk, 1, late);
             }
-            Stage::Reading => Some(Outcome::NoAnswer { job, awaited: Awaited::NextPage, heard: self.heard }),
-            Stage::Stopping { cancelled, .. } | Stage::AskingForMenu { cancelled } if self.answered => {
+            Stage::Stopping { then, .. } | Stage::AskingForMenu { then } if self.answered => {
                 desk.facts.diagnostics = None;
-                Some(if cancelled { Outcome::Cancelled(job) } else { Outcome::Done(job) })
+                return Some(then.clone());
             }
             // A unit without power prints no pages either.
-            Stage::Stopping { cancelled, .. } => {
+            Stage::Stopping { then, .. } => {
                 desk.send(b"m");
-                self.stage = Stage::AskingForMenu { cancelled };
+                self.stage = Stage::AskingForMenu { then: then.clone() };
                 self.deadline = Some(desk.now + STOPPED);
-                None
             }
-            Stage::AskingForMenu { .. } => {
-                let awaited = Awaited::DiagnosticsOff;
-                Some(Outcome::NoAnswer { job, awaited, heard: self.heard })
-            }
+            Stage::AskingForMenu { then: late @ Outcome::NoAnswer { .. } } => return Some(late.clone()),
+            Stage::AskingForMenu { .. } => return Some(self.no_answer(Awaited::DiagnosticsOff)),
         }
+        None
+    }
+
+    fn no_answer(&self, awaited: Awaited) -> Outcome {
+        Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard }
     }
 }
+
+const DONE: Outcome = Outcome::Done(Job::Diagnostics);
+const CANCELLED: Outcome = Outcome::Cancelled(Job::Diagnostics);
 
 /// Whether a line can be one of a page: it has a word, or is a rule of signs.
 pub(super) fn has_words(line: &str) -> bool {
@@ -202,29 +206,30 @@ pub(super) fn has_words(line: &str) -> bool {
 impl Work for Diagnostics {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.answered |= matches!(signal, Signal::Heard(..));
-        if matches!((self.stage, &signal), (Stage::AskingForMenu { .. }, Signal::Heard(..))) {
-            // Rows may go on for ever behind the menu.
+        if matches!((&self.stage, &signal), (Stage::AskingForMenu { .. }, Signal::Heard(..))) {
+            // Rows may go on for ever after the menu.
             let soon = desk.now + MENU;
             self.deadline = self.deadline.map(|deadline| deadline.min(soon));
             return None;
         }
         match signal {
             Signal::Begin if self.only_stops => {
-                self.stop(desk, 1, false);
+                self.stop(desk, 1, DONE);
                 None
             }
             Signal::Begin => {
                 self.deadline = Some(desk.now + WATCH);
                 None
             }
-            // A question is none of a page's lines; it is not ours to answer.
-            Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults)) => {
+            // Somebody has left a question open. While pages come it is a line that ends like one.
+            Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults))
+                if matches!(self.stage, Stage::Watching | Stage::Asked) =>
+            {
                 desk.leave_dialogue();
-                let awaited = Awaited::Page;
-                Some(Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard })
+                Some(self.no_answer(Awaited::Page))
             }
             Signal::Heard(_, Message::Row(_) | Message::Prompt(_)) => None,
-            // Of a row that the unit has had no room for there is its end.
+            // The end of a row that the unit has had no room for.
             Signal::Heard(text, _) if !has_words(&text.text) => {
                 self.heard = Some(text.span);
                 None
@@ -233,26 +238,24 @@ impl Work for Diagnostics {
                 self.heard = Some(text.span);
                 self.page.line(text, desk.now);
                 // Pages that came before anybody has pressed a key belong to no key.
-                desk.understood = self.stage == Stage::Reading;
+                desk.understood = matches!(self.stage, Stage::Reading);
                 None
             }
             Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
-            Signal::Tick if self.page.due().is_some_and(|due| due <= desk.now) => self.page_complete(desk),
-            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.time_is_up(desk),
-            Signal::Tick => None,
-            Signal::Cancel => match self.stage {
-                Stage::Watching => Some(Outcome::Cancelled(Job::Diagnostics)),
+            Signal::Tick => self.tick(desk),
+            Signal::Cancel => match &self.stage {
+                Stage::Watching => Some(CANCELLED),
                 Stage::Asked | Stage::Reading => {
-                    self.stop(desk, 1, true);
+                    self.stop(desk, 1, CANCELLED);
                     None
                 }
                 Stage::Stopping { .. } | Stage::AskingForMenu { .. } | Stage::NotUnderstood => None,
             },
-            Signal::LinkLost => Some(Outcome::Cancelled(Job::Diagnostics)),
+            Signal::LinkLost => Some(CANCELLED),
         }
     }
 
     fn deadline(&self) -> Option<Instant> {
-        [self.page.due(), self.deadline].into_iter().flatten().min()
+        self.page.due().or(self.deadline)
     }
 }

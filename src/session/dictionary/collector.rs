@@ -17,7 +17,7 @@ const MOST_ENTRIES: usize = 20_000;
 /// Different lines that nobody understands, as far as they are kept: the largest product has 326 entries.
 const MOST_UNREAD: usize = 2_000;
 
-/// So many different lines that nobody understands are no titles.
+/// This many different lines that nobody understands are not titles.
 const MANY_UNREAD: usize = 10;
 
 /// Where an object dictionary says which product it is: its code (manuals, object 1018h).
@@ -30,7 +30,7 @@ enum Read {
     Understood,
     /// It may be the heading of another object.
     PerhapsHeading,
-    /// Nothing that belongs into an object dictionary.
+    /// Nothing that belongs in an object dictionary.
     Nothing,
 }
 
@@ -62,7 +62,7 @@ impl Collector {
         self.take_line(text, *message != Message::Text)
     }
 
-    /// `otherwise`: the line means something that is no entry, as a menu behind the view does.
+    /// `otherwise`: the line means something that is not an entry, as a menu after the view does.
     fn take_line(&mut self, text: &Text, otherwise: bool) -> bool {
         if self.product.is_none() && self.lines.len() < MOST_ENTRIES {
             self.lines.push((text.clone(), otherwise));
@@ -89,8 +89,8 @@ impl Collector {
         self.unread.len()
     }
 
-    /// The first line that nobody understood, if so many were not that they may well be what is missing. A unit whose
-    /// software lacks objects has titles and hints of its own, but few of them.
+    /// The first line that nobody understood, if there are enough of them to be what is missing. A unit whose software lacks
+    /// objects has titles and hints of its own, but few of them.
     fn hidden(&self) -> Option<&String> {
         let missing = match self.product {
             Some(_) => self.missing(),
@@ -100,7 +100,7 @@ impl Collector {
         self.first_unread.as_ref().filter(|_| hides)
     }
 
-    /// Headings behind which no entry came were none: the entries stood in them.
+    /// Headings without entries below them were not headings: they held the entries.
     fn count_headings(&mut self) {
         for (index, heading) in std::mem::take(&mut self.headings) {
             let entries = ObjectAddress::new(index, 0)..=ObjectAddress::new(index, u8::MAX);
@@ -152,7 +152,7 @@ impl Collector {
                 self.keep(read_entry(at, line.rest, text, None), None);
                 Read::Understood
             }
-            // The heading of a variable whose value stands below.
+            // The heading of a variable whose value is below it.
             (None, Some(_)) if line.sub.is_none() => Read::Understood,
             (None, Some(_)) => Read::Nothing,
             (None, None) => Read::PerhapsHeading,
@@ -185,7 +185,7 @@ impl Collector {
         Some(entries)
     }
 
-    /// The values of an object one behind the other, as in `6126h: 2 16.000 17.000`: all of them, and the first one says
+    /// The values of an object one after the other, as in `6126h: 2 16.000 17.000`: all of them, and the first one says
     /// how many follow.
     fn read_list(&mut self, object: &Object, line: &ViewLine, text: &Text) {
         let words: Vec<&str> = line.rest.split_whitespace().collect();
@@ -216,7 +216,7 @@ impl Collector {
         trial.count() > 0
     }
 
-    /// Takes back what was read at this place: it was no whole line.
+    /// Takes back what was read at this place: it was not a whole line.
     pub(in crate::session) fn forget(&mut self, span: Span) {
         self.lines.retain(|(line, _)| line.span != span);
         self.entries.retain(|_, entry| entry.span != span);
@@ -347,7 +347,7 @@ fn may_be_an_entry(line: &str) -> bool {
 mod tests {
     use super::*;
 
-    /// Takes lines one behind the other; `>` before one says that it means something that is no entry.
+    /// Takes lines one after the other; `>` before one says that it means something that is not an entry.
     fn take(collector: &mut Collector, lines: &[&str]) {
         for line in lines {
             let (text, otherwise) = line.strip_prefix('>').map_or((*line, false), |text| (text, true));
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_a_number_and_is_no_entry_is_counted_and_titles_are_not() {
+    fn what_has_a_number_and_is_not_an_entry_is_counted_and_titles_are_not() {
         let mut collector = of("AXTC4CO");
         take(
             &mut collector,
@@ -401,7 +401,7 @@ mod tests {
         let mut collector = of("AXTC4CO");
         take(&mut collector, &["1017h Producer Heartbeat Time = 500"]);
         assert_eq!(taken(collector), ("1017:00=Unsigned16(500)".into(), 0));
-        // The heading of an array names a number of its own; that is no value.
+        // The heading of an array has a number of its own, which is not a value.
         let mut collector = of("AXTC4CO");
         take(&mut collector, &["6126h Scaling Factor 4"]);
         assert_eq!(taken(collector), (String::new(), 1));
@@ -438,7 +438,7 @@ mod tests {
     }
 
     #[test]
-    fn where_numbers_are_hexadecimal_without_a_mark_plain_digits_are_no_decimal_ones() {
+    fn where_numbers_are_hexadecimal_without_a_mark_plain_digits_are_not_decimal() {
         let cob_id = "1400h:01 COB-ID C000027F";
         let mut collector = of("AXTC4CO");
         take(&mut collector, &["1017h Producer Heartbeat Time = 500", "1400h:02 255", "1400h:05 5", "6126h:01 16.000"]);
@@ -487,7 +487,7 @@ mod tests {
     }
 
     #[test]
-    fn a_heading_with_numbers_and_nothing_behind_it_was_none() {
+    fn a_heading_with_numbers_and_nothing_below_it_was_not_one() {
         let mut collector = of("AXTC4CO");
         take(&mut collector, &["6126h:01 TC1 = 16.000", "6110h Sensor Type: one 10 two 2", "1003h Errors"]);
         let reading = collector.take(WalkEnd::Whole);

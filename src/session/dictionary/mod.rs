@@ -1,8 +1,8 @@
 //! Reading the object dictionary through V (manuals, section 4.1.1).
 //!
-//! The view shows the PDO parameters first and then an object for each Enter; how many there are nobody says. So Enter is
-//! pressed until the menu comes back or nothing new comes any more. While the view is open scanning and CAN may be halted:
-//! every way out of this job leaves it, and looks whether the menu is there.
+//! The view shows the PDO parameters first and then an object for each Enter, without saying how many there are. So Enter
+//! is pressed until the menu comes back or nothing new comes any more. While the view is open, scanning and CAN may be
+//! halted: every way out of this job leaves it, and checks that the menu is there.
 
 mod collector;
 mod notation;
@@ -18,22 +18,22 @@ use crate::wire::{Message, Prompt, Text};
 
 /// How long the unit may take to begin an answer.
 const ANSWER: Duration = Duration::from_millis(1200);
-/// Silence behind lines that ends an answer: longer than an adapter's latency and a prompt's.
+/// Silence after lines that ends an answer: longer than an adapter's latency and a prompt's.
 const QUIET: Duration = Duration::from_millis(120);
-/// How long an entry without a line end has to stand still until it counts, where it is not known whether the unit ends
+/// How long an entry without a line end has to stay as it is before it counts, where it is not known whether the unit ends
 /// its lines: half of one looks like another entry, and a busy computer may keep the other half back for longer than
 /// [`QUIET`].
 const STANDS_STILL: Duration = Duration::from_millis(400);
-/// How long an answer may go on: text that is none of it may come without end.
+/// How long an answer may go on: other text may come without end.
 const LONGEST_ANSWER: Duration = Duration::from_millis(4000);
-/// Answers without an entry behind which the walk counts as over: a unit may print a title or a last sentence.
+/// Answers without an entry after which the walk counts as over: a unit may print a title or a last sentence.
 const IDLE_ANSWERS: u32 = 3;
-/// Keys that are pressed at most; the largest product has 40 objects behind its first block.
+/// Keys that are pressed at most; the largest product has 40 objects after its first block.
 const MOST_STEPS: u32 = 4_000;
 /// Entries of the menu that show that it is there.
 const MENU_ENTRIES: u32 = 3;
-/// Entries in a hundred that may be missing behind a walk for a second one to be worth its time: what a line loses are
-/// single lines; other software may lack whole objects.
+/// Entries in a hundred that may be missing after a walk for a second one to be worth its time: noise costs single lines,
+/// other software may lack whole objects.
 const LOST_ON_THE_LINE: usize = 10;
 /// Answers in a row that are only lines which nobody understands, before the walk is given up: they may be entries in a
 /// layout of their own, of which others can be read. The largest product has 56 objects.
@@ -47,42 +47,56 @@ const MOST_EXITS: u32 = 3;
 pub(super) struct ReadDictionary {
     collector: Collector,
     stage: Stage,
-    /// The last answer showed entries.
-    fresh: bool,
-    /// The last answer had any text.
-    answered: bool,
-    /// The last answer named a product and its version, as a banner does and many a menu.
-    named: bool,
-    /// Lines that nobody understood before the last answer.
-    unread_before: usize,
-    /// Answers in a row that were nothing but new lines of that kind.
+    answer: Answer,
+    line_ends: LineEnds,
+    /// Answers in a row that were nothing but new lines that nobody understands.
     unread: u32,
-    /// Where an entry without a line end ended when it was first looked at.
-    unended: Option<u64>,
-    /// Answers whose last entry had a line end, and those whose last had none.
-    ended: u32,
-    not_ended: u32,
-    /// Entries without a line end that have been taken: halves, should it turn out that this unit ends its lines.
-    doubtful: Vec<Span>,
-    /// The letters of what stood without a line end behind the last answer.
-    prompt: String,
+    /// Answers in a row without anything new.
     idle: u32,
     steps: u32,
-    menu: u32,
-    asked_at: Instant,
-    /// The view has been walked through once, with so many keys, and is again.
-    again: Option<u32>,
     most_steps: u32,
+    /// The keys of the first walk, once there is a second one.
+    steps_of_first_walk: Option<u32>,
+    /// Entries of the menu that have been seen, each a bit.
+    menu: u32,
     deadline: Option<Instant>,
     heard: Option<Span>,
 }
 
+/// What the unit has answered to the last key.
+#[derive(Default)]
+struct Answer {
+    asked_at: Instant,
+    /// It has shown entries.
+    is_fresh: bool,
+    /// It has shown any text.
+    has_text: bool,
+    /// It has named a product and its version, as a banner does and many a menu.
+    is_named: bool,
+    /// Lines before it that nobody understood.
+    unread_before: usize,
+}
+
+/// Whether this unit ends its lines, as far as is known.
+#[derive(Default)]
+struct LineEnds {
+    /// Answers whose last entry had a line end, and those whose last had none.
+    ended: u32,
+    not_ended: u32,
+    /// Where an entry without a line end ended when it was first looked at.
+    unended: Option<u64>,
+    /// Entries without a line end that have been taken: halves, should it turn out that this unit ends its lines.
+    doubtful: Vec<Span>,
+    /// The letters of what followed the last answer without a line end.
+    prompt: String,
+}
+
 enum Stage {
-    /// V is out.
+    /// V has been sent.
     Opening,
-    /// Enter is out.
+    /// Enter has been sent.
     Walking,
-    /// X is out, so often, and M behind it if `asked`.
+    /// X has been sent, this often, and M after it if `asked`.
     Leaving { exits: u32, asked: bool, then: Outcome },
 }
 
@@ -91,45 +105,40 @@ impl ReadDictionary {
         ReadDictionary {
             collector: Collector::default(),
             stage: Stage::Opening,
-            fresh: false,
-            answered: false,
-            named: false,
-            unread_before: 0,
+            answer: Answer::default(),
+            line_ends: LineEnds::default(),
             unread: 0,
-            unended: None,
-            ended: 0,
-            not_ended: 0,
-            doubtful: Vec::new(),
-            prompt: String::new(),
             idle: 0,
             steps: 0,
-            menu: 0,
-            asked_at: Instant::ZERO,
-            again: None,
             most_steps: MOST_STEPS,
+            steps_of_first_walk: None,
+            menu: 0,
             deadline: None,
             heard: None,
         }
     }
 
-    /// Takes a line of an answer. What has been read before is no progress: a unit may repaint for ever.
+    /// A key is sent now, and what comes from here on answers it.
+    fn ask(&mut self, keys: &[u8], within: Duration, desk: &mut Desk<'_>) {
+        desk.send(keys);
+        self.answer = Answer { asked_at: desk.now, unread_before: self.collector.unread_lines(), ..Answer::default() };
+        self.deadline = Some(desk.now + within);
+    }
+
+    /// Takes a line of an answer. What has been read before is not progress: a unit may repaint for ever.
     fn take(&mut self, text: &Text, message: &Message) -> bool {
-        self.answered = true;
+        self.answer.has_text = true;
         let before = self.collector.count();
         let understood = self.collector.line(text, message);
         // The second time round everything has been read before.
-        self.fresh |= self.collector.count() > before || (self.again.is_some() && understood);
+        self.answer.is_fresh |= self.collector.count() > before || (self.steps_of_first_walk.is_some() && understood);
         understood
     }
 
     fn step(&mut self, desk: &mut Desk<'_>) {
         self.steps += 1;
-        (self.fresh, self.answered, self.named) = (false, false, false);
-        self.unread_before = self.collector.unread_lines();
-        desk.send(b"\r");
+        self.ask(b"\r", ANSWER, desk);
         self.stage = Stage::Walking;
-        self.asked_at = desk.now;
-        self.deadline = Some(desk.now + ANSWER);
         desk.events.push_back(Event::EntriesRead(self.collector.count()));
     }
 
@@ -140,39 +149,36 @@ impl ReadDictionary {
             Stage::Opening | Stage::Walking => 1,
         };
         self.menu = 0;
-        self.asked_at = desk.now;
-        desk.send(b"x");
+        self.ask(b"x", QUIET, desk);
         self.stage = Stage::Leaving { exits, asked: false, then };
-        self.deadline = Some(desk.now + QUIET);
     }
 
     /// Opens the view once more if the line has lost some of it, or if it may have been a banner that ended it: a unit
-    /// that starts anew does not do so in the same place twice.
+    /// that restarts does not do so in the same place twice.
     fn walks_again(&mut self, desk: &mut Desk<'_>) -> bool {
         let (missing, count) = (self.collector.missing(), self.collector.count());
         let is_little = missing * 100 <= count * LOST_ON_THE_LINE;
-        if self.again.is_some() || missing == 0 || !(is_little || self.named) {
+        if self.steps_of_first_walk.is_some() || missing == 0 || !(is_little || self.answer.is_named) {
             return false;
         }
-        self.again = Some(self.steps);
-        self.most_steps = if self.named { MOST_STEPS } else { self.steps + IDLE_ANSWERS };
+        self.steps_of_first_walk = Some(self.steps);
+        self.most_steps = if self.answer.is_named { MOST_STEPS } else { self.steps + IDLE_ANSWERS };
         self.collector.interrupt();
-        (self.fresh, self.answered, self.unended, self.idle, self.steps, self.menu) = (false, false, None, 0, 0, 0);
-        (self.named, self.unread) = (false, 0);
-        desk.send(b"v");
+        (self.idle, self.steps, self.menu, self.unread) = (0, 0, 0, 0);
+        self.line_ends.unended = None;
+        self.ask(b"v", ANSWER, desk);
         self.stage = Stage::Opening;
-        self.asked_at = desk.now;
-        self.deadline = Some(desk.now + ANSWER);
         true
     }
 
-    /// The menu is back: by itself at the end of the view, or because the unit has started anew.
+    /// The menu is back: by itself at the end of the view, or because the unit has restarted.
     fn back_at_menu(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         if self.walks_again(desk) {
             return None;
         }
-        let is_start =
-            self.named && self.collector.missing() > 0 && self.again.is_some_and(|steps| steps != self.steps);
+        let is_start = self.answer.is_named
+            && self.collector.missing() > 0
+            && self.steps_of_first_walk.is_some_and(|steps| steps != self.steps);
         Some(self.finished(if is_start { WalkEnd::Restarted } else { WalkEnd::Whole }, desk))
     }
 
@@ -189,14 +195,14 @@ impl ReadDictionary {
     }
 
     /// The last line of an answer may have no end: there are units of either kind, and half an entry looks like another
-    /// one. So it is taken when it stands still, of a unit that does not usually end its lines. True if more may come.
+    /// one. So it is taken once it stays as it is, from a unit that does not usually end its lines. True if more may come.
     fn waits_for_the_rest(&mut self, desk: &Desk<'_>) -> bool {
         let Some(text) = desk.pending.filter(|text| self.collector.reads(text)) else {
-            if self.fresh && matches!(self.stage, Stage::Walking) {
-                self.ended += 1;
+            if self.answer.is_fresh && matches!(self.stage, Stage::Walking) {
+                self.line_ends.ended += 1;
             }
             if self.ends_lines() {
-                for half in self.doubtful.drain(..) {
+                for half in self.line_ends.doubtful.drain(..) {
                     self.collector.forget(half);
                 }
             }
@@ -205,35 +211,35 @@ impl ReadDictionary {
             }
             return false;
         };
-        let moves = self.unended.replace(text.span.end) != Some(text.span.end);
+        let moves = self.line_ends.unended.replace(text.span.end) != Some(text.span.end);
         let ends_lines = self.ends_lines();
-        if (moves || ends_lines) && desk.now < self.asked_at + LONGEST_ANSWER {
-            self.deadline = Some((desk.now + STANDS_STILL).min(self.asked_at + LONGEST_ANSWER));
+        if (moves || ends_lines) && desk.now < self.answer.asked_at + LONGEST_ANSWER {
+            self.deadline = Some((desk.now + STANDS_STILL).min(self.answer.asked_at + LONGEST_ANSWER));
             return true;
         }
-        self.not_ended += 1;
+        self.line_ends.not_ended += 1;
         if ends_lines {
             // Lost with the rest of it: the second walk reads it.
             self.leave_behind(text);
         } else {
-            self.doubtful.push(text.span);
+            self.line_ends.doubtful.push(text.span);
             self.take(text, &Message::Text);
         }
         false
     }
 
     fn ends_lines(&self) -> bool {
-        self.ended > self.not_ended
+        self.line_ends.ended > self.line_ends.not_ended
     }
 
-    /// Text without a line end that is no entry is a prompt, or half of something. That may have been a heading: the
-    /// entries that follow would then belong to another object. A prompt is what stands there each time.
+    /// Text without a line end that is not an entry is a prompt, or half of something. That may have been a heading: the
+    /// entries that follow would then belong to another object. A prompt is the same each time.
     fn leave_behind(&mut self, text: &Text) {
         let letters: String = text.text.chars().filter(|character| character.is_alphabetic()).collect();
-        if letters.len() < PROMPT_LETTERS || letters != self.prompt {
+        if letters.len() < PROMPT_LETTERS || letters != self.line_ends.prompt {
             self.collector.interrupt();
         }
-        self.prompt = letters;
+        self.line_ends.prompt = letters;
     }
 
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
@@ -242,7 +248,7 @@ impl ReadDictionary {
         }
         let menu_is_back = self.menu.count_ones() >= MENU_ENTRIES;
         match &mut self.stage {
-            Stage::Opening if self.collector.count() == 0 && !self.answered => {
+            Stage::Opening if self.collector.count() == 0 && !self.answer.has_text => {
                 let outcome = self.no_answer(Awaited::Dictionary);
                 self.leave(desk, outcome);
                 None
@@ -252,15 +258,17 @@ impl ReadDictionary {
                 None
             }
             Stage::Walking => {
-                let is_unread = !self.fresh && self.collector.unread_lines() > self.unread_before;
+                let is_unread = !self.answer.is_fresh && self.collector.unread_lines() > self.answer.unread_before;
                 self.unread = if is_unread { self.unread + 1 } else { 0 };
-                let goes_on = self.fresh || (is_unread && self.collector.count() > 0 && self.unread < UNREAD_ANSWERS);
+                let goes_on =
+                    self.answer.is_fresh || (is_unread && self.collector.count() > 0 && self.unread < UNREAD_ANSWERS);
                 self.idle = if goes_on { 0 } else { self.idle + 1 };
-                if menu_is_back && !self.fresh {
+                if menu_is_back && !self.answer.is_fresh {
                     return self.back_at_menu(desk);
                 }
                 if self.idle >= IDLE_ANSWERS || self.steps >= self.most_steps {
-                    let is_whole = self.again.is_some() || self.answered && self.steps < self.most_steps;
+                    let is_whole =
+                        self.steps_of_first_walk.is_some() || self.answer.has_text && self.steps < self.most_steps;
                     let outcome = if self.collector.count() == 0 {
                         self.no_answer(Awaited::Entry)
                     } else {
@@ -278,9 +286,7 @@ impl ReadDictionary {
             Stage::Leaving { then, .. } if menu_is_back => Some(then.clone()),
             Stage::Leaving { asked: asked @ false, .. } => {
                 *asked = true;
-                self.asked_at = desk.now;
-                desk.send(b"m");
-                self.deadline = Some(desk.now + ANSWER);
+                self.ask(b"m", ANSWER, desk);
                 None
             }
             Stage::Leaving { exits, then, .. } if *exits >= MOST_EXITS => Some(then.clone()),
@@ -298,16 +304,14 @@ impl Work for ReadDictionary {
         match signal {
             Signal::Begin => {
                 self.collector.product = desk.facts.product.as_ref().and_then(|known| Product::named(&known.value));
-                desk.send(b"v");
-                self.asked_at = desk.now;
-                self.deadline = Some(desk.now + ANSWER);
+                self.ask(b"v", ANSWER, desk);
                 None
             }
             Signal::Heard(_, Message::Row(_)) => None,
             Signal::Heard(text, message) => {
                 self.heard = Some(text.span);
-                self.deadline = Some((desk.now + QUIET).min(self.asked_at + LONGEST_ANSWER));
-                self.named |=
+                self.deadline = Some((desk.now + QUIET).min(self.answer.asked_at + LONGEST_ANSWER));
+                self.answer.is_named |=
                     matches!(message, Message::Software(name) if name.product.is_some() && name.version.is_some());
                 match (message, &self.stage) {
                     (Message::MenuKey(key), _) => self.menu |= 1 << (*key as u32),
@@ -342,7 +346,12 @@ impl Work for ReadDictionary {
                 }
                 None
             }
-            Signal::LinkLost => Some(Outcome::Cancelled(Job::ReadDictionary)),
+            // What has been read is not lost with the link.
+            Signal::LinkLost => Some(match &self.stage {
+                Stage::Leaving { then, .. } => then.clone(),
+                Stage::Opening | Stage::Walking if self.collector.count() > 0 => self.finished(WalkEnd::Stopped, desk),
+                Stage::Opening | Stage::Walking => Outcome::Cancelled(Job::ReadDictionary),
+            }),
         }
     }
 

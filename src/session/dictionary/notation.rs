@@ -1,8 +1,8 @@
 //! How a unit writes its numbers, as far as it matters for what they are.
 //!
 //! `250` is 250 wherever hexadecimal numbers are marked. Of a unit that prints `C000027F` it may be 592 as well, so digits
-//! without a mark are no value in such a walk, other than those that are the same number either way. What the manual says
-//! of every unit, its vendor and its product code (object 1018h), shows how they are written.
+//! without a mark are not a value in such a walk, unless they are the same number either way. The vendor and product code
+//! (object 1018h), which the manual fixes for every unit, show how numbers are written.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! Stories of what was typed (`>`) and what came, each so many milliseconds behind the one before. Each is told twice:
+//! Stories of what was typed (`>`) and what came, each with the milliseconds since the one before. Each is told twice:
 //! as a recording, to the job that listens to it, and to a live session in which somebody types by hand. Both have to
 //! make the same of it.
 
@@ -18,8 +18,8 @@ struct Told {
     shows: bool,
 }
 
-/// How long behind its last piece a story ends: nothing is waited for but the end of a page.
-const TAIL: u64 = 450;
+/// How long after its last piece a story ends: long enough for the end of a page, and for nothing else.
+const TAIL: u64 = 850;
 
 fn tell(mut session: Session, story: Story<'_>, typed: fn(&mut Session, Instant, &str)) -> Session {
     let mut millis = 0;
@@ -82,7 +82,7 @@ const SWITCHED: [(u64, &str); 3] = [
 ];
 
 #[test]
-fn behind_the_key_for_it_the_first_page_is_believed_and_else_the_one_that_comes_again() {
+fn after_the_key_for_it_the_first_page_counts_and_otherwise_the_one_that_comes_again() {
     for (story, expected) in [
         (&[(0, ">s"), (800, PAGE)][..], (1, 0, true)),
         (&[(0, ">s"), (800, PAGE), (1_000, PAGE), (100, ">s"), (3_000, "")], (2, 0, false)),
@@ -100,7 +100,7 @@ fn behind_the_key_for_it_the_first_page_is_believed_and_else_the_one_that_comes_
 }
 
 #[test]
-fn a_dialogue_is_no_page_and_pages_come_before_and_behind_one() {
+fn a_dialogue_is_not_a_page_and_pages_come_before_and_after_one() {
     let twice = [SWITCH, SWITCHED, SWITCH, SWITCHED].concat();
     assert!(both(&twice).pages.is_empty());
     let story = [&twice[..], &[(1_000, ">s"), (800, PAGE), (1_000, PAGE), (100, ">s"), (900, "Off 1.\r\n")]].concat();
@@ -115,7 +115,7 @@ fn a_page_that_answers_come_with_is_given_without_them() {
     let menu = format!("V - View Object Dictionary 1\r\nanything 7\r\n{PAGE}");
     let told = both(&[(0, ">s"), (800, PAGE), (900, ">m"), (100, &menu)]);
     assert_eq!(told.pages, [lines(PAGE), lines(PAGE)]);
-    // Of a page most has to be left: one line like one of its may stand in the view.
+    // Most of a page has to be left: the view may have a line like one of its.
     let told = both(&[(0, ">s"), (800, LONG), (900, ">v"), (100, "TC1 100.0 C\r\n7 more\r\n")]);
     assert_eq!(told.pages, [lines(LONG)]);
 }
@@ -125,9 +125,26 @@ fn a_key_in_the_middle_of_what_may_be_a_page_makes_it_doubtful() {
     let (first, second) = PAGE.split_at(PAGE.find("TC1").expect("it is there"));
     let doubtful = [(0, ">s"), (800, first), (5, ">1"), (5, second)];
     assert_eq!(both(&doubtful).pages.len(), 0);
-    // The next one is none.
+    // The next one is not.
     let story = [&doubtful[..], &[(1_000, PAGE)]].concat();
     assert_eq!(both(&story).pages.len(), 1);
+}
+
+#[test]
+fn a_page_may_pause_between_its_lines() {
+    let lines = |pause| [(pause, "Supply 24.1 V\r\n"), (250, "TC1 100.0 C\r\n"), (250, "CJ 23.0 C\r\n")];
+    let unasked = both(&[lines(0), lines(500)].concat());
+    assert_eq!(unasked.pages.iter().map(Vec::len).collect::<Vec<_>>(), [3, 3]);
+    let asked = both(
+        &[&[(0, ">s")][..], &lines(800), &lines(500), &[(100, ">s"), (100, "CJ 23.0 C\r\n"), (2_000, "")]].concat(),
+    );
+    assert_eq!((asked.pages.len(), asked.shows), (2, false), "and none after the key");
+}
+
+#[test]
+fn lines_that_never_pause_are_no_pages_unless_somebody_asks_for_them() {
+    let endless: Vec<(u64, &str)> = std::iter::repeat_n((300, "Supply 24.1 V\r\n"), 20).collect();
+    assert_eq!(both(&endless).pages.len(), 0);
 }
 
 #[test]
@@ -160,7 +177,7 @@ fn a_unit_says_itself_whether_pages_come() {
 }
 
 #[test]
-fn a_unit_that_starts_anew_shows_no_pages_any_more() {
+fn a_unit_that_restarts_shows_no_pages_any_more() {
     let defaults =
         [(0, ">d"), (10, "Enter Yes to restore the defaults: "), (900, ">Yes\r"), (10, "Yes\r\n"), (10, BANNER)];
     assert!(both(&defaults).pages.is_empty());

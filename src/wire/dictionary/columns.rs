@@ -1,11 +1,11 @@
 //! Lines in columns: of an entry, or with several entries side by side.
 //!
-//! A number of one or two digits is a sub-index only where the layout says so: in a column of its own behind an index,
+//! A number of one or two digits is a sub-index only where the layout says so: in a column of its own after an index,
 //! before an equals sign in a list of such, or at the head of a column that goes on where the one before it ended.
 
 use super::{COLUMNS, SubIndex, ViewLine, address, sub_at_head};
 
-/// The columns of a line: what stands between bars, tabs, semicolons, or two or more blanks.
+/// The columns of a line: what is between bars, tabs, semicolons, or two or more blanks.
 pub(super) fn of(text: &str) -> Vec<String> {
     let is_border = |sign: char| matches!(sign, '|' | '\t' | ';' | '\u{2500}'..='\u{259F}');
     let even: String =
@@ -109,14 +109,14 @@ fn side_by_side(columns: &[String], knows: &impl Fn(u16) -> bool) -> Option<Vec<
                 entries.push((ViewLine { index, sub: Some(sub), rest: String::new() }, place(taken)));
             }
             (None, Some((_, rest))) => rest.extend(place(0)),
-            // Something else stands before the first of them.
+            // Something else comes before the first of them.
             (None, None) => return None,
         }
     }
     in_order(entries.into_iter().map(|(line, rest)| ViewLine { rest: join(&rest), ..line }).collect())
 }
 
-/// Two entries or more of one object whose sub-indices follow one another, with something behind each.
+/// Two entries or more of one object whose sub-indices follow one another, with something after each.
 fn in_order(lines: Vec<ViewLine>) -> Option<Vec<ViewLine>> {
     let follows = |pair: &[ViewLine]| {
         let [Some(one), Some(next)] = [pair[0].sub, pair[1].sub] else { return false };
@@ -197,7 +197,10 @@ mod tests {
         fn columns_of_any_words_keep_all_of_them(text in "([a-z0-9=:h|│\t ]){0,60}") {
             let plain = |text: &str| text.replace(['|', '│', '\t', ' '], "");
             prop_assert_eq!(plain(&join(&words(&of(&text)))), plain(&text));
-            let _ = several(&text, |_| true);
+            for line in several(&text, |_| true).concat() {
+                prop_assert!(line.sub.is_some() && !line.rest.is_empty(), "{:?}", line);
+                prop_assert!(line.rest.split_whitespace().all(|word| text.contains(word)), "{:?}", line);
+            }
         }
 
         #[test]

@@ -1,8 +1,8 @@
 //! Lines of V, the view of the object dictionary (manuals, section 4.1.1).
 //!
 //! The manuals fix hexadecimal indices and nothing else. So a line is read by its tokens: an index in one of its usual
-//! spellings, a sub-index beside it or at the head of a line below, and what is left, out of which somebody who knows the
-//! entry picks its value ([`value()`]). A line that leaves a doubt stays text.
+//! spellings, a sub-index beside it or at the head of a line below, and the rest, out of which a caller who knows the entry
+//! picks its value ([`value()`]). A line that leaves a doubt stays text.
 
 mod columns;
 mod value;
@@ -21,7 +21,7 @@ pub struct ViewLine {
     pub rest: String,
 }
 
-/// A sub-index as printed. Units write it in hexadecimal or in decimal digits; which, tell only its neighbours.
+/// A sub-index as printed. Units write it in hexadecimal or in decimal digits; only its neighbours tell which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SubIndex {
     /// Its digits as hexadecimal ones.
@@ -31,7 +31,7 @@ pub struct SubIndex {
 }
 
 impl SubIndex {
-    /// The sub-index that is meant behind the one before it.
+    /// The sub-index that is meant after the one before it.
     pub fn behind(self, before: Option<u8>) -> u8 {
         let next = before.map_or(0, |before| before.saturating_add(1));
         match self.decimal {
@@ -49,7 +49,7 @@ impl SubIndex {
     }
 }
 
-/// What stands between two columns of [`ViewLine::rest`].
+/// What is between two columns of [`ViewLine::rest`].
 const COLUMNS: &str = "  ";
 
 /// Reads a line. `knows` says whether an index is that of an object: spellings that could be something else count only
@@ -60,7 +60,7 @@ pub fn line(text: &str, knows: impl Fn(u16) -> bool) -> Option<ViewLine> {
     let tokens: Vec<&str> = placed.iter().map(|(_, token)| *token).collect();
     let head = sub_at_head(&tokens);
     for (place, token) in tokens.iter().enumerate() {
-        // Behind a sub-index a number of four digits is a value: `01h RTD1 = 2711h`.
+        // After a sub-index a number of four digits is a value: `01h RTD1 = 2711h`.
         let Some((index, sub, marked)) = address(token).filter(|_| place == 0 || head.is_none()) else { continue };
         let names_object = place == 0 || tokens[place - 1].to_ascii_lowercase().starts_with(['o', 'i']);
         if !((marked || place == 0) && knows(index) || marked && index >= 0x1000 && names_object) {
@@ -110,12 +110,12 @@ fn address(token: &str) -> Option<(u16, Option<SubIndex>, bool)> {
     let (separator, sub) = ["sub", ":", ".", "/", ",", "[", "("]
         .iter()
         .find_map(|separator| Some((*separator, SubIndex::of(lower.strip_prefix(separator)?)?)))?;
-    // A number like 6126.01 is no address unless something marks it.
+    // A number like 6126.01 is not an address unless something marks it.
     let bracketed = token.starts_with('[');
     Some((index, Some(sub), marked || bracketed || matches!(separator, "sub" | ":")))
 }
 
-/// A sub-index in tokens of its own behind an index, and how many tokens it takes: `sub 1`, `sub-index: 01`, `[1]`, `01h`;
+/// A sub-index in tokens of its own after an index, and how many tokens it takes: `sub 1`, `sub-index: 01`, `[1]`, `01h`;
 /// also within the brackets of the index: `(6126h, 1)`.
 fn sub_behind(index: &str, tokens: &[&str]) -> (Option<SubIndex>, usize) {
     let Some((sub, taken)) = sub_at_head(tokens) else { return (None, 0) };
@@ -215,20 +215,25 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_text_is_read_without_complaint(text in "\\PC{0,120}") {
+        fn any_text_gives_nothing_but_what_it_says(text in "\\PC{0,120}") {
             if let Some(line) = line(&text, |_| true) {
+                prop_assert!(line.rest.split_whitespace().all(|word| text.contains(word)), "{:?}", line);
                 let expected = Expected { data_type: DataType::Real32, names: &["TC1", "a b"], unit: Some("ms") };
-                let _ = value(&line.rest, &expected);
+                let numeral = value(&line.rest, &expected).map(|reading| reading.numeral);
+                prop_assert!(numeral.is_none_or(|numeral| line.rest.contains(&numeral)), "{:?}", line);
             }
         }
 
         #[test]
-        fn tokens_in_any_order_are_read_without_complaint(
+        fn tokens_in_any_order_give_no_other_entry_than_theirs(
             text in "((6126h|0x6126|sub|1|=|:|16\\.0|\\[|\\]|0x|h|\\.\\.\\.|é)[ ]?){0,12}"
         ) {
             if let Some(line) = line(&text, |_| true) {
+                let is_of_text = |index: u16| text.contains(&format!("{index:04x}"));
+                prop_assert!(line.index.is_none_or(is_of_text), "{:?}", line);
                 let expected = Expected { data_type: DataType::Unsigned16, names: &["sub 1"], unit: None };
-                let _ = value(&line.rest, &expected);
+                let numeral = value(&line.rest, &expected).map(|reading| reading.numeral);
+                prop_assert!(numeral.is_none_or(|numeral| line.rest.contains(&numeral)), "{:?}", line);
             }
         }
     }

@@ -1,9 +1,10 @@
-//! Which of the words behind an entry's address is its value.
+//! Which of the words after an entry's address is its value.
 //!
-//! Somebody who knows the entry says its type, the names it may carry, and its unit. What can be read in two ways is no
-//! value: a decimal comma, another unit of the same quantity, two numbers of which either could be meant.
+//! The caller knows the entry's type, the names it may carry, and its unit. What can be read in two ways is not a value: a
+//! decimal comma, another unit of the same quantity, two numbers of which either could be meant.
 
 use crate::canopen::{DataType, Value};
+use crate::wire::units::unit;
 
 /// What is known of an entry whose value is looked for.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +24,7 @@ pub enum Shown {
     Value(Value),
     /// Nothing: the unit has no number for it at the moment.
     Nothing,
-    /// Digits that only somebody prints who writes hexadecimal numbers without a mark: `C000027F`, `FA 00 00 00`.
+    /// Digits that only a unit prints that writes hexadecimal numbers without a mark: `C000027F`, `FA 00 00 00`.
     Hexadecimal,
 }
 
@@ -38,12 +39,12 @@ pub struct Reading {
     pub plain: bool,
 }
 
-/// What a candidate stands behind, the surest first.
+/// What comes before a candidate, the surest first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Place {
     Equals,
     Colon,
-    /// Behind the word `value`, or alone in its column.
+    /// After the word `value`, or alone in its column.
     Column,
     Anywhere,
 }
@@ -97,11 +98,11 @@ pub fn value(rest: &str, expected: &Expected<'_>) -> Option<Reading> {
     Some(Reading { plain: plain && hexadecimal.is_empty(), ..one })
 }
 
-/// Numbers that may be the value, with where they stand. `None` if one of them may be meant in another way.
+/// Numbers that may be the value, with their places. `None` if one of them may be meant in another way.
 fn candidates(tokens: &[Token<'_>], expected: &Expected<'_>) -> Option<Vec<(Place, Reading)>> {
     let mut found = Vec::new();
     let mut place = Place::Anywhere;
-    // The word directly before, whatever signs stand between.
+    // The word directly before, whatever signs are between.
     let mut label = String::new();
     for (at, token) in tokens.iter().enumerate() {
         let Some(text) = token.text else {
@@ -125,11 +126,11 @@ fn candidates(tokens: &[Token<'_>], expected: &Expected<'_>) -> Option<Vec<(Plac
         }
         if let Some(reading) = read(bare, expected) {
             let mut behind = tokens[at + 1..].iter().map(|token| token.text.unwrap_or_default());
-            let (unit, further) = (behind.next().unwrap_or_default(), behind.next().unwrap_or_default());
+            let (next, further) = (behind.next().unwrap_or_default(), behind.next().unwrap_or_default());
             // `500 min 0 max 65535` is about limits, and not about minutes.
             let is_limit =
-                unit == "min" && further.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '='));
-            if !is_limit && !fits(plain_unit(unit), expected.unit) {
+                next == "min" && further.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '='));
+            if !is_limit && !fits(plain_unit(next), expected.unit) {
                 return None;
             }
             let is_column = is_alone(tokens, at) || matches!(label.as_str(), "value" | "val");
@@ -160,17 +161,17 @@ fn is_other(label: &str) -> bool {
     labels.contains(&label)
 }
 
-/// Whether a number has its column to itself, but for a unit and what stands in brackets.
+/// Whether a number has its column to itself, but for a unit and what is in brackets.
 fn is_alone(tokens: &[Token<'_>], at: usize) -> bool {
     let column = tokens[at].column;
     let mut others = tokens.iter().enumerate().filter(|(place, token)| token.column == column && *place != at);
     others.all(|(place, token)| match token.text {
         None => true,
-        Some(text) => place > at && (text.starts_with(['(', '[']) || unit_of(plain_unit(text)).is_some()),
+        Some(text) => place > at && (text.starts_with(['(', '[']) || unit(plain_unit(text)).is_some()),
     })
 }
 
-/// The bytes of a value that is printed as such; one that stands alone is a number.
+/// The bytes of a value that is printed as such; a single one is a number.
 fn bytes<'a>(tokens: &[Token<'a>]) -> Option<Vec<&'a str>> {
     let is_byte = |token: &&Token<'a>| token.text.is_some_and(|text| text.len() == 2 && is_hexadecimal(text));
     (0..tokens.len()).find_map(|at| {
@@ -215,7 +216,7 @@ fn bare(word: &str) -> &str {
     word.trim_matches(['(', ')', '[', ']', '<', '>', ',', ';', '"', '\'']).trim_end_matches(':')
 }
 
-/// Takes a name's words out of the tokens, where they stand one behind the other.
+/// Takes a name's words out of the tokens, where they follow one another.
 fn forget(tokens: &mut [Token<'_>], name: &str) {
     let words: Vec<String> = name.split_whitespace().map(plain).collect();
     if words.is_empty() || words.len() > tokens.len() {
@@ -235,7 +236,7 @@ fn plain(word: &str) -> String {
     word.trim_matches(|c: char| !c.is_alphanumeric()).to_lowercase()
 }
 
-/// What a word says of an entry, if it is a number or stands for none.
+/// What a word says of an entry, if it is a number or means that there is none.
 fn read(word: &str, expected: &Expected<'_>) -> Option<Reading> {
     let reading = |shown, numeral: &str| {
         let digits = numeral.strip_prefix(['+', '-']).unwrap_or(numeral);
@@ -244,11 +245,11 @@ fn read(word: &str, expected: &Expected<'_>) -> Option<Reading> {
     if let Some(shown) = parse(word, expected.data_type) {
         return Some(reading(shown, word));
     }
-    // `16ms`, `24.1V`. Letters that are hexadecimal digits as well are units only behind a point.
+    // `16ms`, `24.1V`. Letters that are hexadecimal digits as well are units only after a point.
     let end = word.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '+' | '-')))?;
-    let (numeral, unit) = word.split_at(end);
+    let (numeral, behind) = word.split_at(end);
     let is_sure =
-        unit_of(unit).is_some() && (numeral.contains('.') || !is_hexadecimal(unit)) && fits(unit, expected.unit);
+        unit(behind).is_some() && (numeral.contains('.') || !is_hexadecimal(behind)) && fits(behind, expected.unit);
     parse(numeral, expected.data_type).filter(|_| is_sure).map(|shown| reading(shown, numeral))
 }
 
@@ -285,36 +286,13 @@ fn plain_unit(word: &str) -> &str {
     word.trim_matches(['(', ')', '[', ']', ',', ';', '.'])
 }
 
-/// A unit's quantity, and the unit in one spelling.
-fn unit_of(word: &str) -> Option<(&'static str, &'static str)> {
-    Some(match word.to_lowercase().replace(['µ', 'μ'], "u").as_str() {
-        "v" => ("voltage", "V"),
-        "mv" => ("voltage", "mV"),
-        "uv" => ("voltage", "uV"),
-        "a" => ("current", "A"),
-        "ma" => ("current", "mA"),
-        "ua" => ("current", "uA"),
-        "s" | "sec" => ("time", "s"),
-        "ms" => ("time", "ms"),
-        "us" => ("time", "us"),
-        "min" => ("time", "min"),
-        "c" | "°c" | "degc" | "deg" => ("temperature", "C"),
-        "f" | "°f" | "degf" => ("temperature", "F"),
-        "ohm" | "ohms" | "ω" => ("resistance", "ohm"),
-        "kohm" => ("resistance", "kohm"),
-        "hz" => ("frequency", "Hz"),
-        "khz" => ("frequency", "kHz"),
-        _ => return None,
-    })
-}
-
-/// Whether a unit behind a number may be that of the entry. Another one of the same quantity makes it another number:
+/// Whether a unit after a number may be that of the entry. Another one of the same quantity makes it another number:
 /// `24061 mV` is not 24061 V.
 fn fits(printed: &str, own: Option<&str>) -> bool {
-    let (Some((quantity, printed)), Some(own)) = (unit_of(printed), own) else { return true };
+    let (Some(printed), Some(own)) = (unit(printed), own) else { return true };
     // `0.1 °C` counts tenths of it.
     let (factor, name) = own.rsplit_once(' ').map_or((None, own), |(factor, name)| (Some(factor), name));
-    unit_of(name).is_none_or(|(of, own)| of != quantity || (own == printed && factor.is_none()))
+    unit(name).is_none_or(|own| own.quantity != printed.quantity || (own == printed && factor.is_none()))
 }
 
 #[cfg(test)]

@@ -1,0 +1,75 @@
+//! Leaving a question that a job does not answer.
+//!
+//! A unit may take the key that leaves a question for an answer, and ask the next one. So the line is watched for a while,
+//! and whatever is asked meanwhile is left as well.
+
+use super::event::Outcome;
+use super::job::Desk;
+use crate::time::{Duration, Instant};
+use crate::wire::Message;
+
+/// Questions that are left, one after the other, before a unit that goes on asking is given up.
+const MOST: u32 = 3;
+
+/// Questions on their way out, and how the job ends once none is open.
+#[derive(Debug)]
+pub(super) struct Leaving {
+    /// What leaves a question.
+    keys: &'static [u8],
+    /// How long the unit may take to ask the next one.
+    wait: Duration,
+    left: u32,
+    is_asked: bool,
+    due: Instant,
+    then: Outcome,
+}
+
+impl Leaving {
+    /// Leaves the question at hand.
+    pub(super) fn begin(keys: &'static [u8], wait: Duration, desk: &mut Desk<'_>, then: Outcome) -> Self {
+        let mut leaving = Leaving::if_asked(keys, wait, desk.now, then);
+        leaving.leave(desk);
+        leaving
+    }
+
+    /// No question is open, but the unit may ask one by `due`.
+    pub(super) fn if_asked(keys: &'static [u8], wait: Duration, due: Instant, then: Outcome) -> Self {
+        Leaving { keys, wait, left: 0, is_asked: false, due, then }
+    }
+
+    fn leave(&mut self, desk: &mut Desk<'_>) {
+        desk.send(self.keys);
+        self.left += 1;
+        self.is_asked = false;
+        self.due = desk.now + self.wait;
+    }
+
+    /// The unit has printed something. A row of the stream, or a page, may end the line of a question that is still open.
+    pub(super) fn heard(&mut self, message: &Message) {
+        self.is_asked |= matches!(message, Message::Prompt(_));
+    }
+
+    /// The job ends otherwise than it was going to.
+    pub(super) fn end_as(&mut self, then: Outcome) {
+        self.then = then;
+    }
+
+    /// How the job ends.
+    pub(super) fn then(&self) -> Outcome {
+        self.then.clone()
+    }
+
+    /// When [`Leaving::time_is_up`] is wanted.
+    pub(super) fn due(&self) -> Instant {
+        self.due
+    }
+
+    /// The unit has had its time. Leaves the next question if there is one; otherwise the job is over.
+    pub(super) fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if (self.is_asked || desk.pending.is_some()) && self.left < MOST {
+            self.leave(desk);
+            return None;
+        }
+        Some(self.then())
+    }
+}
