@@ -120,7 +120,7 @@ fn image() -> CheckedImage {
 
 #[test]
 fn a_byte_of_the_file_that_is_lost_doubled_corrupted_or_unreadable_fails_the_upload_and_says_how() {
-    // The 5,000th byte stands within a record.
+    // The 5,000th byte is within a record.
     for (fault, errors) in [
         ("lost to-unit at byte 5000", ["error 4", "error 2", "error 3"].as_slice()),
         ("doubled to-unit at byte 5000", &["error 4", "error 2", "error 3"]),
@@ -179,9 +179,9 @@ fn a_reset_or_a_power_cut_at_any_record_leaves_a_unit_that_waits_and_can_be_save
             let mut bench = Faulty::running(LoaderKind::G2, &[&format!("{fault}{record}{back}")]);
             let report = bench.load(&image);
             assert_eq!(report.verdict, Verdict::Failed, "{fault}{record}: {report:?}");
-            // G2 says its prompt on the line of its dots: begun before the end record, it proves nothing behind it.
-            let is_behind_the_end = record == 189 && fault.starts_with("power");
-            let known = if is_behind_the_end { UnitNow::Unknown } else { UnitNow::Loader };
+            // G2 says its prompt on the line of its dots: begun before the end record, it proves nothing after it.
+            let is_after_the_end = record == 189 && fault.starts_with("power");
+            let known = if is_after_the_end { UnitNow::Unknown } else { UnitNow::Loader };
             assert_eq!(report.unit, known, "{fault}{record}: {report:?}");
             // Nobody can know before the loader speaks again; at the next page its XON is missing.
             let sent = record..=record + 18;
