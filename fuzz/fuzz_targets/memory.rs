@@ -1,4 +1,4 @@
-//! What lies in a unit's memory: an identity block and an image of the parameters are read or refused, and what was
+//! What is in a unit's memory: an identity block and an image of the parameters are read or refused, and what was
 //! read is what is written again.
 #![no_main]
 
@@ -18,13 +18,13 @@ fn identity(program: &[u8]) {
         Ok(verified) => assert_eq!(verified, identity),
         Err(error) => assert!(matches!(error, IdentityError::Crc { stored, .. } if stored == identity.crc)),
     }
-    // Stamped anew it is sound, and says the same.
+    // Stamped again it is sound, and says the same.
     let mut stamped = program[..words * 2].to_vec();
     identity.stamp(&mut stamped);
     assert_eq!(Identity::verify(&stamped), Ok(identity));
 }
 
-/// The bytes as a whole memory whose slots are intact: chance finds no check sum.
+/// The bytes as a whole memory whose slots are intact: chance finds no checksum.
 fn sealed(bytes: &[u8]) -> Vec<u8> {
     let mut image = bytes.to_vec();
     image.resize(IMAGE_BYTES, 0xFF);

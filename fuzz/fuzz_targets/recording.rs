@@ -19,7 +19,7 @@ fn read<'a>(chunks: impl Iterator<Item = &'a [u8]>) -> (Vec<Piece>, String) {
     (pieces, format!("{end:?}"))
 }
 
-/// The pieces behind the header, in a recording of our own.
+/// The pieces after the header, in a recording of our own.
 fn record(pieces: &[Piece]) -> Vec<u8> {
     let mut cast = Cast::begin(Vec::new(), &Header::default(), Instant::ZERO).expect("a vector takes all");
     for piece in pieces {

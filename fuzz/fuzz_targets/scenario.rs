@@ -14,7 +14,7 @@ use libfuzzer_sys::fuzz_target;
 
 /// As long as a scenario is played.
 const PLAYED: Duration = Duration::from_secs(3);
-/// Steps a stage takes in that time at most: a ramp has ten a second, a stream a thousand characters.
+/// The most steps a stage takes in that time: a ramp has ten a second, a stream a thousand characters.
 const MOST_STEPS: u32 = 200_000;
 
 fn flash(product: &Product) -> Vec<u8> {

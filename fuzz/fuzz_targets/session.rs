@@ -119,7 +119,7 @@ fuzz_target!(|input: &[u8]| {
     let from_unit = |from| record.entries_from(from).filter(|entry| entry.direction == Direction::FromUnit);
     let kept: usize = from_unit(0).map(|entry| entry.bytes.len()).sum();
     assert!(kept <= received.len());
-    // A password with a pause in it is no echo of ours.
+    // A password with a pause in it is not an echo of ours.
     let in_one_piece = answers.iter().map(|(_, bytes)| count(bytes)).sum::<usize>() == count(&received);
     if let Some(sent_at) = console.sent_at.filter(|_| in_one_piece) {
         let later: Vec<u8> = from_unit(sent_at).flat_map(|entry| entry.bytes.clone()).collect();

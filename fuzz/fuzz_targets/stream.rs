@@ -7,7 +7,7 @@ use axcon::wire::stream::{Layout, Reading, Row, Source};
 use axcon_fuzz::parameter;
 use libfuzzer_sys::fuzz_target;
 
-/// Equal, as far as so many digits behind the point and a number's precision go.
+/// Equal, as far as this many decimal places and a number's precision go.
 fn alike(one: &Row, other: &Row) -> bool {
     one.source == other.source
         && one.readings.len() == other.readings.len()

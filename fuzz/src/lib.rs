@@ -6,8 +6,8 @@ use axcon::device::Complaint;
 
 /// The input as a talk: bytes that come at once, and the wait before them.
 ///
-/// A NUL and a byte n behind it are a wait of n² ms, up to a minute; two NULs are a NUL. All else comes as it is, so a
-/// file without a NUL comes in one piece.
+/// A NUL followed by a byte n is a wait of n² ms, up to a minute; two NULs are a NUL. All else comes as it is, so a file
+/// without a NUL comes in one piece.
 pub fn pieces(input: &[u8]) -> Vec<(Duration, Vec<u8>)> {
     let mut pieces = vec![(Duration::ZERO, Vec::new())];
     let mut bytes = input.iter().copied();
@@ -22,7 +22,7 @@ pub fn pieces(input: &[u8]) -> Vec<(Duration, Vec<u8>)> {
     pieces
 }
 
-/// What stands before the first byte, and what behind it: targets that have a parameter take it from there.
+/// The first byte and what follows it: targets that have a parameter take it from there.
 pub fn parameter(input: &[u8]) -> Option<(u8, &[u8])> {
     input.split_first().map(|(&first, rest)| (first, rest))
 }

@@ -36,7 +36,7 @@ impl fmt::Display for Complaint {
     }
 }
 
-/// The most complaints about one file that are shown: more help nobody, and each is looked up in the text.
+/// The most complaints about one file that are shown: more are of no help, and each is looked up in the text.
 const MOST_COMPLAINTS: usize = 100;
 /// The most characters of a message that are shown: a key or a text of the file may have any length.
 const LONGEST_MESSAGE: usize = 400;

@@ -61,7 +61,7 @@ impl Emergency {
     fn channel_name(self, product: &Product) -> String {
         let inputs = usize::from(product.measurement.channels);
         let names = &product.stream.channels;
-        // A unit may send its cold junction in front of its inputs.
+        // A unit may send its cold junction before its inputs.
         let in_front = names.len().saturating_sub(inputs);
         let place = usize::from(self.channel).checked_sub(1).filter(|place| *place < inputs);
         let name = place.and_then(|place| names.get(in_front + place));

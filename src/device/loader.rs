@@ -20,7 +20,7 @@ pub enum LoaderKind {
     G2,
     /// Circular buffer, 2005 and later: XOFF after every record.
     G3,
-    /// The same up to version 1.3: it takes the check sum of a record with an odd number of data bytes as data, and waits
+    /// The same up to version 1.3: it takes the checksum of a record with an odd number of data bytes as data, and waits
     /// for ever. The console sends whole words to every loader, so it treats both alike.
     #[serde(rename = "g3-1.3")]
     G3Early,
@@ -64,7 +64,7 @@ pub enum Pacing {
     /// way, no second one.
     Pages,
     /// XOFF after every record, XON when the receive ring is empty: each pair says that a record has been taken. S0
-    /// erases all of the program flash before its XON. Nobody counts what is in the ring of [`RING`] characters.
+    /// erases all of the program flash before its XON. Nothing counts what is in the ring of [`RING`] characters.
     Records,
 }
 

@@ -71,7 +71,7 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
     places.into_iter().filter_map(differs).collect()
 }
 
-/// Where an entry lies; index and sub-index as they are written in a dump that somebody has edited badly.
+/// Where an entry is; index and sub-index as written if the dump has been edited badly.
 type Place<'a> = Result<ObjectAddress, (&'a str, u8)>;
 
 fn by_place(dump: &Dump) -> BTreeMap<Place<'_>, &DumpEntry> {

@@ -224,7 +224,7 @@ impl Dump {
         self.entries.iter().filter(listed).map(|entry| entry.meaning.as_deref().unwrap_or(&entry.text))
     }
 
-    /// How many entries show a value that nobody can be certain of.
+    /// How many entries show a value that is not certain.
     pub fn doubtful(&self) -> usize {
         self.entries.iter().filter(|entry| entry.value.is_none() && entry.meaning.as_deref() == Some(DOUBTFUL)).count()
     }
@@ -259,7 +259,7 @@ impl DumpEntry {
         }
     }
 
-    /// Where it lies; `None` in a dump that somebody has edited badly.
+    /// Where it is; `None` in a dump that has been edited badly.
     pub fn at(&self) -> Option<ObjectAddress> {
         let index = u16::from_str_radix(&self.index, 16).ok()?;
         Some(ObjectAddress { index, sub: self.subindex })

@@ -57,7 +57,7 @@ impl Dump {
     }
 }
 
-/// A text as a field that no spreadsheet evaluates: the unit, or somebody who has edited a dump, has written it.
+/// A text as a field that no spreadsheet evaluates: it comes from the unit, or from a dump that anybody may have edited.
 fn quoted(text: &str) -> String {
     let is_formula = text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err();
     let text = if is_formula { format!("'{text}") } else { text.to_owned() };

@@ -20,7 +20,7 @@ struct Piece {
     hump: Option<[f64; 3]>,
 }
 
-/// Steps of the iteration at most: it halves its interval at worst.
+/// The most steps of the iteration: it halves its interval at worst.
 const MOST_STEPS: usize = 80;
 /// The iteration ends when a step is smaller than this, in °C.
 const CLOSE_ENOUGH: f64 = 1e-7;

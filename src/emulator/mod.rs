@@ -73,7 +73,7 @@ pub struct Store {
     pub area: Area,
     /// Byte offset.
     pub offset: usize,
-    /// What lies there now.
+    /// What is there now.
     pub bytes: Vec<u8>,
 }
 
@@ -422,7 +422,7 @@ impl Endpoint for Unit {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let Power::On { program, .. } = &self.power else { return None };
-        // Asked for some thousand times in each second of a unit that talks: plain comparisons, no list of what may be due.
+        // Asked some thousand times a second while the unit talks: plain comparisons, no list of what may be due.
         let program_due = match program {
             Program::Starting { until, .. } => *until,
             Program::Loader(loader) => loader.deadline(&self.flash).unwrap_or(Instant::NEVER),

@@ -1,4 +1,4 @@
-//! The CANopen node's state (CiA 301, NMT): who changes it, and when it changes by itself.
+//! The CANopen node's state (CiA 301, NMT): what changes it, and when it changes by itself.
 //!
 //! The node starts pre-operational. It is not operational before the first valid data (manuals, section 1.1); what
 //! becomes of a start that comes earlier is the product's. With object 5555h set it becomes operational by itself, 5 s

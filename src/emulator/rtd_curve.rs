@@ -33,7 +33,7 @@ pub fn coefficients(selected: i64) -> Option<[f32; 3]> {
     COEFFICIENTS.get(place).copied()
 }
 
-/// Steps of the iteration at most; it needs four from anywhere in the range.
+/// The most steps of the iteration; it needs four from anywhere in the range.
 const MOST_STEPS: usize = 50;
 /// The iteration ends when a step is smaller than this, in °C.
 const CLOSE_ENOUGH: f64 = 1e-9;

@@ -133,7 +133,7 @@ impl Uart {
         self.waiting.len()
     }
 
-    /// When everything that waits will have left, if nobody stops it.
+    /// When everything that waits will have left, if nothing stops it.
     pub fn finished_at(&self) -> Instant {
         self.end_of(self.waiting.len())
     }

@@ -21,7 +21,7 @@ impl fmt::Display for WordError {
 
 impl std::error::Error for WordError {}
 
-/// Characters of a word that an error quotes at most.
+/// The most characters of a word that an error quotes.
 const LONGEST_QUOTE: usize = 60;
 /// Longest time for which a supply is off, or a cable out, before it comes back by itself: a day.
 pub const LONGEST_OFF_S: f64 = 86_400.0;
@@ -142,12 +142,12 @@ pub fn unknown(column: usize, word: &str, allowed: &str) -> WordError {
     WordError { column, message: format!("'{}' is not known; there is: {allowed}", shown(word)) }
 }
 
-/// A number of the user's as an error quotes it: not with all the digits of an absurd one.
+/// The user's number as an error quotes it: not with all the digits of an absurd one.
 pub fn number(value: f64) -> String {
     if value.abs() < 1e15 { value.to_string() } else { format!("{value:e}") }
 }
 
-/// A word of the user's as an error quotes it: an endless one its beginning.
+/// The user's word as an error quotes it: the start of an endless one.
 pub fn shown(word: &str) -> String {
     let begin: String = word.chars().take(LONGEST_QUOTE).collect();
     let rest = if begin.len() < word.len() { " ..." } else { "" };

@@ -96,7 +96,7 @@ pub fn count_words(image: &Image) -> u64 {
     words(image).len() as u64
 }
 
-/// A word and where it lies, in words; half a word is filled up as erased flash reads.
+/// A word and its address in words; half a word is filled up as erased flash reads.
 struct Word {
     address: u64,
     value: u16,

@@ -1,6 +1,6 @@
 //! The identity block: what a program image says about itself.
 //!
-//! The emulated application *is* what lies in flash, so product, version and a checksum have to be there too. The
+//! The emulated application *is* what is in flash, so product, version and a checksum have to be there too. The
 //! block is our own convention (`docs/images.md` has the table); nothing is known about one in the real units, so
 //! the console treats a file without it as "says nothing", not as wrong by itself.
 
@@ -11,7 +11,7 @@ pub const WORD_ADDRESS: u32 = 0x80;
 /// Bytes the block takes.
 pub const LENGTH: usize = 64;
 
-/// ASCII characters of a product name at most.
+/// The most ASCII characters of a product name.
 pub const LONGEST_NAME: usize = 12;
 
 const BYTE_OFFSET: usize = WORD_ADDRESS as usize * 2;

@@ -75,7 +75,7 @@ impl<R: Read> Lines<R> {
         Lines::with_buffer(reader, BUFFER)
     }
 
-    /// Tests choose a small buffer, so that its borders come to lie everywhere.
+    /// Tests choose a small buffer, so that its borders come to be everywhere.
     pub(super) fn with_buffer(reader: R, size: usize) -> Self {
         assert!(size >= SMALLEST_BUFFER, "the beginning of the file and one line have to fit");
         Lines { reader, buffer: vec![0; size].into(), from: 0, to: 0, at_end: false, bytes: 0 }

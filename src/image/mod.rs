@@ -111,7 +111,7 @@ pub enum Outside {
     Folds,
     /// It stops with an error, when the old program is erased already.
     Refuses,
-    /// Nobody knows which loader it is.
+    /// Which loader it is is not known.
     Unknown,
 }
 

@@ -298,7 +298,7 @@ fn data_memory(content: &Content, target: &Judged, column: usize, findings: &mut
     });
 }
 
-/// Notes what lies outside of the program flash, the boot flash apart.
+/// Notes what is outside the program flash, the boot flash apart.
 fn elsewhere(content: &Content, target: &Judged, flash_end: u64, column: usize, findings: &mut Findings) {
     let whose = target.product.as_ref().map_or("any unit's".to_owned(), |product| format!("the {product}'s"));
     let in_boot = |span: &AddressRange| target.boot.is_some_and(|boot| span.start < boot.end && boot.start < span.end);

@@ -1,6 +1,6 @@
 //! Every byte, both directions, in order, with its time.
 //!
-//! Structure is an overlay: events point into this record by [`Span`], and what no recogniser understood lies here all
+//! Structure is an overlay: events point into this record by [`Span`], and what no recogniser understood is here all
 //! the same. The record in memory keeps the newest part only; the file on disk keeps the rest.
 
 mod cast;
@@ -16,7 +16,7 @@ use std::collections::VecDeque;
 use crate::endpoint::Secrecy;
 use crate::time::Instant;
 
-/// Who sent.
+/// Which side sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// The unit sent, we received.
@@ -56,7 +56,7 @@ impl Span {
 pub struct Entry {
     /// When.
     pub at: Instant,
-    /// Who sent.
+    /// Which side sent.
     pub direction: Direction,
     /// Whether the content was secret and has been replaced.
     pub secrecy: Secrecy,
@@ -80,7 +80,7 @@ pub const LINK_LOST: &str = "link lost";
 /// How the note begins that it is back: `link back as /dev/ttyUSB0`, perhaps with `after 2.8 s` in between.
 pub const LINK_BACK: &str = "link back ";
 
-/// Memory kept at most: hours of ordinary talk, seconds of a flood.
+/// The most memory kept: hours of ordinary talk, seconds of a flood.
 pub const KEPT_BYTES: usize = 8 << 20;
 
 /// Bytes of one entry at most, so that the oldest can be let go in small steps.
@@ -112,7 +112,7 @@ impl Record {
         Record { limit: Some(limit), ..Record::default() }
     }
 
-    /// Appends bytes and says where they lie among those of their direction.
+    /// Appends bytes and says where they are among those of their direction.
     pub fn push(&mut self, at: Instant, direction: Direction, secrecy: Secrecy, bytes: &[u8]) -> Span {
         let counter = match direction {
             Direction::FromUnit => &mut self.from_unit,
@@ -160,7 +160,7 @@ impl Record {
     /// The bytes of a span from the unit, as far as they are still in memory.
     pub fn bytes(&self, span: Span) -> Vec<u8> {
         let mut pieces: Vec<&[u8]> = Vec::new();
-        // Newest first: spans that are asked for lie near the end.
+        // Newest first: spans that are asked for are near the end.
         for entry in self.entries.iter().rev().filter(|entry| entry.direction == Direction::FromUnit) {
             let end = entry.start + entry.bytes.len() as u64;
             if end <= span.start {

@@ -11,7 +11,7 @@ use super::Direction;
 use super::cast::{Adapter, Header, LATIN_1, SCHEMA};
 use crate::time::{Duration, Instant};
 
-/// Bytes of a line at most. This program's own lines have 25,000; other recorders write a screen at once.
+/// The most bytes of a line. This program's own lines have 25,000; other recorders write a screen at once.
 pub const LONGEST_LINE: usize = 4 << 20;
 
 /// The longest time a recording may span: thirty years, so that arithmetic on moments never saturates.
@@ -26,7 +26,7 @@ pub enum Piece {
     Bytes {
         /// When, since the recording began.
         at: Instant,
-        /// Who sent.
+        /// Which side sent.
         direction: Direction,
         /// What, at least one byte.
         bytes: Vec<u8>,

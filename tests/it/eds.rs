@@ -21,7 +21,7 @@ fn a_data_sheet_goes_to_standard_output_or_to_a_file() {
     assert_eq!(std::fs::read_to_string(world.path("unit.eds")).expect("written"), ran.out);
     let again = world.run(&["eds", "axtc4co", "--out", "unit.eds"], b"");
     assert_eq!(again.code, Some(2), "{}", again.err);
-    // Standard output by its names is standard output, also where a file is behind it.
+    // Standard output by its names is standard output, even where it is a file.
     for name in ["-", "/dev/stdout"] {
         let named = world.run(&["eds", "axtc4co", "--out", name], b"");
         assert_eq!((named.code, &named.out), (Some(0), &ran.out), "{name}: {}", named.err);

@@ -120,7 +120,7 @@ fn image() -> CheckedImage {
 
 #[test]
 fn a_byte_of_the_file_that_is_lost_doubled_corrupted_or_unreadable_fails_the_upload_and_says_how() {
-    // The 5,000th byte stands within a record.
+    // The 5,000th byte is within a record.
     for (fault, errors) in [
         ("lost to-unit at byte 5000", ["error 4", "error 2", "error 3"].as_slice()),
         ("doubled to-unit at byte 5000", &["error 4", "error 2", "error 3"]),

@@ -90,7 +90,7 @@ fn an_image_with_errors_is_not_converted_and_leaves_no_file() {
     let kept = run(&world, &["convert", &bad, "--out", "x.S", "--allow", "bad-checksum"]);
     assert_eq!(kept.code, Some(2));
     assert!(kept.err.contains("x.S exists already"), "{}", kept.err);
-    assert_eq!(world.files(".").len(), 1, "no half file stays behind");
+    assert_eq!(world.files(".").len(), 1, "no half file is left");
     for options in [["--record-bytes", "251"], ["--record-bytes", "0"], ["--record-bytes", "7"]] {
         let refused = run(&world, &[&["convert", &image(NEW), "--out", "y.S"], &options[..]].concat());
         assert_eq!(refused.code, Some(2), "{options:?}: {}", refused.err);

@@ -84,7 +84,7 @@ fn sample(id: DefectId) -> String {
 }
 
 #[test]
-fn the_program_makes_every_sample_file_anew() {
+fn the_program_makes_every_sample_file_again() {
     for (product, version) in SOUND {
         let made = axcon(&["image", "make", "--product", product, "--version", version, "--out", "-"]);
         let kept = fs::read(in_tree(&format!("firmware_images/{product}_V{version}.elf.S"))).expect("a sample");

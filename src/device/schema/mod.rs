@@ -42,7 +42,7 @@ struct RawProduct {
 /// to stay a line.
 const MOST_CHANNELS: usize = 64;
 const WIDEST_FIELD: usize = 40;
-/// Words of program flash at most: an emulated unit has all of it in memory. The largest product has 262,144.
+/// The most words of program flash: an emulated unit has all of it in memory. The largest product has 262,144.
 const MOST_WORDS: u32 = 1 << 22;
 
 /// Reads a product's file.
@@ -170,7 +170,7 @@ impl Reader<'_> {
         if channels == 0 {
             self.complain(at, "measurement.channels", "there is no channel");
         }
-        // The cold junction comes in front of the inputs (errata E-104).
+        // The cold junction comes before the inputs (errata E-104).
         let fields = match sensors {
             SensorKind::Thermocouple => usize::from(channels) + 1,
             SensorKind::Rtd => usize::from(channels),

@@ -27,7 +27,7 @@ pub enum Bootloader {
 }
 
 impl Bootloader {
-    /// Starts the loader: it says who it is and what it wants. `may_leave` says that there is an application it could
+    /// Starts the loader: it says what it is and what it wants. `may_leave` says that there is an application it could
     /// start instead.
     pub fn start(kind: LoaderKind, board: &mut Board<'_>, may_leave: bool) -> Self {
         match kind {

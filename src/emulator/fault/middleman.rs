@@ -1,4 +1,4 @@
-//! The cable with someone on it who does to bytes what the faults say: loses, doubles, changes and delays them, and counts.
+//! The cable, and what the faults make of the bytes on it: lost, doubled, changed, late.
 //!
 //! Pure: a byte goes in with the moment at which an undisturbed line would deliver it, and comes out when it arrives.
 //! What follows a late byte waits for it, and then arrives at the line's rate, not all at once: what stalls is the
@@ -37,7 +37,7 @@ pub struct Middleman {
     text: Text,
 }
 
-/// A line fault that lies in wait.
+/// A line fault that is waiting to strike.
 #[derive(Debug)]
 struct Ordered {
     fault: LineFault,
@@ -46,7 +46,7 @@ struct Ordered {
     chance: Rng,
 }
 
-/// The most faults that lie in wait; an order beyond them is refused. A scenario that repeats orders its own each time.
+/// The most faults that wait to strike; an order beyond them is refused. A scenario that repeats orders its own each time.
 pub const MOST_FAULTS: usize = 1_000;
 
 /// The most bytes under way in one direction: more than the line carries in the longest lateness. What comes beyond is
@@ -134,7 +134,7 @@ impl Middleman {
         }
     }
 
-    /// Faults that lie in wait.
+    /// Faults that are waiting to strike.
     pub fn faults(&self) -> usize {
         self.line_faults.len() + self.record_faults.len()
     }
@@ -239,7 +239,7 @@ impl Middleman {
         }
     }
 
-    /// The unit restarts, or another client has come: nobody is held.
+    /// The unit restarts, or another client has come: none is held.
     pub fn forget_hold(&mut self) {
         self.to_client.holds_client = false;
     }

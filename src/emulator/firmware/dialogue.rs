@@ -17,7 +17,7 @@ const DEFAULT_PERIOD_MS: u16 = 1_000;
 /// The password for new software. Real ones come from Axiomatic; this is the emulator's build setting (errata E-112).
 const PASSWORD: &str = "AXIO-2010";
 
-/// Who gets the keys.
+/// What gets the keys.
 #[derive(Debug)]
 pub(super) enum Dialogue {
     Menu,

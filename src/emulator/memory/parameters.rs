@@ -112,7 +112,7 @@ pub enum ParametersError {
     #[error("the {0} in the parameter memory makes no sense")]
     Value(&'static str),
     /// The memory is that of another product.
-    #[error("the parameter memory is of {}, not of {expected}", found.as_deref().unwrap_or("a product nobody knows"))]
+    #[error("the parameter memory is of {}, not of {expected}", found.as_deref().unwrap_or("an unknown product"))]
     Product {
         /// Whose it is, where that is known.
         found: Option<String>,

@@ -267,7 +267,7 @@ fn stream_and_diagnostics_pause_while_something_is_asked_or_shown() {
         bench.run_ms(1_000);
         bench.take();
         bench.run_ms(2_000);
-        assert_eq!(bench.take(), "", "silence behind {}", open.escape_ascii());
+        assert_eq!(bench.take(), "", "silence after {}", open.escape_ascii());
         bench.send(close);
         bench.run_ms(1_500);
         let text = bench.take();

@@ -194,7 +194,7 @@ fn the_node_starts_by_itself_if_it_was_told_to() {
     }
 }
 
-// Errata E-110: behind the view the node is pre-operational.
+// Errata E-110: after the view the node is pre-operational.
 #[test]
 fn a_start_that_is_due_while_the_view_is_open_comes_later() {
     for name in PRODUCTS {

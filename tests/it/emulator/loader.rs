@@ -288,7 +288,7 @@ fn another_header_begins_the_load_from_scratch_even_while_the_sender_is_held() {
 }
 
 #[test]
-fn a_character_that_cannot_be_read_behind_s7_is_error_1_and_nothing_is_started() {
+fn a_character_that_cannot_be_read_after_s7_is_error_1_and_nothing_is_started() {
     let mut bench = in_loader();
     let records = file(&new_program());
     send_obeying(&mut bench, &records, Instant::NEVER);
@@ -301,12 +301,12 @@ fn a_character_that_cannot_be_read_behind_s7_is_error_1_and_nothing_is_started()
 }
 
 #[test]
-fn behind_s7_the_last_page_waits_for_silence_whatever_is_on_the_line() {
+fn after_s7_the_last_page_waits_for_silence_whatever_is_on_the_line() {
     let mut bench = in_loader();
     let program = new_program();
     let records = file(&program);
     send_obeying(&mut bench, &records, Instant::NEVER);
-    // Nothing of this is read, but it is no silence: characters come closer than the 0.6 ms the loader waits for.
+    // Nothing of this is read, but it is not silence: characters come closer than the 0.6 ms the loader waits for.
     for _ in 0..400 {
         bench.send(b"\r");
         bench.run(Duration::from_micros(250));
@@ -515,7 +515,7 @@ pub(super) fn cut_and_save(loader: LoaderKind, seed: u64, send: impl FnOnce(&mut
 }
 
 #[test]
-fn a_second_upload_saves_a_unit_cut_off_behind_any_seventh_record() {
+fn a_second_upload_saves_a_unit_cut_off_after_any_seventh_record() {
     for records in (0..46).step_by(7) {
         cut_and_save(LoaderKind::G1, 1, |bench, file| send_obeying(bench, &file[..records], Instant::NEVER));
     }

@@ -42,7 +42,7 @@ fn program(name: &str, version: Version, words: usize) -> Vec<u8> {
     bytes
 }
 
-/// A program as the flash that holds it, erased behind it.
+/// A program as the flash that holds it, erased after it.
 fn flash_with(program: &[u8]) -> Vec<u8> {
     let mut flash = program.to_vec();
     flash.resize(product().flash.program_words as usize * 2, 0xFF);

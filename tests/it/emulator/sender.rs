@@ -11,7 +11,7 @@ const PATIENCE: Duration = Duration::from_secs(15);
 /// Data bytes of one record, as CodeWarrior writes them.
 const RECORD_BYTES: usize = 32;
 
-/// A record of a type with four address bytes, with a CR behind it.
+/// A record of a type with four address bytes, followed by a CR.
 pub fn record(digit: u8, address: u32, data: &[u8]) -> String {
     let mut bytes = vec![(data.len() + 5) as u8];
     bytes.extend(address.to_be_bytes());

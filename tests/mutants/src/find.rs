@@ -20,7 +20,7 @@ pub struct Mutant {
     /// The function it is in.
     pub function: String,
     pub line: usize,
-    /// What stands there, on one line.
+    /// What is there, on one line.
     pub original: String,
     /// What the mutant says instead.
     pub mutated: String,
@@ -254,7 +254,7 @@ impl<'ast> Visit<'ast> for Finder<'_> {
     }
 
     fn visit_expr_binary(&mut self, found: &'ast syn::ExprBinary) {
-        // A chain of `let`s is no expression.
+        // A chain of `let`s is not an expression.
         if !has_let(&found.left) && !has_let(&found.right) {
             self.binary(found);
         }
@@ -290,7 +290,7 @@ impl<'ast> Visit<'ast> for Finder<'_> {
 
 const COMPARISONS: [&str; 4] = ["==", "!=", "<=", ">="];
 
-/// What may stand where this operator stands.
+/// What may take this operator's place.
 fn others(op: &BinOp) -> &'static [&'static str] {
     match op {
         BinOp::Eq(_) => &["!="],

@@ -1,4 +1,4 @@
-//! Writes a source file anew, with each mutant behind its switch.
+//! Rewrites a source file with each mutant behind its switch.
 
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -48,12 +48,12 @@ impl Schema {
     /// Writes a part of the source, with the places within it.
     fn part(&mut self, source: &str, part: Range<usize>, rest: &mut &[Kept<'_>]) {
         let mut at = part.start;
-        while let Some(((start, end, shape, mutants), behind)) = rest.split_first() {
-            // What is inserted behind a pattern does not belong to an expression that ends there.
+        while let Some(((start, end, shape, mutants), after)) = rest.split_first() {
+            // What is inserted after a pattern does not belong to an expression that ends there.
             if *start > part.end || *end > part.end || (*start == part.end && part.end < source.len()) {
                 break;
             }
-            *rest = behind;
+            *rest = after;
             self.text.push_str(&source[at..*start]);
             at = *end;
             let begun = self.text.len();

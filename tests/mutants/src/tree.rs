@@ -27,7 +27,7 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// What it is called in files. Holds no line number: what stands above may grow.
+    /// What it is called in files. Holds no line number: what is above may grow.
     pub fn key(&self) -> String {
         let Mutant { function, original, mutated, .. } = &self.mutant;
         format!("{}\t{function}\t{}\t{}", self.file, short(original), short(mutated))

@@ -61,7 +61,7 @@ enum Activity {
 }
 
 impl Loader {
-    /// Starts the loader: it says who it is and asks for a key. `may_leave` says that there is an application to start.
+    /// Starts the loader: it says what it is and asks for a key. `may_leave` says that there is an application to start.
     pub fn start(version: Version, board: &mut Board<'_>, may_leave: bool) -> Self {
         let mut loader = Loader {
             version,

@@ -12,7 +12,7 @@
 /// Which loader of the generation it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
-    /// The last one that fails on a record with an odd number of data bytes: it reads whole words, takes the check sum for
+    /// The last one that fails on a record with an odd number of data bytes: it reads whole words, takes the checksum for
     /// the high byte of the last one, and waits for the end of the record for ever. That it swallows all that follows is a
     /// guess.
     V1_3,
@@ -21,7 +21,7 @@ pub enum Version {
 }
 
 impl Version {
-    /// Who it says it is. The manual does not print it.
+    /// What it calls itself. The manual does not print it.
     pub const fn header(self) -> &'static str {
         match self {
             Version::V1_3 => "56F83xx Serial Bootloader v1.3",
@@ -81,7 +81,7 @@ pub enum Read {
         /// Words, low byte first in the record; half a word is filled up as erased flash reads (a guess).
         words: Vec<u16>,
     },
-    /// A record is over, its check sum is right.
+    /// A record is over, its checksum is right.
     End(Kind),
 }
 
@@ -110,7 +110,7 @@ enum Place {
     Start,
     Type,
     Body(Body),
-    /// Behind the check sum.
+    /// After the checksum.
     LineEnd(Kind),
 }
 

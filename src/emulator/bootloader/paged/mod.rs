@@ -75,7 +75,7 @@ struct PageBuffer {
 }
 
 impl Loader {
-    /// Starts the loader: it says who it is and what it wants.
+    /// Starts the loader: it says what it is and what it wants.
     pub fn start(profile: &'static Profile, board: &mut Board<'_>) -> Self {
         let mut loader = Loader {
             profile,
