@@ -106,10 +106,10 @@ fn no_key_of_a_job_completes_an_answer_that_was_begun_by_hand() {
     assert!(desk.picture().contains("asks, see 3"), "{}", desk.picture());
     desk.sent.clear();
     desk.keys("s").run(Duration::from_secs(10));
-    assert!(desk.picture().contains("the question after the D that was typed is still open"), "{}", desk.picture());
+    assert!(desk.picture().contains("the D that was typed is still open"), "{}", desk.picture());
     for key in ["m", "v", "t", "d"] {
         desk.keys(key).run(Duration::from_secs(2));
-        assert!(desk.picture().contains("the question after the D"), "{key}: {}", desk.picture());
+        assert!(desk.picture().contains("the D that was typed is still open"), "{key}: {}", desk.picture());
     }
     assert!(desk.sent.is_empty(), "{:?}", desk.sent);
     desk.keys("q");
