@@ -80,7 +80,7 @@ fn palette(variable: impl Fn(&str) -> Option<OsString>) -> Result<Palette, CliEr
     }
 }
 
-/// What a name typed on the screen means: the same as behind `--port`.
+/// What a name typed on the screen means: the same as after `--port`.
 fn resolve(name: &str) -> Result<LinkSpec, Failure> {
     link::named(name, || ports::list().unwrap_or_default()).map_err(|error| failure(&error))
 }
@@ -118,7 +118,7 @@ fn note(link: &str, upload: Option<Noted>) {
     };
 }
 
-/// The journal of uploads, and what it calls the port behind a link; `None` where nothing is noted.
+/// The journal of uploads, and what it calls the port of a link; `None` where nothing is noted.
 fn journal(link: &str) -> Option<(Journal, String)> {
     Some((Journal::of_user()?, link::journal_key(&resolve(link).ok()?)?))
 }

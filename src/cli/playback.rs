@@ -21,7 +21,7 @@ pub struct Playback {
     next: Option<Piece>,
 }
 
-/// How long timers go on behind the last byte: a prompt's and a page's silence.
+/// How long timers go on after the last byte: a prompt's and a page's silence.
 const BEHIND_THE_END: Duration = Duration::from_secs(2);
 
 impl Playback {

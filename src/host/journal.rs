@@ -1,6 +1,6 @@
 //! Uploads that have begun and not ended well, in the user's state directory.
 //!
-//! A loader that waits for a file does not say which product it belongs to. Whoever asked for it knew: so the product is
+//! A loader that waits for a file does not say which product it belongs to. The user who asked for it knew: so the product is
 //! noted, with the port, before the loader is entered, and the note is removed when the new software runs. A program
 //! that is killed in between leaves the note, and the next upload on that port needs no more than being asked for.
 
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_stays_at_the_journal_stops_nobody() {
+    fn a_program_that_stays_at_the_journal_stops_nobody() {
         let folder = tempfile::tempdir().expect("a folder");
         let journal = Journal::at(folder.path().join("uploads.json"));
         let _stays = journal.lock().expect("locked");
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_journal_that_makes_no_sense_holds_nothing_and_is_written_anew() {
+    fn a_journal_that_makes_no_sense_holds_nothing_and_is_rewritten() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("uploads.json");
         fs::write(&file, b"\xff{]").expect("written");

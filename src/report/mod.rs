@@ -1,4 +1,4 @@
-//! A unit's service report: everything known of it on one page of HTML, for whoever was not there.
+//! A unit's service report: everything known of it on one page of HTML, for somebody who was not there.
 //!
 //! The page needs nothing but itself: no script, no picture from elsewhere, no font. All text that a device has sent is
 //! escaped, control characters made visible. It prints on paper.
@@ -184,7 +184,7 @@ impl Contents<'_> {
     }
 }
 
-/// What stands in a place of a table, and how.
+/// What is in a place of a table, and how.
 pub struct Cell {
     text: String,
     look: &'static str,

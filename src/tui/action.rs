@@ -44,14 +44,14 @@ pub enum Action {
     StartLoad {
         /// The unit's password; a unit that waits in its loader asks for none.
         password: Option<Secret>,
-        /// What stands on the unit's label, where the unit cannot say it.
+        /// What the unit's label says, where the unit cannot.
         product: Option<String>,
     },
     /// The unit is not the one that the note of an upload is about.
     OtherUnit,
     /// The report of the last upload has been read.
     DismissReport,
-    /// Start minimum and maximum anew.
+    /// Restart minimum and maximum.
     RestartExtremes,
     /// Mark this moment, or an earlier one, in chart and recording.
     Mark(Option<Instant>),

@@ -1,4 +1,4 @@
-//! What stands around every screen: header, tabs, the latest word, the unit's menu, the screen's keys.
+//! What is around every screen: header, tabs, the latest word, the unit's menu, the screen's keys.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -21,11 +21,11 @@ const ABOVE: u16 = 2;
 const BELOW: u16 = 3;
 /// Lines that the latest word may take.
 const MOST_NOTICE_ROWS: usize = 3;
-/// What stands before the recording's name.
+/// What comes before the recording's name.
 const RECORDING: &str = "rec ";
-/// What stands before the unit's menu.
+/// What comes before the unit's menu.
 const UNIT: &str = " Unit  ";
-/// What stands before the keys of the screen.
+/// What comes before the keys of the screen.
 const KEYS: &str = " axcon ";
 /// What is being done takes no more than this.
 const ACTIVITY_COLUMNS: usize = 24;
@@ -53,7 +53,7 @@ pub fn too_small(view: &View, asks: bool, frame: &mut Frame) {
             format!("Leave axcon? Y leaves, N stays.{what}")
         }
         false => format!(
-            "axcon needs {} x {} characters, this terminal has {} x {}. Make it larger: everything goes on meanwhile. \
+            "axcon needs {} x {} characters, this terminal has {} x {}. Make it larger; everything goes on. \
              Until then only Q means something: it leaves.",
             LEAST.0, LEAST.1, area.width, area.height
         ),
@@ -124,7 +124,7 @@ pub fn tabs(view: &View, front: Option<ScreenId>, theme: Theme, columns: usize) 
     let room = columns.saturating_sub(line.width() + 1);
     let right = match &view.link.recording {
         _ if !activity.is_empty() && format::width(activity) <= room => Span::styled(activity, theme.warning()),
-        // It stands where the latest word stands else.
+        // It takes the place of the latest word.
         _ if !activity.is_empty() => Span::raw(""),
         Some(path) if room > LEAST_RECORDING => {
             let path = format::keep_end(&visible::text(path), room - RECORDING.len());
@@ -175,7 +175,7 @@ pub fn key_at(theme: Theme, bindings: &[Binding], column: usize) -> Option<Cmd> 
     [bindings, EVERYWHERE].into_iter().flatten().filter(|binding| !binding.short.is_empty()).find_map(|binding| {
         let begin = end;
         end += hint(theme, binding).iter().map(Span::width).sum::<usize>();
-        // The blanks behind it are nobody's.
+        // The blanks after it are nobody's.
         (begin..end.saturating_sub(2)).contains(&column).then_some(binding.cmd)
     })
 }
@@ -214,11 +214,9 @@ pub fn lost(view: &View, front: ScreenId, theme: Theme, columns: usize) -> Vec<L
     let mut rows = vec![Line::styled(format::left(&format!(" {text}"), columns), theme.alarm())];
     let then = match front {
         ScreenId::Terminal if view.emulated().is_some() => {
-            " Below is history. The emulated unit is gone with it; Ctrl-] C begins anew."
+            " Below is history. The emulated unit is gone with it; Ctrl-] C starts a new one."
         }
-        _ if view.emulated().is_some() => {
-            " Below is history. The emulated unit is gone with it; C begins with a new one."
-        }
+        _ if view.emulated().is_some() => " Below is history. The emulated unit is gone with it; C starts a new one.",
         ScreenId::Terminal => " Below is history. Plug it in again; Ctrl-] C connects, Ctrl-] 1 lists links.",
         _ => " Below is history. Plug the cable in again; C connects, 1 chooses another link.",
     };
@@ -241,11 +239,11 @@ pub fn notice(view: &View, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let line = |(number, text): (usize, String)| {
         let text = format!(" {text} ");
         let rest = columns.saturating_sub(2 + format::width(&text));
-        let (before, behind) = if number == 0 { ("──", "─") } else { ("  ", " ") };
+        let (before, after) = if number == 0 { ("──", "─") } else { ("  ", " ") };
         Line::from(vec![
             Span::styled(before, theme.quiet()),
             Span::styled(text, style),
-            Span::styled(behind.repeat(rest), theme.quiet()),
+            Span::styled(after.repeat(rest), theme.quiet()),
         ])
     };
     texts.into_iter().enumerate().map(line).collect()
@@ -281,7 +279,7 @@ pub fn keys(theme: Theme, bindings: &[Binding]) -> Line<'static> {
     line
 }
 
-/// The keys of the terminal screen: those behind the prefix, as many as have room.
+/// The keys of the terminal screen: those after the prefix, as many as have room.
 pub fn terminal_keys(theme: Theme, screen: ScreenId, after_prefix: bool, columns: usize) -> Line<'static> {
     let behind_prefix = |binding: &&Binding| is_letter(binding) && !binding.short.is_empty();
     let mut bindings: Vec<Binding> = screen.bindings().iter().filter(behind_prefix).copied().collect();

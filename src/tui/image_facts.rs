@@ -24,7 +24,7 @@ pub struct Amount {
 pub struct ImageFacts {
     /// Which file.
     pub path: PathBuf,
-    /// Whether it may be sent: no error stands.
+    /// Whether it may be sent: no error is left.
     pub ok: bool,
     /// Product the image says it is for.
     pub product: Option<String>,
@@ -36,7 +36,7 @@ pub struct ImageFacts {
     pub packed: Amount,
     /// Every defect in one line each, errors first: `line 12, column 43: ...`.
     pub defects: Vec<String>,
-    /// Which errors stand, each once.
+    /// Which errors are left, each once.
     pub errors: Vec<DefectId>,
     /// Errors in spite of which it may be sent, because the user says so.
     pub allowed: Vec<DefectId>,

@@ -13,7 +13,7 @@ use crate::image::DefectId;
 use crate::time::Duration;
 use crate::version::Version;
 
-/// How much of a file tells what it may be: an image's first record, type and length, behind a byte order mark; the
+/// How much of a file tells what it may be: an image's first record, type and length, after a byte order mark; the
 /// schema of a saved object dictionary.
 pub const FIRST_BYTES: usize = 64;
 /// Largest text file that is read: a dump of the largest product has a tenth of it.
@@ -96,7 +96,7 @@ pub enum Input {
     RecordingsListed(Result<RecordingList, String>),
     /// How the recording is played now.
     Playing(Playing),
-    /// The recording begins anew: what it showed so far has not happened yet.
+    /// The recording restarts: what it showed so far has not happened yet.
     PlayedAnew(LinkInfo),
     /// Answer to [`Effect::Order`].
     Ordered {
@@ -139,7 +139,7 @@ pub enum Effect {
         /// Errors in spite of which it may be sent.
         allow: Vec<DefectId>,
     },
-    /// Write a new file. One that is there already is left alone, and that is an error. Answered by
+    /// Write a new file. An existing one is left alone, and that is an error. Answered by
     /// [`Input::FileWritten`].
     CreateFile {
         /// Which.
@@ -147,7 +147,7 @@ pub enum Effect {
         /// What is in it.
         bytes: Vec<u8>,
     },
-    /// Write more behind a file that [`Effect::CreateFile`] has made.
+    /// Write more at the end of a file that [`Effect::CreateFile`] has made.
     AppendFile {
         /// Which.
         path: PathBuf,
@@ -194,7 +194,7 @@ pub struct PortEntry {
     pub link: String,
     /// What it is, in a few words: `USB, FTDI FT232R, 0403:6001, serial number AX12345`.
     pub description: String,
-    /// Who holds it, if somebody does: `picocom, process 4711`.
+    /// Which program holds it, if one does: `picocom, process 4711`.
     pub busy_by: Option<String>,
 }
 
@@ -286,7 +286,7 @@ pub enum Playback {
     Pace(Pace),
     /// Go to this place.
     Seek(Duration),
-    /// Begin anew at this pace.
+    /// Restart at this pace.
     Again(Pace),
 }
 
@@ -304,9 +304,9 @@ pub struct Playing {
 /// How fast a recording is played.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// It stands.
+    /// Not at all.
     Paused,
-    /// So many times as fast as it was made.
+    /// This many times as fast as it was made.
     Times(u32),
     /// As fast as it can be read.
     AtOnce,

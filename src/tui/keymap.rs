@@ -1,6 +1,6 @@
 //! Which key does what.
 //!
-//! A screen lists its bindings; the menu of the unit's manual and the keys that work everywhere stand here. Footer and
+//! A screen lists its bindings; the menu of the unit's manual and the keys that work everywhere are here. Footer and
 //! help screen are made from these tables, so they cannot say anything else than what the keys do.
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
@@ -56,7 +56,7 @@ pub enum Cmd {
     Hex,
     /// With or without times.
     Times,
-    /// Start minimum and maximum anew.
+    /// Restart minimum and maximum.
     Restart,
     /// Left, or earlier.
     Left,

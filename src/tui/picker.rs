@@ -60,7 +60,7 @@ pub enum Picked {
     File(PathBuf),
 }
 
-/// Schema of a saved object dictionary, as it stands at its beginning.
+/// Schema of a saved object dictionary, as it appears at its beginning.
 const DUMP: &[u8] = b"axcon.dictionary/";
 
 impl Picker {
@@ -69,7 +69,7 @@ impl Picker {
         Picker { offers, directory, listing: Listing::Unread, awaited: None, cursor: 0 }
     }
 
-    /// Where it stands.
+    /// Where it is.
     pub fn directory(&self) -> &Path {
         &self.directory
     }
@@ -202,14 +202,14 @@ impl Picker {
         match self.offers {
             _ if *is_cut => Some("There is more in this folder than was read."),
             _ if has_file => None,
-            Offers::Images => Some("No image here, neither by name nor by how it begins."),
+            Offers::Images => Some("No image here, by name or by first bytes."),
             Offers::Dumps => Some("No saved object dictionary here (JSON)."),
             Offers::Anything => Some("No file here."),
         }
     }
 }
 
-/// Where a typed path lies: absolute, from the user's home folder (`~`, to be found by whoever knows it), or else from
+/// Where a typed path lies: absolute, from the user's home folder (`~`, to be found by the caller), or else from
 /// this folder.
 pub fn placed(directory: &Path, typed: &str) -> PathBuf {
     let typed = typed.trim();

@@ -15,7 +15,7 @@ const MOST_WAITING: usize = 4096;
 pub struct Returning {
     /// What was known of the unit.
     before: Facts,
-    /// What has come from whoever is there now.
+    /// What has come from the unit that is there now.
     waiting: VecDeque<Event>,
 }
 
@@ -46,18 +46,18 @@ impl Returning {
         self.before.state == UnitState::Loader
     }
 
-    /// Whether its version is known to be that of whoever is there now.
+    /// Whether its version is known to be that of the unit there now.
     pub fn has_version_of(&self, now: &Facts) -> bool {
         let versions = self.before.version.as_ref().zip(now.version.as_ref());
         versions.is_some_and(|(before, now)| before.value == now.value)
     }
 
-    /// Whether whoever is there now has not said its version, of which that of before is known.
+    /// Whether the unit there now has not said its version, while that of the one before is known.
     pub fn lacks_version(&self, now: &Facts) -> bool {
         self.before.version.is_some() && now.version.is_none()
     }
 
-    /// Keeps a row or a page of whoever is there now.
+    /// Keeps a row or a page of the unit there now.
     pub fn wait(&mut self, event: Event) {
         if self.waiting.len() == MOST_WAITING {
             self.waiting.pop_front();
@@ -70,7 +70,7 @@ impl Returning {
         self.waiting
     }
 
-    /// Who is there, going by what is known now. `None` as long as nobody has answered.
+    /// Which unit is there, going by what is known now. `None` until one has answered.
     pub fn who(&self, now: &Facts) -> Option<Who> {
         if now.state == UnitState::Silent {
             return None;

@@ -146,7 +146,7 @@ impl Desk {
                 Effect::Quit => self.over = true,
                 Effect::CreateFile { path, bytes } => {
                     let is_new = self.files.insert(path.clone(), bytes).is_none();
-                    let result = if is_new { Ok(()) } else { Err("it is there already".to_owned()) };
+                    let result = if is_new { Ok(()) } else { Err("it already exists".to_owned()) };
                     self.input(Input::FileWritten { path, result });
                 }
                 Effect::AppendFile { path, bytes } => {
@@ -235,7 +235,7 @@ impl Desk {
         self.keys("lp/images/AXTC4CO_V1.2.0.elf.S").press(KeyCode::Enter).press(KeyCode::Enter)
     }
 
-    /// Clicks on a text, wherever it stands first.
+    /// Clicks on a text, where it appears first.
     fn click(&mut self, text: &str) -> &mut Self {
         let picture = self.drawn();
         let (row, line) = picture.lines().enumerate().find(|(_, line)| line.contains(text)).expect(text);
@@ -324,7 +324,7 @@ fn the_dictionary_is_read_searched_compared_and_written_down() {
     desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("before.json").press(KeyCode::Enter);
     assert!(desk.picture().contains("before.json is written"), "{}", desk.picture());
     desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("before.json").press(KeyCode::Enter);
-    assert!(desk.picture().contains("it is there already"), "an older file is left alone: {}", desk.picture());
+    assert!(desk.picture().contains("it already exists"), "an older file is left alone: {}", desk.picture());
     desk.press(KeyCode::Esc);
 
     // Somebody switches a channel off, and the next reading says so.
@@ -554,7 +554,7 @@ fn task_send_us_a_recording() {
 }
 
 #[test]
-fn whoever_leaves_in_the_middle_leaves_a_unit_that_measures() {
+fn leaving_in_the_middle_leaves_a_unit_that_measures() {
     for (begins, shows) in [("v\r", "so far"), ("s", "Supply Voltage"), ("3v", "halted by V")] {
         for way in ["signal", "question"] {
             let mut desk = Desk::new();

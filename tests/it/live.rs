@@ -183,7 +183,7 @@ fn silent_unit() -> Puppet {
 }
 
 #[test]
-fn ctrl_z_gives_the_terminal_back_and_fg_draws_everything_anew() {
+fn ctrl_z_gives_the_terminal_back_and_fg_redraws_everything() {
     let (world, unit) = (World::new(), silent_unit());
     let mut screen = console_of_a_shell(&world, &unit);
     screen.wait("The unit is an AXTC4CO 1.1.0.");
@@ -291,7 +291,7 @@ fn a_wire_broken_on_the_bench_is_an_open_circuit_in_the_stream() {
     let rows = fs::read_to_string(world.path("rows.csv")).expect("written");
     assert!(rows.starts_with("time,source,CJ,TC1,TC2,TC3,TC4\n") && rows.contains(",open,"), "{rows}");
     screen.keys("e\x15rows.csv\r");
-    screen.wait("is there already");
+    screen.wait("already exists");
     assert_eq!(fs::read_to_string(world.path("rows.csv")).expect("still there"), rows);
 }
 

@@ -90,7 +90,7 @@ mod story {
         is_told(&screen, "Cargo.toml is not an image, said by a worker");
     }
 
-    /// The terminal is the shell's again, and the panic stands on it: whole, and each line at the left edge, which raw mode
+    /// The terminal is the shell's again, and the panic is on it: whole, and each line at the left edge, which raw mode
     /// would have moved.
     fn is_told(screen: &Screen, message: &str) {
         assert!(screen.is_given_back(), "{}", screen.text());

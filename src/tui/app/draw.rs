@@ -1,4 +1,4 @@
-//! The picture: what stands around the screen in front, the screen, and what stands in front of it.
+//! The picture: what is around the screen in front, the screen, and what is in front of it.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;

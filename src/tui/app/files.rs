@@ -17,7 +17,7 @@ use crate::tui::widgets::format;
 use crate::wire::stream::Row;
 
 impl App {
-    /// A folder has been read: for whoever has asked for it, if anybody still waits.
+    /// A folder has been read, for the screen or box that still waits for it.
     pub(super) fn files_listed(&mut self, directory: PathBuf, entries: Result<Vec<FileEntry>, String>) {
         self.dirty = true;
         match &mut self.popup {
@@ -183,7 +183,7 @@ impl App {
             }
         };
         for (at, row) in stream.kept_rows() {
-            // A mark stands between rows. What was marked before the rows that are kept stands among none.
+            // A mark is between rows. What was marked before the rows that are kept is among none.
             match rows {
                 0 => marks_before(at, &mut String::new()),
                 _ => marks_before(at, &mut text),
@@ -287,7 +287,7 @@ impl App {
         let name = path.display().to_string();
         let dump = text
             .map_err(|why| format!("{name}: {why}"))
-            .and_then(|text| Dump::parse(&name, &text).map_err(|_| format!("{name} is no dump as JSON")));
+            .and_then(|text| Dump::parse(&name, &text).map_err(|_| format!("{name} is not a JSON dump")));
         match dump {
             Err(why) => self.view.tell(Tone::Refused, format!("Not compared: {why}.")),
             Ok(_) if self.view.unit.dictionary.is_none() => {

@@ -106,7 +106,7 @@ impl App {
         }
     }
 
-    /// A click into a list: what stands there is chosen, and what is chosen already is done.
+    /// A click into a list: what is there is chosen, and what is chosen already is done.
     fn choose_at(&mut self, y: u16) -> Option<Cmd> {
         if self.help.is_some() {
             return None;
@@ -195,7 +195,7 @@ impl App {
         }
     }
 
-    /// A key while nothing of the screen is seen: what it did would be seen by nobody. Only leaving is possible, and asked
+    /// A key while the screen cannot be seen, nor what the key would do. Only leaving is possible, and asked
     /// about in the one message there is; and Ctrl-Z, which changes nothing.
     fn key_unseen(&mut self, key: KeyEvent, effects: &mut Vec<Effect>) {
         let cmd = keymap::find(&[EVERYWHERE], key);
@@ -405,7 +405,7 @@ impl App {
             MenuCmd::Diagnostics if self.view.job == Some(Job::Diagnostics) => {
                 self.perform(Action::Command(Command::Cancel), effects);
             }
-            // Whoever has asked for them: the key only toggles, and asking for more would be to stop them.
+            // No matter who asked for them: the key only toggles, and asking for more would stop them.
             MenuCmd::Diagnostics if self.view.facts.diagnostics.is_some() => {
                 self.perform(Action::Command(Command::DiagnosticsOff), effects);
             }

@@ -1,4 +1,4 @@
-//! The link: how it opens and closes, is lost and comes back, and how the unit behind it is left.
+//! The link: how it opens and closes, is lost and comes back, and how the unit on it is left.
 
 use ratatui::crossterm::event::KeyCode;
 
@@ -15,7 +15,7 @@ use crate::tui::view::{Link, LinkState, Tone};
 use crate::tui::visible;
 
 /// How long a unit has to answer what puts it in order before its link is closed: it prints a menu in a tenth of that,
-/// and whoever leaves, or shuts the computer down, does not wait longer for a unit that is silent.
+/// and a user who leaves, or shuts the computer down, does not wait longer for a silent unit.
 const WINDING_UP: Duration = Duration::from_secs(2);
 
 /// What comes once the unit has been left in order.
@@ -162,7 +162,7 @@ impl App {
         }
         self.scrollback.begin(now, format!("connected to {}", visible::text(&info.link)));
         self.begin_session(info, effects);
-        // Who has chosen a recording wants to steer it.
+        // A user who has chosen a recording wants to steer it.
         self.front = if self.front == ScreenId::Recordings { self.front } else { ScreenId::Overview };
         if !is_recording {
             self.command(Command::Identify);
@@ -170,7 +170,7 @@ impl App {
         self.list_recordings_in_front(effects);
     }
 
-    /// The terminal begins anew: what it shows has happened at other times of day, or has not happened yet.
+    /// The terminal starts from scratch: what it shows happened at other times of day, or has not happened yet.
     fn forget_lines(&mut self) {
         self.scrollback = Scrollback::default();
         self.terminal.follow();
@@ -233,7 +233,7 @@ impl App {
             self.scrollback.note(now, "link lost".into());
             self.export_note(now, "link lost", effects);
             self.view.link.state = LinkState::Lost(failure);
-            // It was about the link as it was; what ends with it is told behind this.
+            // It was about the link as it was; what ends with the link is reported after this.
             self.view.forget_notice();
             if let Some(session) = &mut self.session {
                 session.link_lost(now);
@@ -246,7 +246,7 @@ impl App {
     }
 
     /// The cable is plugged in again. What stood on the screen goes on; the unit is asked who it is, since it may have
-    /// started anew.
+    /// restarted.
     pub(super) fn link_back(&mut self, now: Instant, name: &str, effects: &mut Vec<Effect>) {
         self.dirty = true;
         if matches!(self.view.link.state, LinkState::Lost(_)) {
@@ -262,7 +262,7 @@ impl App {
         }
     }
 
-    /// The unit behind a link that came back has said something of itself, or has had its chance: whether what was shown
+    /// The unit on a link that came back has said something of itself, or has had its chance: whether what was shown
     /// before is its own is decided now.
     pub(super) fn decide_who_returned(&mut self, has_said_all: bool, effects: &mut Vec<Effect>) {
         let lacks_version = self.view.returning.as_ref().is_some_and(|before| before.lacks_version(&self.view.facts));
@@ -274,7 +274,7 @@ impl App {
             return;
         };
         if !self.view.can_send() {
-            // Lost again: whoever has answered is not there any more.
+            // Lost again: the unit that answered is gone.
             return;
         }
         let Some(returning) = self.view.returning.take() else { return };
@@ -311,8 +311,8 @@ impl App {
                 self.begin_unit(text.to_owned(), effects);
             }
             Who::Unknown => {
-                let text = "The link is back. Whether the unit is the one from before it has not said, so the screens \
-                            begin anew.";
+                let text = "The link is back. The unit has not said whether it is the one from before, so the screens \
+                            start from scratch.";
                 self.begin_unit(text.to_owned(), effects);
             }
         }
@@ -352,14 +352,14 @@ impl App {
         }
     }
 
-    /// Another unit, or one that may be another: nothing that was shown is its own. What it says itself comes anew.
+    /// Another unit, or one that may be another: nothing that was shown is its own.
     pub(super) fn begin_unit(&mut self, text: String, effects: &mut Vec<Effect>) {
         if self.view.export.is_some() {
             self.end_export(Some("another unit may be on the cable"));
         }
         self.view.begin_unit();
         if matches!(&self.popup, Some(Popup::Asking(question)) if question.is_about_unit()) {
-            // Who has answered it for one unit has not answered it for another.
+            // An answer for one unit is not an answer for another.
             self.popup = None;
         }
         self.dictionary.begin_link();
@@ -371,7 +371,7 @@ impl App {
         self.view.tell(Tone::Bad, text);
     }
 
-    /// What was said of the loader was said of another unit's; a file that was judged for it is judged anew.
+    /// What was said of the loader was said of another unit's; a file that was judged for it is judged again.
     fn forget_loader(&mut self, effects: &mut Vec<Effect>) {
         if let Some(action) = self.load.begin_unit() {
             self.perform(action, effects);

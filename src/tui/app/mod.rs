@@ -299,7 +299,7 @@ impl App {
             let facts = self.session.as_ref().map_or(&self.no_facts, Session::facts);
             self.view.fold(self.now, &event, facts);
             if let (Event::Finished(_), Some(session)) = (&event, &self.session) {
-                // One that had to wait for the end of this one runs by now. Listening to a recording is no job of the user's.
+                // A job that had to wait for the end of this one runs by now. Listening to a recording is not a job of the user's.
                 self.view.job = session.job().filter(|job| *job != Job::Overhear);
             }
             self.dirty = true;

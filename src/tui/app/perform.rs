@@ -20,7 +20,7 @@ impl App {
         self.dirty = true;
         match action {
             Action::Go(screen) => self.go(screen, effects),
-            // A recording can be opened again as it was; whoever has a unit at the line is asked.
+            // A recording can be opened again as it was; before a unit is left, the user is asked.
             Action::Open(link) => {
                 let link = link_name::expanded(&link, self.options.home.as_deref());
                 match self.view.can_send() {
@@ -73,7 +73,7 @@ impl App {
             Action::RestartExtremes => {
                 self.view.restart_extremes();
                 let time = format::time_of_day(self.start_of_day, self.now);
-                self.view.tell(Tone::Quiet, format!("Minimum, maximum and mean begin anew at {time}."));
+                self.view.tell(Tone::Quiet, format!("Minimum, maximum and mean restart at {time}."));
             }
             Action::Mark(at) => self.mark(at, effects),
             Action::Find(words) => match self.front {
@@ -192,7 +192,7 @@ impl App {
             Command::Keys(keys) if !session.password_open() => opens_view(keys),
             _ => None,
         };
-        // Whoever wants something else need not wait for minutes for a slow stream's first row.
+        // A user who wants something else need not wait minutes for a slow stream's first row.
         if self.view.awaits_first_row() && !matches!(command, Command::Cancel) {
             let _ = session.command(self.now, Command::Cancel);
         }

@@ -84,23 +84,23 @@ fn the_keys_in_the_last_line_can_be_clicked_also_on_the_help_page() {
 #[test]
 fn the_kind_of_loader_is_chosen_on_the_load_screen_judged_and_ordered() {
     let mut stage = Stage::connected(SMALL).with_image(good_image());
-    assert!(stage.shows("g1, believed of every AXTC4CO; G if the unit has another"), "{}", stage.picture());
+    assert!(stage.shows("g1, assumed for every AXTC4CO; G if the unit has another"), "{}", stage.picture());
     for kind in LoaderKind::ALL.map(Some).into_iter().chain([None, Some(LoaderKind::G1)]) {
         stage.asked();
         stage.keys("g");
         let path = good_image().path;
         assert_eq!(stage.asked(), [Effect::CheckImage { path, loader: kind, allow: Vec::new() }]);
         stage.input(Input::ImageChecked(Box::new(good_image())));
-        let words = kind.map_or("believed of every".to_owned(), |kind| format!("{}, as chosen", kind.name()));
+        let words = kind.map_or("assumed for every".to_owned(), |kind| format!("{}, as chosen", kind.name()));
         assert!(stage.shows(&words), "{}", stage.picture());
     }
-    // Of another unit nothing is known, and what was judged for the loader of this one is judged anew.
+    // Of another unit nothing is known, and what was judged for the loader of this one is judged again.
     stage.keys("1").press(KeyCode::Enter).keys("y").asked();
     stage.opened("/dev/ttyUSB0");
-    let anew = Effect::CheckImage { path: good_image().path, loader: None, allow: Vec::new() };
-    assert!(stage.asked().contains(&anew));
+    let again = Effect::CheckImage { path: good_image().path, loader: None, allow: Vec::new() };
+    assert!(stage.asked().contains(&again));
     stage.input(Input::ImageChecked(Box::new(good_image()))).keys("4");
-    assert!(stage.shows("believed of every"), "{}", stage.picture());
+    assert!(stage.shows("assumed for every"), "{}", stage.picture());
 }
 
 #[test]

@@ -155,7 +155,7 @@ fn a_recording_is_steered_by_its_keys() {
     plays(&mut stage, 50, Pace::Paused);
     stage.keys(" ");
     assert_eq!(stage.asked(), [Effect::Play(Playback::Pace(Pace::Times(5)))], "as fast as before the pause");
-    // As every recording stands that has just been opened, and as one that was played to its end.
+    // Where every recording is that has just been opened, and one that was played to its end.
     for pace in [Pace::AtOnce, Pace::Times(1), Pace::Paused] {
         plays(&mut stage, 100, pace);
         stage.keys(" ");
@@ -301,7 +301,7 @@ fn an_idle_console_wants_nothing_and_draws_nothing() {
     assert!(stage.app.is_dirty());
 }
 
-/// The screens with something chosen, and what stands on the chosen row.
+/// The screens with something chosen, and what is on the chosen row.
 fn scenes_with_a_choice() -> [(&'static str, Stage); 4] {
     let mut with_ports = Stage::with_ports(SMALL);
     with_ports.press(KeyCode::Down);
@@ -382,7 +382,7 @@ fn keys_on_the_terminal_of_a_recording_are_the_consoles() {
     stage.keys("m");
     assert!(stage.shows("Not sent: this is a recording. Press 1 to choose a link."), "{}", stage.picture());
     stage.prefix().keys("2");
-    assert!(stage.shows("── Unit ──"), "whoever is used to the prefix is not stopped: {}", stage.picture());
+    assert!(stage.shows("── Unit ──"), "a user who is used to the prefix is not stopped: {}", stage.picture());
 }
 
 #[test]

@@ -66,9 +66,9 @@ fn another_link_is_asked_about_and_opened_before_the_first_is_given_up() {
 }
 
 #[test]
-fn an_enter_too_many_behind_a_failure_opens_no_other_port() {
+fn an_enter_too_many_after_a_failure_opens_no_other_port() {
     let failed = || Input::LinkFailed(Failure { text: "it is busy".into(), hints: Vec::new() });
-    // The list may come before or behind the failure.
+    // The list may come before or after the failure.
     for (link, opened) in [("/dev/ttyUSB1", Some("/dev/ttyUSB1")), ("/dev/ttyUSB7", None)] {
         for is_listed_first in [true, false] {
             let mut stage = Stage::on(SMALL, Some(link.into()));
@@ -326,7 +326,7 @@ fn the_faults_of_eight_channels_stay_in_sight_when_the_link_is_lost() {
 fn an_emulated_unit_that_is_gone_with_its_link_is_called_gone_and_another_asked_about() {
     let mut stage = Stage::with_ports(SMALL);
     stage.press(KeyCode::Enter).opened("emu:axtc4co").lost().asked();
-    assert!(stage.shows("The emulated unit is gone with it; C begins with a new one."), "{}", stage.picture());
+    assert!(stage.shows("The emulated unit is gone with it; C starts a new one."), "{}", stage.picture());
     stage.keys("c").press(KeyCode::Enter);
     assert!(stage.shows("with all that was set") && stage.asked().is_empty(), "{}", stage.picture());
     assert!(stage.shows("as the factory made it"), "{}", stage.picture());
@@ -344,7 +344,7 @@ fn a_refusal_stays_for_some_seconds_before_other_news() {
     assert!(stage.shows("Not sent: ") && !stage.shows("The stream is off"), "{}", stage.picture());
     stage.wait(200);
     assert!(stage.shows("The stream is off") && !stage.shows("Not sent"), "{}", stage.picture());
-    // Whoever goes on has read it.
+    // A user who goes on has read it.
     let mut stage = Stage::connected(SMALL);
     stage.keys("s").keys("t");
     stage.finished(Outcome::Done(Job::StreamOff));

@@ -1,4 +1,4 @@
-//! What leads to an upload and what stands against it, in sentences.
+//! What leads to an upload and what prevents it, in sentences.
 
 use ratatui::crossterm::event::KeyCode;
 
@@ -54,7 +54,7 @@ fn only_y_gives_an_upload_up() {
 }
 
 #[test]
-fn whoever_leaves_a_unit_in_its_loader_is_told_what_it_waits_for() {
+fn leaving_a_unit_in_its_loader_says_what_it_waits_for() {
     let mut stage = Stage::in_loader(SMALL, noted("AXTC4CO"));
     stage.asked();
     stage.keys("q");
@@ -201,7 +201,7 @@ fn a_note_starts_nothing_before_somebody_has_said_that_it_is_that_unit() {
     for words in ["Is it the unit this was begun for?", "AXTC4CO_V1.2.0.elf.S", "2026-01-30 16:20:00", "Its label"] {
         assert!(asked.contains(words), "{words}: {asked}");
     }
-    assert_eq!(stage.asked(), [], "Enter is no answer");
+    assert_eq!(stage.asked(), [], "Enter is not an answer");
     stage.press(KeyCode::Esc);
     assert!(stage.shows("── Plan") && stage.asked().is_empty(), "{}", stage.picture());
     stage.press(KeyCode::Enter).keys("n");
@@ -226,7 +226,7 @@ fn a_note_that_is_wrong_locks_no_file_out() {
 }
 
 #[test]
-fn a_product_that_does_not_exist_is_called_so_and_can_be_mended() {
+fn a_product_that_does_not_exist_is_refused_and_can_be_corrected() {
     for word in ["tc4", "/images/AXTC4CO.S"] {
         let mut stage = Stage::in_loader(SMALL, None).with_image(good_image());
         stage.press(KeyCode::Enter).keys(word).press(KeyCode::Enter);

@@ -148,7 +148,7 @@ fn an_answer_of_the_bench_is_read_to_its_end_at_80_columns() {
     stage.press(KeyCode::Enter).opened("emu:axtc4co").keys("9/set 1 temperature 9999").press(KeyCode::Enter);
     let why = "column 19: a temperature cannot be 9999; it is between -270 and 1820 in °C here";
     stage.input(Input::Ordered { line: "set 1 temperature 9999".into(), answer: Err(why.into()) });
-    // In the box in which it can be mended, and in the list of orders behind it.
+    // In the box in which it can be corrected, and in the list of orders behind it.
     let boxed = stage.picture().to_lowercase();
     stage.press(KeyCode::Esc);
     for word in why.split(' ') {
@@ -221,7 +221,7 @@ fn what_cannot_be_read_is_listed_with_its_reason_and_what_is_left_out_is_counted
         assert!(picture.contains("20260301T120000Z-c-1.cast  cannot be read: line 1: this is no"), "{picture}");
         assert!(picture.contains("2 of 9, newest first"), "{picture}");
         for word in why.split(' ') {
-            assert!(picture.contains(word), "all of the reason stands below: no '{word}' in {picture}");
+            assert!(picture.contains(word), "all of the reason is below: no '{word}' in {picture}");
         }
         assert!(!picture.contains("Attach this file"), "{picture}");
         stage.press(KeyCode::Down);
@@ -230,7 +230,7 @@ fn what_cannot_be_read_is_listed_with_its_reason_and_what_is_left_out_is_counted
 }
 
 #[test]
-fn the_list_of_recordings_is_read_anew_when_a_link_opens_or_ends_in_front_of_it() {
+fn the_list_of_recordings_is_read_again_when_a_link_opens_or_ends_in_front_of_it() {
     let mut stage = Stage::connected(SMALL).with_recordings();
     let is_read = |stage: &mut Stage| stage.asked().contains(&Effect::ListRecordings);
     assert!(is_read(&mut stage), "as the screen comes to the front");
@@ -314,7 +314,7 @@ fn the_keys_of_a_question_stay_in_sight_whatever_it_has_to_say() {
     let mut stage = Stage::streaming(SMALL);
     stage.fold_with(Event::FactsChanged, &Facts { product: stage_product(), ..Facts::default() });
     stage.keys("tp1");
-    assert!(stage.shows("unit will leave rows out.") && stage.shows("in the recording only."), "{}", stage.picture());
+    assert!(stage.shows("unit will leave rows out.") && stage.shows("recording only."), "{}", stage.picture());
     assert!(stage.shows("Enter switch on") && stage.shows("Every, in ms: › 1"), "{}", stage.picture());
 }
 

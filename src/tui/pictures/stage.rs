@@ -214,7 +214,7 @@ impl Stage {
         self
     }
 
-    /// Clicks on a text, where it stands first.
+    /// Clicks on a text, where it appears first.
     pub(super) fn click(&mut self, text: &str) -> &mut Self {
         let picture = self.picture();
         let (row, line) = picture.lines().enumerate().find(|(_, line)| line.contains(text)).expect(text);
@@ -330,7 +330,7 @@ pub(super) fn recording(begun: &str, port: &str, part: u32, length: Option<Durat
     }
 }
 
-/// A file with the name of a recording, and why it is none.
+/// A file with the name of a recording, and why it is not one.
 pub(super) fn no_recording(path: &str, why: &str) -> RecordingEntry {
     RecordingEntry { link: format!("replay:{path}"), path: path.into(), bytes: 12, content: Err(why.into()) }
 }
@@ -355,7 +355,8 @@ pub(super) fn files() -> Vec<FileEntry> {
 }
 
 pub(super) fn link_info(link: &str) -> LinkInfo {
-    let emulated = link.strip_prefix("emu:").and_then(Product::named);
+    let (scheme, product) = link.split_once(':').unwrap_or_default();
+    let emulated = Product::named(product).filter(|_| scheme.eq_ignore_ascii_case("emu"));
     LinkInfo {
         link: link.into(),
         baud: 115_200,

@@ -103,7 +103,7 @@ fn a_unit_that_only_notes_know_is_named_as_what_it_may_be() {
 }
 
 #[test]
-fn a_path_of_nothing_is_told_where_it_was_typed_and_can_be_mended() {
+fn a_path_of_nothing_is_refused_where_it_was_typed_and_can_be_corrected() {
     let mut stage = Stage::connected(SMALL).picking();
     stage.keys("pnew.S").press(KeyCode::Enter).asked();
     let unreadable = |why: &str| Input::ImageUnreadable { path: "/home/service/images/new.S".into(), why: why.into() };
@@ -136,7 +136,7 @@ fn the_order_box_says_what_there_is_and_so_does_help() {
         assert!(stage.shows(&orders.join(", ")) && stage.shows(does), "{orders:?}: {}", stage.picture());
     }
     stage.keys("Help").press(KeyCode::Enter);
-    assert!(stage.shows("They stand above") && stage.shows("Enter do it"), "{}", stage.picture());
+    assert!(stage.shows("They are above") && stage.shows("Enter do it"), "{}", stage.picture());
     assert_eq!(stage.asked(), []);
     stage.keys("heal").press(KeyCode::Enter);
     assert_eq!(stage.asked(), [Effect::Order("heal".into())], "the word itself is gone");
@@ -350,10 +350,10 @@ fn one_is_one_and_not_ones() {
 }
 
 #[test]
-fn minimum_and_maximum_do_not_begin_anew_without_a_word() {
+fn minimum_and_maximum_do_not_restart_without_a_word() {
     let mut stage = Stage::streaming(SMALL);
     stage.keys("2r");
-    assert!(stage.shows("Minimum, maximum and mean begin anew at 12:01:33."), "{}", stage.picture());
+    assert!(stage.shows("Minimum, maximum and mean restart at 12:01:33."), "{}", stage.picture());
 }
 
 #[test]

@@ -125,7 +125,7 @@ fn what_of_a_paste_the_unit_does_not_know_is_told_before_it_is_sent() {
     paste(&mut stage, "°");
     assert!(stage.shows("Not sent: the unit knows none of these"), "{}", stage.picture());
     paste(&mut stage, "m\nv\nx\n");
-    assert!(stage.shows("6 characters, 3 lines"), "behind the last line end nothing begins: {}", stage.picture());
+    assert!(stage.shows("6 characters, 3 lines"), "nothing begins after the last line end: {}", stage.picture());
     stage.press(KeyCode::Enter);
     assert!(stage.sent().is_empty() && stage.shows("Send the pasted"), "{}", stage.picture());
     stage.press(KeyCode::Esc).lost();
@@ -147,7 +147,7 @@ fn a_complaint_goes_when_what_it_is_about_does() {
 }
 
 #[test]
-fn a_name_that_is_refused_is_mended_where_it_was_typed() {
+fn a_name_that_is_refused_is_corrected_where_it_was_typed() {
     let mut stage = Stage::with_dictionary(SMALL);
     stage.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("tc.xml").press(KeyCode::Enter).asked();
     assert!(stage.shows("› tc.xml") && stage.shows("has to end in .json, .csv, .dcf or .txt"), "{}", stage.picture());
@@ -155,18 +155,15 @@ fn a_name_that_is_refused_is_mended_where_it_was_typed() {
     stage.keys("x");
     let written = stage.asked();
     assert_eq!(written.len(), 1, "once: {written:?}");
-    stage.input(Input::FileWritten {
-        path: "tc.csv".into(),
-        result: Err("a file of that name is there already".into()),
-    });
-    assert!(stage.shows("› tc.csv") && stage.shows("is there already"), "{}", stage.picture());
+    stage.input(Input::FileWritten { path: "tc.csv".into(), result: Err("a file of that name already exists".into()) });
+    assert!(stage.shows("› tc.csv") && stage.shows("already exists"), "{}", stage.picture());
     stage.key(KeyCode::Char('u'), KeyModifiers::CONTROL).keys("tc2.csv").press(KeyCode::Enter);
     stage.input(Input::FileWritten { path: "tc2.csv".into(), result: Ok(()) });
     assert!(!stage.shows("› tc2.csv") && stage.shows("tc2.csv is written."), "{}", stage.picture());
 }
 
 #[test]
-fn an_order_that_is_refused_is_mended_where_it_was_typed() {
+fn an_order_that_is_refused_is_corrected_where_it_was_typed() {
     let mut stage = Stage::with_ports(SMALL);
     stage.press(KeyCode::Enter).opened("emu:axtc4co").keys("9/set 1 temprature 20").press(KeyCode::Enter);
     let refuse = |stage: &mut Stage, line: &str| {
@@ -188,6 +185,6 @@ fn the_last_line_of_the_terminal_shows_what_is_the_units_and_what_is_not() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("3");
     let last = stage.picture().lines().last().unwrap_or_default().to_owned();
-    let (before, behind) = last.split_once("Ctrl-]").expect("the prefix");
-    assert!(before.contains("F1 help") && behind.contains("Q quit") && !behind.contains("F1"), "{last}");
+    let (before, after) = last.split_once("Ctrl-]").expect("the prefix");
+    assert!(before.contains("F1 help") && after.contains("Q quit") && !after.contains("F1"), "{last}");
 }

@@ -1,4 +1,4 @@
-//! What keys and pasted text do to what stands in front of a screen.
+//! What keys and pasted text do to what is in front of a screen.
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -49,7 +49,7 @@ impl Popup {
     }
 
     /// Pasted text goes into a field as if it had been typed, up to its first line end. Where there is no field it answers
-    /// nothing: who pastes a text that begins with a Y has not said yes.
+    /// nothing: pasting a text that begins with a Y is not saying yes.
     pub fn paste(&mut self, text: &str) -> Answer {
         let Popup::Asking(question) = self else { return Answer::Stay };
         if !question.has_field() {
@@ -84,7 +84,7 @@ impl Question {
                 self.edit(TextField::clear, PasswordField::clear);
                 self.changed()
             }
-            // Pressed out of habit, or twice behind a path, it destroys nothing: where only Y is named, only Y is meant.
+            // Pressed out of habit, or twice after a path, it destroys nothing: where only Y is named, only Y is meant.
             KeyCode::Enter if self.wants_y() => Answer::Stay,
             KeyCode::Enter => self.accept(),
             // Nothing is left of what was typed: as in the list of the load screen.
@@ -152,7 +152,7 @@ impl Question {
         }
     }
 
-    /// Esc. Who has looked for something and leaves wants to see everything again.
+    /// Esc. A user who leaves a search wants to see everything again.
     fn leave(&self) -> Answer {
         match self {
             Question::Find(_) => Answer::Act(Action::Find(String::new())),
@@ -301,7 +301,7 @@ impl Question {
             Question::SendFile { is_image: true, .. } if character.eq_ignore_ascii_case(&'l') => {
                 return Answer::Act(Action::Go(ScreenId::Load));
             }
-            // Whoever types on without looking must not close them: the rest would be keys to the unit.
+            // A user who types on without looking must not close them: the rest would be keys to the unit.
             Question::Paste { .. } | Question::SendFile { .. } if !character.eq_ignore_ascii_case(&'y') => {}
             _ => {
                 if !self.has_field() {

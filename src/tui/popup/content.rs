@@ -62,7 +62,7 @@ fn choose(wanted: Wanted, picker: &Picker, text: &str, theme: Theme, (columns, r
     (title.to_owned(), rows, vec![(ENTER, key), clear, (ESC, "back")])
 }
 
-/// What a question shows in so many columns; a list of files in it has so many rows.
+/// What a question shows in this many columns; a list of files in it has `room` rows.
 pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room): (usize, usize)) -> Content {
     let (title, rows, hints) = match question {
         Question::Link(form) => (
@@ -253,7 +253,7 @@ pub(super) fn ask(question: &Question, view: &View, theme: Theme, (columns, room
         Question::Paste { bytes, left_out } => (
             "Send the pasted text?",
             {
-                // What stands behind the last line end is a line as well, if anything does.
+                // What follows the last line end, if anything, is a line as well.
                 let rows = bytes.split_inclusive(|&byte| byte == b'\r').count();
                 let lines = if rows == 1 { "one line".to_owned() } else { format!("{} lines", format::grouped(rows)) };
                 let go = if bytes.len() == 1 { "goes" } else { "go" };

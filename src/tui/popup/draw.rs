@@ -1,4 +1,4 @@
-//! Where a popup stands and what can be clicked on it; what it says is in `content`.
+//! Where a popup is and what can be clicked on it; what it says is in `content`.
 
 use ratatui::Frame;
 use ratatui::layout::{Position, Rect};

@@ -1,4 +1,4 @@
-//! What stands in front of a screen: a question, a wait, or a failure.
+//! What is in front of a screen: a question, a wait, or a failure.
 //!
 //! All text is typed here, so that a letter on a screen is always a command and a letter in a popup never is.
 
@@ -27,7 +27,7 @@ pub use answer::Answer;
 pub use draw::{Target, draw, target_at};
 pub use warnings::in_the_middle;
 
-/// What stands in front of the screen.
+/// What is in front of the screen.
 #[derive(Debug)]
 pub enum Popup {
     /// The user has to answer.
@@ -198,7 +198,7 @@ pub enum Wanted {
 
 /// Orders to an emulated unit as examples, and what they do; each is one that the emulator takes.
 pub const ORDERS: &[(&[&str], &str)] = &[
-    (&["set 1 temperature 45.5"], "its sensor has so many °C"),
+    (&["set 1 temperature 45.5"], "its sensor's temperature, °C"),
     (&["process 1"], "back to the default process"),
     (&["open 2", "short 2", "repair 2"], "its wires"),
     (&["fault lost from-unit one in 100"], "something goes wrong"),
@@ -207,7 +207,7 @@ pub const ORDERS: &[(&[&str], &str)] = &[
     (&["write 6112:1 0", "read 6100:1"], "the object dictionary"),
     (&["power off", "power cycle 2"], "the supply"),
     (&["unplug"], "the unit is gone with it"),
-    (&["freeze", "thaw", "status"], "the converter; how it stands"),
+    (&["freeze", "thaw", "status"], "the converter; a summary"),
 ];
 
 /// Repetition time that is suggested where no other is known.
@@ -218,7 +218,7 @@ const SHORTEST_PERIOD_MS: u64 = 1;
 const LONGEST_PERIOD_MS: u64 = 60_000;
 
 impl Popup {
-    /// Whether there is nothing to wait for or to answer any more once the link is lost.
+    /// Whether there is nothing left to wait for or to answer once the link is lost.
     pub fn ends_with_link(&self) -> bool {
         matches!(self, Popup::Waiting { .. } | Popup::Asking(Question::CancelLoad | Question::Quit))
     }

@@ -10,10 +10,10 @@ use crate::wire::stream::Source;
 pub(super) fn loses_rows(view: &View, source: Source) -> Option<String> {
     let stream = &view.unit.monitor.stream;
     let rows = stream.source.filter(|shown| *shown != source).map(|_| format::counted(stream.rows, "row"))?;
-    Some(format!("The screens begin anew with it: {rows} of the other kind stay in the recording only."))
+    Some(format!("The screens restart with it: {rows} of the other kind stay in the recording only."))
 }
 
-/// Says so if the line cannot carry a row so often.
+/// What happens if the line cannot carry a row this often.
 pub(super) fn too_fast(view: &View, source: Source, millis: &str) -> Option<String> {
     let period = millis.parse::<f64>().ok().filter(|&millis| millis > 0.0)? / 1000.0;
     let characters = view.product()?.stream.row_characters(source) as f64;
@@ -45,8 +45,8 @@ pub fn in_the_middle(view: &View) -> [&'static str; 2] {
             ["The unit is in the middle of its questions.", "axcon ends them first, so that it is at its menu again."]
         }
         None | Some(Job::Identify | Job::Overhear) if view.question.is_some() => [
-            "The unit's question behind a key typed on the terminal is still open.",
-            "It stays so, and takes the next key for its answer, whoever sends it: end it on the terminal with Enter.",
+            "The unit's question after a key typed on the terminal is still open.",
+            "It stays open and takes the next key as its answer, no matter who sends it: Enter on the terminal ends it.",
         ],
         None | Some(Job::Identify | Job::Overhear) if view.waits_in_loader() => [
             "The unit waits in its loader for a file: it neither measures nor talks on CAN.",

@@ -45,7 +45,7 @@ pub(super) struct PendingOrder {
     answer: Receiver<unit::Answer>,
 }
 
-/// Answers come on a channel of their own, and wake whoever waits on the loop's.
+/// Answers come on a channel of their own, and wake the loop through its own.
 pub(super) fn channel(waker: SyncSender<host::Input>) -> (Reporter, Answers) {
     let (found, answers) = sync_channel(MOST_WAITING);
     (Reporter { found, waker }, answers)
@@ -102,7 +102,7 @@ impl Console {
     pub(super) fn order(&mut self, line: String) {
         let refusal = match &self.link {
             // The unit was on its link.
-            None => "the unit is gone with its link, C begins with a new one",
+            None => "the unit is gone with its link, C starts a new one",
             Some(_) if self.orders.len() >= MOST_ORDERS => "too many orders wait for the unit",
             Some(link) => {
                 // Each with a channel of its own, which has room: the unit's thread must never wait for the loop, which

@@ -139,7 +139,7 @@ impl Console {
 
     /// Closes the link; what it has put on the channel and nobody has taken is forgotten.
     pub(super) fn close_link(&mut self) {
-        // The console's time goes on from where the recording's stands.
+        // The console's time goes on from where the recording's is.
         let now = self.now();
         self.player = None;
         self.skew += now.since(self.now());

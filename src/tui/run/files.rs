@@ -110,10 +110,10 @@ pub(super) fn recordings(state: Result<PathBuf, String>, written: Option<PathBuf
     Ok(RecordingList { entries: library.listed.into_iter().map(entry).collect(), older: library.older })
 }
 
-/// Writes a file that is not there yet, whole or not at all.
+/// Writes a new file, whole or not at all.
 pub(super) fn create(path: &Path, bytes: &[u8]) -> Result<(), String> {
     save(path, bytes, false).map_err(|error| match error {
-        SaveError::Exists | SaveError::NotAFile => "a file of that name is there already".to_owned(),
+        SaveError::Exists | SaveError::NotAFile => "a file of that name already exists".to_owned(),
         SaveError::Io(error) => error.to_string(),
     })
 }

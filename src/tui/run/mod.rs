@@ -336,7 +336,7 @@ impl Console {
                 let failure = (self.world.explain)(error);
                 self.lose_link(failure);
             }
-            // Whoever stopped us, and whatever was drawn meanwhile: it is our terminal again.
+            // Whatever stopped us, and whatever was drawn meanwhile: it is our terminal again.
             host::Input::Signal(number) if signal::continues(&number) => {
                 if let Err(error) = canvas.retake().and_then(|()| self.redraw(canvas)) {
                     self.end(Err(error));

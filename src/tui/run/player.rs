@@ -1,6 +1,6 @@
 //! A recording that is played: at its own pace, faster, all at once; paused; from another place.
 //!
-//! The console's time is the recording's then: it stands while the recording is paused, and passes in no time while it
+//! The console's time is then the recording's: it stops while the recording is paused, and passes in no time while it
 //! is played all at once.
 
 use std::path::{Path, PathBuf};
@@ -108,7 +108,7 @@ impl Player {
         Playing { position: self.wanted().unwrap_or(self.position()), length: self.length, pace: self.pace }
     }
 
-    /// The place it is on its way to: whoever steers from there counts from it, and not from where it happens to be.
+    /// The place it is on its way to: steering counts from there, not from where it happens to be.
     fn wanted(&self) -> Option<Duration> {
         let target = self.target?;
         match self.length {
@@ -118,7 +118,7 @@ impl Player {
         }
     }
 
-    /// Whether it has to begin anew for that.
+    /// Whether it has to restart for that.
     pub(super) fn is_behind(&self, playback: Playback) -> bool {
         match playback {
             Playback::Pace(_) => false,
@@ -127,13 +127,13 @@ impl Player {
         }
     }
 
-    /// Plays it differently. What lies behind needs [`Player::begin_again`] first.
+    /// Plays it differently. Going back needs [`Player::begin_again`] first.
     pub(super) fn steer(&mut self, clock: Instant, playback: Playback) {
         match playback {
             Playback::Pace(pace) | Playback::Again(pace) => self.pace = pace,
             Playback::Seek(place) => {
                 self.target = Some(place);
-                // Who looks for a place wants to see it.
+                // A user who looks for a place wants to see it.
                 if self.pace == Pace::AtOnce {
                     self.pace = Pace::Paused;
                 }
@@ -203,7 +203,8 @@ impl Player {
                 Ok(Some(Piece::Mark { at, text })) => (at, Input::Mark(text)),
                 Ok(None) => {
                     let cut = self.recording.ending() == Some(Ending::CutShort);
-                    let text = "The recording ends in the middle of a line: whoever wrote it was killed.".to_owned();
+                    let text =
+                        "The recording ends in the middle of a line: the program that wrote it was killed.".to_owned();
                     return Err(cut.then(|| Failure { text, hints: Vec::new() }));
                 }
                 Err(error) => return Err(Some(unreadable(error))),
@@ -326,10 +327,10 @@ mod tests {
             assert_eq!(player.playing().position, seconds(wanted));
             player.step(clock(0), unreadable);
         }
-        assert_eq!(heard(&mut player, clock(0)), "de", "behind a, b and c, one for each key, and not further");
+        assert_eq!(heard(&mut player, clock(0)), "de", "after a, b and c, one for each key, and not further");
         assert_eq!(player.playing().position, seconds(4));
         player.steer(clock(0), Playback::Seek(seconds(99)));
-        assert_eq!(player.playing().position, seconds(10), "there is nothing behind the end");
+        assert_eq!(player.playing().position, seconds(10), "there is nothing after the end");
         assert_eq!(heard(&mut player, clock(0)), "fghijk.");
         assert_eq!(player.playing().position, seconds(10));
     }

@@ -61,7 +61,7 @@ fn console_and_keys() -> (Console, SyncSender<TerminalEvent>) {
         open: |spec, baud, clock, inputs| {
             let connection = Connection::open(spec, LinkOptions { baud }, clock, inputs.clone());
             let connection = connection.map_err(|error| Failure { text: error.to_string(), hints: Vec::new() })?;
-            // A reader that is quicker than whoever has opened the link.
+            // A reader that is quicker than the code that opens the link.
             let (link, bytes) = (connection.id(), format!("hello from {}\r\n", spec).into_bytes());
             inputs.send(host::Input::Bytes { link, at: clock.now(), bytes }).expect("there is room");
             Ok(connection)
@@ -137,7 +137,7 @@ fn no_byte_is_lost_when_one_link_takes_the_place_of_another() {
 }
 
 #[test]
-fn what_the_reader_has_brought_counts_also_behind_the_loss_of_the_link() {
+fn what_the_reader_has_brought_counts_also_after_the_loss_of_the_link() {
     let folder = tempfile::tempdir().expect("a folder");
     let pty = Pty::open(115_200).expect("a port");
     let mut console = console();
@@ -189,13 +189,13 @@ fn files_are_written_in_their_order_beside_the_loop_and_are_whole_when_it_ends()
     let created = |text: &str| Effect::CreateFile { path: path.clone(), bytes: text.into() };
     let appended = |text: &str| Effect::AppendFile { path: path.clone(), bytes: text.into() };
     console.perform(vec![created("a"), appended("b"), appended("c")]);
-    // The file of somebody else: what was to stand behind a new one is not put into it.
+    // The file of somebody else: what was to follow in a new one is not put into it.
     let theirs = folder.path().join("theirs.csv");
     std::fs::write(&theirs, "theirs").expect("written");
     let more = Effect::AppendFile { path: theirs.clone(), bytes: "ours".into() };
     console.perform(vec![Effect::CreateFile { path: theirs.clone(), bytes: "ours".into() }, more]);
     assert!(matches!(answer(&console), Input::FileWritten { result: Ok(()), .. }));
-    assert!(matches!(answer(&console), Input::FileWritten { result: Err(_), .. }), "it is there already");
+    assert!(matches!(answer(&console), Input::FileWritten { result: Err(_), .. }), "it already exists");
     assert_eq!(console.into_writer().finish(std::time::Duration::from_secs(60)), [PathBuf::new(); 0]);
     let written = |path| std::fs::read_to_string(path).expect("there");
     assert_eq!((written(&path), written(&theirs)), ("abc".into(), "theirs".into()));

@@ -154,7 +154,7 @@ impl Unwritten {
 /// Writes one piece after the other.
 struct Disk<R> {
     report: R,
-    /// Files that could not be made, since they were there already or the disk refused: nothing is added to them.
+    /// Files that could not be made, since they existed already or the disk refused: nothing is added to them.
     refused: BTreeSet<PathBuf>,
 }
 

@@ -43,7 +43,7 @@ pub const BINDINGS: &[Binding] = &[
 
 /// Rows below the list that explain the chosen entry.
 const DETAIL_ROWS: u16 = 6;
-/// Links used before that are shown at most.
+/// Links used before that are shown, at most.
 const MOST_RECENT: usize = 5;
 /// Columns of a port's name; a longer one keeps its end.
 const NAME_COLUMNS: usize = 22;
@@ -56,7 +56,7 @@ pub struct Connect {
     recent: Vec<String>,
     /// The link that was opened last.
     current: Option<String>,
-    /// Recordings that are there.
+    /// How many recordings there are.
     recordings: usize,
     cursor: usize,
     /// The link that could not be opened, until the user chooses another.
@@ -219,7 +219,7 @@ impl Connect {
         lines::first_visible(cursor_row, rows, usize::from(list.height))
     }
 
-    /// All rows of the list, and in which of them each entry stands.
+    /// All rows of the list, and in which of them each entry is.
     fn rows(&self, scene: Scene, columns: u16) -> (Vec<Line<'static>>, Vec<usize>) {
         let theme = scene.theme;
         let mut rows = vec![lines::rule(theme, columns, "Serial ports", "")];
@@ -305,16 +305,17 @@ impl Connect {
             Entry::Recent(name) => {
                 shown.push(text(match scene.view.link.name.as_deref() == Some(*name) {
                     true => "Connected now, or last.".into(),
-                    false => "Was connected before, as the recordings say.".into(),
+                    false => "Connected before, according to the recordings.".into(),
                 }));
-                // Nobody has written down which folder that was.
+                // Which folder that was is not recorded.
                 if name.contains('/') && !name.starts_with('/') && !name.contains("://") {
                     shown.push(text("A path from the folder of that time: from another it leads elsewhere.".into()));
                 }
             }
             Entry::Recordings => {
-                shown
-                    .push(text("Every connection is recorded. A recording shows on all screens what was then.".into()));
+                shown.push(text(
+                    "Every connection is recorded. A recording shows on all screens what happened then.".into(),
+                ));
             }
             Entry::Other => {
                 shown.push(text("/dev/ttyUSB0 or COM3      a serial port that is not listed".into()));

@@ -31,9 +31,9 @@ pub const BINDINGS: &[Binding] = &[
 const FOUND_COLUMNS: usize = 33;
 /// Columns of a label at most: a value far from its name is hard to read.
 const LONGEST_LABEL: usize = 36;
-/// From this width on the page and what was found on it stand side by side.
+/// From this width on the page and what was found on it are side by side.
 const BESIDE: u16 = 120;
-/// Columns of the numbers at least where they stand beside the page, with their extremes.
+/// Columns of the numbers at least where they are beside the page, with their extremes.
 const LEAST_FOUND_COLUMNS: u16 = 60;
 /// Rows that the numbers get at least below a page.
 const LEAST_FOUND_ROWS: u16 = 7;
@@ -130,7 +130,7 @@ impl Diagnostics {
     }
 }
 
-/// The page and its numbers, and where they stand.
+/// The page and its numbers, and where they are.
 struct Parts {
     left: Rect,
     right: Rect,
@@ -184,7 +184,7 @@ impl Parts {
     }
 }
 
-/// What of so many rows is not in sight.
+/// Which of this many rows are not in sight.
 fn more(rows: usize, first: usize, room: usize) -> Option<String> {
     match (first, rows.saturating_sub(first + room)) {
         (0, 0) => None,
@@ -197,7 +197,7 @@ fn more(rows: usize, first: usize, room: usize) -> Option<String> {
 /// Words that a page has in place of a channel's temperature (`wire::stream` knows those of the rows).
 const STATES: [&str; 9] = ["open", "short", "shorted", "opencct", "shortcct", "disabled", "null", "off", "error"];
 
-/// The numbers under names of their own. Where a channel has no temperature its state stands before the number behind it,
+/// The numbers under names of their own. Where a channel has no temperature its state comes before the number after it,
 /// `RTD1 Short C raw 4001 uV`: that is the `RTD1 raw` of other pages. Two quantities of one name are told apart by what
 /// their units measure.
 fn named(found: &[Tracked]) -> Vec<Tracked> {

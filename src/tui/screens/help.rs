@@ -12,7 +12,7 @@ use crate::tui::widgets::{format, lines};
 
 /// Columns of the keys.
 const KEY_COLUMNS: usize = 17;
-/// From this width on two columns of text stand side by side, where all of it fits.
+/// From this width on two columns of text are side by side, where all of it fits.
 const TWO_COLUMNS: u16 = 150;
 
 /// The page for the screen it was called from.
@@ -22,13 +22,13 @@ pub struct Help {
     scrolled: usize,
 }
 
-/// How the page stands in an area.
+/// How the page lies in an area.
 enum Layout {
     /// Keys on the left, the rest on the right.
     Beside([(Rect, Vec<Line<'static>>); 2]),
     /// One below the other.
     Below(Vec<Line<'static>>),
-    /// The same, with more rows than there is room for: so many are shown, one row says how many are not.
+    /// The same, with more rows than there is room for: this many are shown, one row says how many are not.
     Scrolled(Vec<Line<'static>>, usize),
 }
 

@@ -140,7 +140,7 @@ impl Recordings {
         let play = match cmd {
             // There is nothing to stop or to go on with: it begins again.
             Cmd::Pause if is_at_end(playing) => Playback::Again(pace_from_end(playing)),
-            // Once more at once would show what is there already.
+            // Looking again at once would show nothing new.
             Cmd::Faster if is_at_end(playing) => match step_of_pace(pace_from_end(playing), 1) {
                 Pace::AtOnce => return None,
                 pace => Playback::Pace(pace),
@@ -245,7 +245,7 @@ impl Recordings {
             Err(why) => ("Cannot be read", format!("{}.", visible::sentence(why))),
         };
         let mut rows = vec![lines::rule(theme, columns, heading, "")];
-        // Whoever copies the path needs all of it, and the file's name in one piece.
+        // A user who copies the path needs all of it, and the file's name in one piece.
         let name = path.rfind('/').filter(|_| format::width(&path) > room).map_or(0, |slash| slash + 1);
         let (folder, name) = path.split_at(name);
         let parts = [folder, name].into_iter().filter(|part| !part.is_empty());
@@ -260,7 +260,7 @@ impl Recordings {
     }
 }
 
-/// An entry of the list: a recording, or why the file is none.
+/// An entry of the list: a recording, or why the file is not one.
 fn row(theme: Theme, entry: &RecordingEntry, is_chosen: bool, columns: usize) -> Line<'static> {
     let mark = if is_chosen { "›" } else { " " };
     let recorded = match &entry.content {
@@ -296,7 +296,7 @@ fn is_at_end(playing: Playing) -> bool {
     playing.length.is_some_and(|length| playing.position >= length)
 }
 
-/// The pace it is played at from its beginning once it stands at its end.
+/// The pace it is played at from its beginning once it is at its end.
 fn pace_from_end(playing: Playing) -> Pace {
     match playing.pace {
         Pace::Times(times) => Pace::Times(times),
@@ -350,7 +350,7 @@ fn player(scene: Scene, playing: Playing, columns: u16) -> Vec<Line<'static>> {
             Span::raw(format!("  {pace}")),
         ]),
         match defect.filter(|_| ended) {
-            // Its place stands at the end.
+            // Its place is at the end.
             Some(defect) => Line::styled(
                 format!("  {}", format::keep_end(&visible::text(defect), usize::from(columns).saturating_sub(4))),
                 theme.bad(),

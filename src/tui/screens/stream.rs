@@ -74,7 +74,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('r'))],
         cmd: Cmd::Restart,
         short: "restart min/max",
-        long: "start minimum, maximum and mean anew",
+        long: "restart minimum, maximum and mean",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('e'))],
@@ -100,7 +100,7 @@ const LEAST_SPAN: f64 = 1.0;
 const TABLE_COLUMNS: usize = 77;
 /// A chart of fewer columns or rows, its heading and its axis among them, says little: then fewer are shown.
 const LEAST_CHART: (u16, u16) = (60, 9);
-/// Charts as high as this stand one below the other, so that the same moment is in the same column of all.
+/// Charts as high as this are one below the other, so that the same moment is in the same column of all.
 const HIGH_CHART: u16 = 11;
 
 /// The page.
@@ -116,7 +116,7 @@ pub struct Stream {
 /// The picture is held.
 #[derive(Clone, Copy, Debug)]
 struct Held {
-    /// What stands at the right edge.
+    /// What is at the right edge.
     end: Instant,
     /// What is looked at.
     cursor: Instant,
@@ -157,7 +157,7 @@ impl Stream {
                 self.alone = !self.alone;
                 let text = match self.alone {
                     true => "One curve has all the room.",
-                    false => "As many curves as have room.",
+                    false => "As many curves as fit.",
                 };
                 return Some(Action::Tell(text.to_owned()));
             }
@@ -229,7 +229,7 @@ impl Stream {
             .iter()
             .filter_map(|&(number, area)| Some((number, self.curve(scene, number, (from, to))?, area)))
             .collect();
-        // Charts that stand one below the other have their times in the same columns.
+        // Charts one below the other have their times in the same columns.
         let needed = curves.iter().map(|(_, curve, area)| curve.needed_columns(area.height.saturating_sub(1))).max();
         for (number, mut curve, area) in curves {
             curve.label_columns = needed.unwrap_or_default();
@@ -266,7 +266,7 @@ impl Stream {
         let count = lines_of(columns);
         let places = shown.chunks(usize::from(columns)).enumerate().flat_map(|(line, channels)| {
             let (top, bottom) = (share(area.height, count, line), share(area.height, count, line + 1));
-            // What stands alone in the last line has all of it.
+            // A text that is alone in the last line has all of it.
             let count = channels.len() as u16;
             channels.iter().enumerate().map(move |(place, &channel)| {
                 let (left, right) = (share(area.width, count, place), share(area.width, count, place + 1));
@@ -362,7 +362,7 @@ impl Stream {
         let is_old = scene.view.why_old().is_some() || self.held.is_some();
         let (state, style) = state(theme, channel, reading);
         let unit = if source == Source::FieldValue { " °C" } else { "   " };
-        // Where there is no value its state says why; a unit behind nothing would look like a value.
+        // Where there is no value its state says why; a unit after nothing would look like a value.
         let value = match reading.and_then(Reading::value) {
             Some(value) => format!("{value:.decimals$}{unit}"),
             None => "-   ".into(),
@@ -412,7 +412,7 @@ fn state(theme: Theme, channel: &Channel, reading: Option<Reading>) -> (&'static
 /// What has to be said below the table: where rows go, or that none come.
 fn note(scene: Scene, chosen: Option<&Channel>, columns: usize) -> Line<'static> {
     let (theme, view) = (scene.theme, scene.view);
-    // Where rows go says nothing of whether any come: that stands first, shorter where both have to.
+    // Where rows go says nothing of whether any come: that comes first, shorter where both have to be shown.
     let warning = match view.why_old() {
         Some(old) if view.export.is_some() => format!("  {} ", old.reason()),
         Some(old) => format!("  {}", old.text()),

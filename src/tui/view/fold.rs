@@ -85,7 +85,7 @@ impl View {
             self.unit.monitor.stream.interrupt();
         }
         match (self.facts.stream, facts.stream) {
-            // Who is away, or starts anew, has not been switched off by that.
+            // A unit that is away, or restarts, has not been switched off by that.
             (Some(_), None) => {
                 let is_away = self.returning.is_some() || has_started || facts.state == UnitState::Loader;
                 let is_away = is_away || self.unit.is_cut_off;
@@ -139,13 +139,10 @@ impl View {
                 }
             }
             Outcome::Identified => self.identified(),
-            // The end of a recording is told by whoever has read it, with its reason.
+            // The end of a recording is reported by its reader, with the reason.
             Outcome::DefaultsTaken => {
                 self.outdate_dictionary();
-                self.tell(
-                    Tone::Good,
-                    "The unit has taken the Yes and shows its menu; that it has started anew is not to be seen.",
-                );
+                self.tell(Tone::Good, "The unit has taken the Yes and shows its menu; no restart was seen.");
             }
             Outcome::Done(Job::Overhear) => {}
             Outcome::StreamRuns { was_on } => {
@@ -244,7 +241,7 @@ impl View {
                         let first = visible::line(first.as_bytes());
                         format!("Not all of it is understood, first: \"{first}\". {entries} {were} read.")
                     }
-                    WalkEnd::Restarted => format!("The unit started anew in the middle of it: {entries} {were} read."),
+                    WalkEnd::Restarted => format!("The unit restarted in the middle of it: {entries} {were} read."),
                     WalkEnd::Whole | WalkEnd::Stopped | WalkEnd::Cancelled => {
                         format!("Not all of the object dictionary was shown: {entries} {were} read.")
                     }

@@ -106,11 +106,11 @@ pub struct Link {
     pub unrecorded: Option<String>,
     /// The start of time, in milliseconds since 1970, UTC.
     pub start_millis: i64,
-    /// How it stands.
+    /// Its state.
     pub state: LinkState,
 }
 
-/// How a link stands.
+/// The state of a link.
 #[derive(Debug, Default, PartialEq)]
 pub enum LinkState {
     /// No link.
@@ -127,7 +127,7 @@ pub enum LinkState {
 /// The upload.
 #[derive(Debug, Default)]
 pub struct Load {
-    /// Where it stands.
+    /// Where it is.
     pub progress: Option<Progress>,
     /// Since when the unit holds us by XOFF.
     pub held_since: Option<Instant>,
@@ -161,7 +161,7 @@ pub struct DictionaryRead {
     pub reading: DictionaryReading,
     /// When it was complete, or its last entry came.
     pub at: Instant,
-    /// The unit has started anew since, or is in its loader: it may have other values.
+    /// The unit has restarted since, or is in its loader: it may have other values.
     pub is_outdated: bool,
 }
 
@@ -263,7 +263,7 @@ impl View {
         self.ages_at.filter(|_| self.can_send())
     }
 
-    /// Starts minimum, maximum and mean of every channel anew.
+    /// Restarts minimum, maximum and mean of every channel.
     pub fn restart_extremes(&mut self) {
         self.unit.monitor.stream.restart_extremes();
     }
@@ -328,7 +328,7 @@ impl View {
             Job::ReadDictionary => Some("the object dictionary is being read: Esc on its screen cancels that"),
             Job::Load => Some("new software is being loaded: Esc on its screen cancels that"),
             Job::StreamOn | Job::StreamOff | Job::RestoreDefaults | Job::Overhear => {
-                Some("the unit is being told something: wait a moment")
+                Some("the unit is being given an order: wait a moment")
             }
         }
     }
@@ -343,7 +343,7 @@ impl View {
         self.can_send() && self.facts.state == UnitState::Loader
     }
 
-    /// Whether something would stay half done, or has been left so, and whoever leaves now should know.
+    /// Whether something would stay half done, or has been left so, and a user who leaves now should know.
     pub fn would_be_left(&self) -> bool {
         self.is_in_the_middle() || self.waits_in_loader()
     }
@@ -470,7 +470,7 @@ mod tests {
         assert!(view.aged(Instant::from_millis(15_000)));
         assert_eq!(view.ages_at(), Some(Instant::from_millis(25_000)));
         view.fold(Instant::from_millis(20_000), &Event::FactsChanged, &said(50));
-        assert_eq!(view.nmt_heard, Some(Instant::from_millis(20_000)), "the same word anew");
+        assert_eq!(view.nmt_heard, Some(Instant::from_millis(20_000)), "the same word again");
         view.fold(Instant::from_millis(21_000), &Event::FactsChanged, &said(50));
         assert_eq!(view.nmt_heard, Some(Instant::from_millis(20_000)), "something else has changed");
         view.link.kind = LinkKind::Recording;

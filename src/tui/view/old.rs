@@ -51,7 +51,7 @@ impl Old {
             Old::DictionaryIsRead => "These values are old: the unit measures nothing while its dictionary is read.",
             Old::Viewing => "These values are old: the view is open and halts the unit. M closes it.",
             Old::StreamOff => "The stream is off: these are its last values. T switches it on.",
-            Old::NotHeard => "No row since the unit is back: these are its last values. T switches it on.",
+            Old::NotHeard => "No row since the unit came back: these are its last values. T switches it on.",
             Old::NoRow => "No new row: these values are old. M asks whether the unit still answers.",
             Old::NoRowYet => "The stream is on: no row has come yet, these values are from before.",
         }

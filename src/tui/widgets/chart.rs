@@ -50,7 +50,7 @@ const LEAST_STEPS: f64 = 5.0;
 const AXIS_ROWS: u16 = 2;
 
 impl Quantity {
-    /// What rows of this source carry, with so many digits behind the point.
+    /// What rows of this source carry, with this many digits after the point.
     pub fn of(source: Source, decimals: usize) -> Self {
         let step = 10f64.powi(-i32::try_from(decimals).unwrap_or(i32::MAX));
         let unit = match source {
@@ -62,7 +62,7 @@ impl Quantity {
 }
 
 impl Curve {
-    /// The scale of its values in an area of so many rows; `None` if there is no value.
+    /// The scale of its values in an area of this many rows; `None` if there is no value.
     fn scale(&self, rows: u16) -> Option<Scale> {
         let known = self.samples.iter().filter_map(|&(_, value)| value);
         let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
@@ -70,7 +70,7 @@ impl Curve {
         (low <= high).then(|| Scale::new(low, high, self.quantity.least_span, rows))
     }
 
-    /// Columns that its labels take in an area of so many rows.
+    /// Columns that its labels take in an area of this many rows.
     pub fn needed_columns(&self, rows: u16) -> u16 {
         let Some(scale) = self.scale(rows) else { return 0 };
         let texts = scale.ticks.iter().map(|&tick| scale.label(tick)).chain([self.quantity.unit.to_owned()]);

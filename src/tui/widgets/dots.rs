@@ -1,6 +1,6 @@
 //! Lines as dots, eight to a character: two columns and four rows in each.
 
-/// Where the dots of a braille pattern stand in its bits, from the top to the bottom, left and right.
+/// Where the dots of a braille pattern are in its bits, from the top to the bottom, left and right.
 const BITS: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
 /// The pattern without a dot.
 const EMPTY: u32 = 0x2800;
@@ -20,7 +20,7 @@ pub struct Dots {
 }
 
 impl Dots {
-    /// An empty area of so many characters.
+    /// An empty area of this many characters.
     pub fn new(columns: u16, rows: u16) -> Self {
         Dots { columns, rows, cells: vec![0; usize::from(columns) * usize::from(rows)] }
     }

@@ -53,7 +53,7 @@ pub fn period(duration: Duration) -> String {
 
 /// What was heard less long ago is as good as what is heard now ...
 const FRESH: Duration = Duration::from_secs(10);
-/// ... and what is older than a minute, or an hour, is told in whole ones.
+/// ... and what is older than a minute, or an hour, is given in whole ones.
 const COARSER: [Duration; 2] = [Duration::from_secs(60), Duration::from_secs(3600)];
 
 /// How long ago something was, `40 s ago`; nothing for what has just been.
@@ -102,7 +102,7 @@ pub fn width(text: &str) -> usize {
     Span::raw(text).width()
 }
 
-/// The end of a name, for paths: what tells two of them apart stands there. At most `columns` wide.
+/// The end of a name, for paths: what tells two of them apart is there. At most `columns` wide.
 pub fn keep_end(text: &str, columns: usize) -> String {
     if width(text) <= columns {
         return text.to_owned();
@@ -119,7 +119,7 @@ pub fn keep_end(text: &str, columns: usize) -> String {
     if columns == 0 { String::new() } else { std::iter::once('…').chain(kept.into_iter().rev()).collect() }
 }
 
-/// The beginning of a text, at most `columns` wide, `…` behind it if something is missing.
+/// The beginning of a text, at most `columns` wide, `…` after it if something is missing.
 pub fn keep_start(text: &str, columns: usize) -> String {
     if width(text) <= columns {
         return text.to_owned();

@@ -35,7 +35,7 @@ pub fn labelled(theme: Theme, label: &str, value: impl Into<Span<'static>>) -> L
     Line::from(vec![Span::styled(format!("  {}", format::left(label, LABEL_COLUMNS)), theme.quiet()), value.into()])
 }
 
-/// Columns of a label, the blank behind it included.
+/// Columns of a label, the blank after it included.
 pub const LABEL_COLUMNS: usize = 12;
 
 /// Draws lines from the top of an area on; what does not fit is left out.

@@ -50,7 +50,7 @@ pub struct Scale {
     pub high: f64,
     /// The values that get a label, upwards.
     pub ticks: Vec<f64>,
-    /// Digits behind the point of a label.
+    /// Digits after the point of a label.
     decimals: usize,
 }
 
@@ -73,7 +73,7 @@ impl Scale {
         Scale { low, high, ticks, decimals }
     }
 
-    /// Where a value stands, 0 at the lower edge, 1 at the upper one.
+    /// Where a value is, 0 at the lower edge, 1 at the upper one.
     pub fn place(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
@@ -90,7 +90,7 @@ impl Scale {
 /// differently, and none of them knows 0.1.
 const HAIR: f64 = 1e-9;
 
-/// The step of 1, 2 or 5 times a power of ten that is no less than `least`.
+/// The step of 1, 2 or 5 times a power of ten that is not less than `least`.
 fn round_step(least: f64) -> f64 {
     let power = 10f64.powi((least.log10() + HAIR).floor() as i32);
     let steps = [1.0, 2.0, 5.0].map(|digit| digit * power);
@@ -118,7 +118,7 @@ pub fn times(start: Duration, from: Instant, to: Instant, columns: u16) -> Vec<(
         let room = u128::from(columns) * u128::from(*step) / span;
         room >= (widest(*step) + BLANKS) as u128
     };
-    // A scale over days has its labels at midnight, every so many of them.
+    // A scale over days has its labels at midnights, with some days between them.
     let days = (1..12).map(|doublings| (24 * HOUR) << doublings);
     let Some(step) = TIME_STEPS.into_iter().chain(days).find(has_room) else { return Vec::new() };
     let nanos = u128::from(step) * 1_000_000;

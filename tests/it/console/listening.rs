@@ -74,7 +74,7 @@ fn pages_that_another_console_has_left_on_are_shown_and_stopped() {
 }
 
 #[test]
-fn pages_that_go_on_behind_a_lost_link_are_shown_as_running() {
+fn pages_that_go_on_after_a_lost_link_are_shown_as_running() {
     let mut desk = Desk::new();
     desk.keys("s");
     desk.wait_for("page 3");
@@ -88,7 +88,7 @@ fn pages_that_go_on_behind_a_lost_link_are_shown_as_running() {
 }
 
 #[test]
-fn pages_of_a_unit_that_has_restarted_behind_a_lost_link_are_stopped() {
+fn pages_of_a_unit_that_has_restarted_after_a_lost_link_are_stopped() {
     let mut desk = Desk::new();
     desk.keys("s");
     desk.wait_for("page 3");
@@ -104,8 +104,8 @@ fn pages_of_a_unit_that_has_restarted_behind_a_lost_link_are_stopped() {
     desk.wait_for("S stops");
 }
 
-/// A console that plays what another one has recorded, with its remarks, up to `behind` the last byte.
-fn replayed(record: &[Entry], marks: &[(Instant, &str)], behind: Duration) -> Desk {
+/// A console that plays what another one has recorded, with its remarks, up to `after` the last byte.
+fn replayed(record: &[Entry], marks: &[(Instant, &str)], after: Duration) -> Desk {
     let mut desk = Desk::new();
     desk.app = console();
     desk.now = Instant::ZERO;
@@ -121,7 +121,7 @@ fn replayed(record: &[Entry], marks: &[(Instant, &str)], behind: Duration) -> De
         start_of_day: Duration::ZERO,
         start_millis: 0,
     }));
-    let end = record.last().map_or(Instant::ZERO, |entry| entry.at) + behind;
+    let end = record.last().map_or(Instant::ZERO, |entry| entry.at) + after;
     let bytes = record.iter().map(|entry| {
         let input = match entry.direction {
             Direction::ToUnit => Input::Sent(entry.bytes.clone()),

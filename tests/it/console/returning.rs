@@ -25,7 +25,7 @@ fn much_known() -> Desk {
 }
 
 #[test]
-fn the_same_unit_behind_a_cable_plugged_in_again_goes_on() {
+fn the_same_unit_on_a_cable_plugged_in_again_goes_on() {
     let mut desk = much_known();
     desk.pull().input(Input::LinkBack("/dev/ttyUSB0".into()));
     let asked = desk.picture();
@@ -38,7 +38,7 @@ fn the_same_unit_behind_a_cable_plugged_in_again_goes_on() {
 }
 
 #[test]
-fn another_product_behind_a_cable_plugged_in_again_is_named_and_inherits_nothing() {
+fn another_product_on_a_cable_plugged_in_again_is_named_and_inherits_nothing() {
     let mut desk = much_known();
     desk.keys("e").key(KeyCode::Char('u'), KeyModifiers::CONTROL);
     desk.press(KeyCode::Esc).pull();
@@ -69,7 +69,7 @@ fn another_unit_of_the_same_kind_is_known_by_its_serial_number() {
 }
 
 #[test]
-fn nobody_behind_a_cable_plugged_in_again_leaves_history_until_somebody_answers() {
+fn nobody_on_a_cable_plugged_in_again_leaves_history_until_somebody_answers() {
     let mut desk = much_known();
     desk.pull();
     let now = desk.now;

@@ -113,12 +113,12 @@ fn no_key_of_a_job_completes_an_answer_that_was_begun_by_hand() {
     }
     assert!(desk.sent.is_empty(), "{:?}", desk.sent);
     desk.keys("q");
-    assert!(desk.picture().contains("question behind a key typed on the terminal"), "{}", desk.picture());
+    assert!(desk.picture().contains("question after a key typed on the terminal"), "{}", desk.picture());
     desk.keys("n3").press(KeyCode::Enter).run(Duration::from_secs(3));
     desk.key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("2m").run(Duration::from_secs(3));
     let told = desk.picture();
     assert!(told.contains("application runs") && !told.contains("asks, see 3"), "{told}");
-    // The unit has not started anew: nothing has been restored.
+    // The unit has not restarted: nothing has been restored.
     assert!(!desk.sent.is_empty());
 }
 

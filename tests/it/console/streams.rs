@@ -26,7 +26,7 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
     let text = String::from_utf8(desk.files[Path::new("rows.csv")].clone()).expect("text");
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "time,source,CJ,TC1,TC2,TC3,TC4");
-    // 30 s before, 15 s behind its beginning.
+    // 30 s before, 15 s after its beginning.
     assert!((215..235).contains(&lines.len()), "{} lines", lines.len());
     let is_row = |line: &&str| line.contains("Z,fv,") || line.ends_with("Z,mark 1,,,,,");
     assert!(lines[1..].iter().all(|line| is_row(line) && line.split(',').count() == 7), "{text}");
@@ -68,12 +68,12 @@ fn the_stream_is_suggested_as_it_was_and_a_change_of_source_says_what_it_costs()
     desk.run(Duration::from_secs(45)).pull().input(Input::LinkBack("/dev/ttyUSB0".into()));
     desk.run(Duration::from_secs(5)).keys("6");
     let told = desk.picture();
-    assert!(told.contains("No row since the unit is back") && !told.contains("The stream is off"), "{told}");
+    assert!(told.contains("No row since the unit came back") && !told.contains("The stream is off"), "{told}");
     desk.keys("t");
     let asked = desk.picture();
-    assert!(asked.contains("› 20000") && !asked.contains("begin anew"), "{asked}");
+    assert!(asked.contains("› 20000") && !asked.contains("screens restart"), "{asked}");
     desk.keys("p");
-    assert!(desk.picture().contains("The screens begin anew with it: 2 rows"), "{}", desk.picture());
+    assert!(desk.picture().contains("The screens restart with it: 2 rows"), "{}", desk.picture());
     desk.press(KeyCode::Esc).run(Duration::from_secs(20));
     assert!(desk.picture().contains("every 20 s") && !desk.picture().contains("No row"), "{}", desk.picture());
 }

@@ -22,7 +22,7 @@ fn marks_that_were_set_before_an_export_stand_between_its_rows() {
 }
 
 #[test]
-fn what_answers_a_key_is_no_text_that_nobody_understands() {
+fn what_answers_a_key_is_not_a_text_that_nobody_understands() {
     let mut desk = Desk::new();
     let other_text = |desk: &mut Desk| {
         desk.keys("2");
@@ -45,7 +45,7 @@ fn what_answers_a_key_is_no_text_that_nobody_understands() {
     desk.keys("3s").run(Duration::from_secs(10)).keys("sv").run(Duration::from_secs(2));
     desk.press(KeyCode::Enter).press(KeyCode::Enter).keys("xt").run(Duration::from_secs(2)).press(KeyCode::Enter);
     desk.run(Duration::from_secs(5)).key(KeyCode::Char('5'), KeyModifiers::CONTROL);
-    assert_eq!(other_text(&mut desk), "none", "whoever has pressed the keys");
+    assert_eq!(other_text(&mut desk), "none", "no matter who pressed the keys");
 }
 
 #[test]

@@ -77,9 +77,9 @@ const HEADING: &str = "Object dictionary";
 const HEAD_ROWS: u16 = 2;
 /// Rows of the pane that explains the chosen entry, its heading included.
 const DETAIL_ROWS: u16 = 8;
-/// From this width on that pane stands beside the table ...
+/// From this width on that pane is beside the table ...
 const BESIDE_AT: u16 = 150;
-/// ... and takes so many columns at least; the table takes no more than these.
+/// ... and takes this many columns at least; the table takes no more than these.
 const DETAIL_COLUMNS: u16 = 64;
 const TABLE_COLUMNS: u16 = 140;
 
@@ -372,12 +372,12 @@ fn without_unit(view: &View) -> &'static str {
     }
 }
 
-/// Where the rows of the table stand.
+/// Where the rows of the table are.
 fn table(area: Rect) -> Rect {
     lines::split(parts(area).0, HEAD_ROWS).1
 }
 
-/// Where the table with its heading stands, and where the chosen entry is explained.
+/// Where the table with its heading is, and where the chosen entry is explained.
 fn parts(area: Rect) -> (Rect, Rect) {
     match area.width >= BESIDE_AT {
         true => {

@@ -57,7 +57,7 @@ impl Widths {
     }
 }
 
-/// What stands between two values, which may be of many words.
+/// What separates two values, which may be of many words.
 const VALUES_APART: &str = "  ";
 impl<'a> Row<'a> {
     /// The manual's entries, as nobody has read them.
@@ -109,7 +109,7 @@ impl Row<'_> {
         }
     }
 
-    /// The value in so many columns: rather the whole number without its unit, which is told below, than half of both.
+    /// The value in this many columns: rather the whole number without its unit, which is shown below, than half of both.
     fn cell(&self, columns: usize) -> String {
         let value = self.value();
         if format::width(&value) <= columns { value } else { self.bare_value() }
@@ -132,7 +132,7 @@ impl Row<'_> {
         }
     }
 
-    /// The same in so many columns: with its unit where there is room for both.
+    /// The same in this many columns: with its unit where there is room for both.
     fn other_cell(&self, columns: usize) -> String {
         let bare = self.other();
         let with_unit = self.measure().map(|measure| format!("{bare} {}", measure.unit));
@@ -140,7 +140,7 @@ impl Row<'_> {
         with_unit.filter(|text| is_number && format::width(text) <= columns).unwrap_or(bare)
     }
 
-    /// What the value stands for; what stands in place of one needs no other words.
+    /// What the value stands for; what takes the place of one needs no other words.
     pub(super) fn meaning(&self) -> Option<&str> {
         self.read.filter(|read| read.value.is_some()).and_then(|read| read.meaning.as_deref())
     }

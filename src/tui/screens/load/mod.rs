@@ -1,7 +1,7 @@
 //! Load new software (AXTC4CO manual, section 4.1.5): choose a file, read its report and the plan, watch, read the
 //! verdict.
 //!
-//! An upload cannot be started while anything stands against it; what stands against it is on the screen.
+//! An upload cannot be started while anything prevents it; what does is on the screen.
 
 mod progress;
 mod report;
@@ -72,7 +72,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('o'))],
         cmd: Cmd::Allow,
         short: "",
-        long: "send in spite of what stands against it",
+        long: "send in spite of what speaks against it",
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('n'))],
@@ -123,7 +123,7 @@ pub struct Load {
     allow: Vec<DefectId>,
 }
 
-/// Where the choosing stands.
+/// How far the choosing has come.
 #[derive(Debug)]
 enum Stage {
     Picking,
@@ -240,7 +240,7 @@ impl Load {
         self.packed
     }
 
-    /// The loader the unit is said to have; `None` for the one its product is believed to have.
+    /// The loader the unit is said to have; `None` for the one its product is assumed to have.
     pub fn loader(&self) -> Option<LoaderKind> {
         self.loader
     }
@@ -253,7 +253,7 @@ impl Load {
         Some(self.check(path))
     }
 
-    /// The next kind of loader; behind the last one the product's own again.
+    /// The next kind of loader; after the last one the product's own again.
     fn next_loader(&mut self) {
         let next = match self.loader {
             None => 0,
@@ -322,7 +322,7 @@ impl Load {
                     Cmd::Type => return Some(Action::Ask(Question::image(self.picker.directory()))),
                     Cmd::Pack => self.packed = !self.packed,
                     Cmd::Loader => {
-                        // What a loader does with some defects differs: the file is judged anew.
+                        // What a loader does with some defects differs: the file is judged again.
                         let path = facts.path.clone();
                         self.next_loader();
                         return Some(self.check(path));
@@ -401,7 +401,7 @@ impl Load {
     }
 }
 
-/// What stands against the file, or against sending it to this unit, by the names that O takes.
+/// What speaks against the file, or against sending it to this unit, by the names that O takes.
 fn overridable(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>) -> Vec<DefectId> {
     let misfits = misfits(facts, view, loader).into_iter().map(|misfit| misfit.id);
     facts.errors.iter().copied().chain(misfits).collect()

@@ -1,4 +1,4 @@
-//! What was found in a file, what stands against sending it, and what will happen.
+//! What was found in a file, what speaks against sending it, and what will happen.
 
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub(super) fn misfits(facts: &ImageFacts, view: &View, loader: Option<LoaderKind
     image.misfits(&target, software).into_iter().filter(stands).collect()
 }
 
-/// What stands against sending this image now, one sentence each.
+/// What speaks against sending this image now, one sentence each.
 pub(super) fn objections(facts: &ImageFacts, view: &View, loader: Option<LoaderKind>) -> Vec<String> {
     let mut against = Vec::new();
     if facts.is_nameless() {
@@ -67,7 +67,7 @@ pub(super) fn objections(facts: &ImageFacts, view: &View, loader: Option<LoaderK
     against
 }
 
-/// Everything about the file, what stands against it, and what will happen.
+/// Everything about the file, what speaks against it, and what will happen.
 pub(super) fn report(
     scene: Scene,
     facts: &ImageFacts,
@@ -115,11 +115,11 @@ fn to_send(facts: &ImageFacts, packed: bool) -> String {
 
 /// Which loader the unit has, and who says so.
 fn loader_line(theme: Theme, facts: &ImageFacts, chosen: Option<LoaderKind>) -> Line<'static> {
-    let believed = facts.product.as_deref().and_then(Product::named);
-    let text = match (chosen, believed) {
+    let assumed = facts.product.as_deref().and_then(Product::named);
+    let text = match (chosen, assumed) {
         (Some(kind), _) => format!("{}, as chosen; ", kind.name()),
-        (None, Some(product)) => format!("{}, believed of every {}; ", product.loader.kind.name(), product.name),
-        (None, None) => "as believed of the product; ".to_owned(),
+        (None, Some(product)) => format!("{}, assumed for every {}; ", product.loader.kind.name(), product.name),
+        (None, None) => "as assumed for the product; ".to_owned(),
     };
     let mut line = lines::labelled(theme, "Loader", text);
     line.push_span(Span::styled("G", theme.key()));
@@ -176,7 +176,7 @@ fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
     }
 }
 
-/// What is going to happen, and what stands against it or how it is begun.
+/// What is going to happen, and what speaks against it or how it is begun.
 fn plan(
     theme: Theme,
     view: &View,
@@ -212,7 +212,7 @@ fn plan(
             rows.extend(hanging(Span::raw(format!("  {number}. ")), &step, room));
         }
         rows.push(lines::labelled(theme, "Unit now", unit_version(view)));
-        // Whoever was left in the middle still waits somewhere, though the unit that is there now is not it.
+        // The unit that was left in the middle still waits somewhere, though it is not the one that is there now.
         if let Some(noted) = view.link.noted.as_ref().filter(|_| view.facts.state == UnitState::Application) {
             let image = file_name(Path::new(&noted.image));
             let product = visible::text(&noted.product);
@@ -243,7 +243,7 @@ fn plan(
     rows
 }
 
-/// A text behind a label, broken where it has to be: what stands at its end may be what there is to do.
+/// A text after a label, broken where it has to be: its end may be what there is to do.
 fn hanging(label: Span<'static>, text: &str, columns: usize) -> Vec<Line<'static>> {
     let indent = " ".repeat(label.width());
     let broken = format::wrap(text, columns.saturating_sub(label.width())).into_iter().enumerate();

@@ -8,7 +8,7 @@ use crate::tui::screens::Scene;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
-/// Rows beside what is told: heading, verdict, what Enter does, and blanks between them.
+/// Rows beside the text: heading, verdict, what Enter does, and blanks between them.
 const FRAME_ROWS: usize = 6;
 /// What to do about a unit that has fallen silent in the middle.
 const SEE_POWER: &str = "see that it has power and that the cable is in, and send the file again: it has no complete \

@@ -31,7 +31,7 @@ impl Overview {
         }
         let over = scene.view.over_shutdown().len();
         remark.extend((over > 0).then(|| format!("{over} over shutdown")));
-        // How far it can be scrolled stands in the heading: a row of its own would take that of a fault.
+        // How far it can be scrolled is in the heading: a row of its own would take that of a fault.
         remark.extend((first > 0).then(|| format!("↑ {first} more")));
         remark.extend((below > 0).then(|| format!("↓ {below} more, PgDn")));
         let mut shown = vec![lines::rule(theme, area.width, "Faults", &remark.join(", "))];

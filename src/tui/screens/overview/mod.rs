@@ -38,7 +38,7 @@ pub const BINDINGS: &[Binding] = &[
         keys: &[Press::Plain(KeyCode::Char('r'))],
         cmd: Cmd::Restart,
         short: "restart min/max",
-        long: "start minimum and maximum anew",
+        long: "restart minimum and maximum",
     },
 ];
 
@@ -60,7 +60,7 @@ pub struct Overview {
     scrolled: usize,
 }
 
-/// Where the parts of the page stand.
+/// Where the parts of the page are.
 struct Parts {
     unit: Vec<Line<'static>>,
     values: Vec<Line<'static>>,
@@ -69,7 +69,7 @@ struct Parts {
 }
 
 impl Overview {
-    /// What a command does here; `faults` is how many of them can stand above those that are shown, and how many are
+    /// What a command does here; `faults` is how many of them there can be above those shown, and how many are
     /// shown at once.
     pub fn on(&mut self, cmd: Cmd, channels: usize, (last, shown): (usize, usize)) -> Option<Action> {
         self.scrolled = self.scrolled.min(last);
@@ -85,7 +85,7 @@ impl Overview {
         None
     }
 
-    /// How many faults can stand above those that are shown, and how many are shown at once.
+    /// How many faults there can be above those shown, and how many are shown at once.
     pub fn faults_at(&self, scene: Scene, area: Rect) -> (usize, usize) {
         let room = usize::from(self.parts(scene, page(area)).faults.height.saturating_sub(1));
         (fault_rows(scene).len().saturating_sub(room), room)
@@ -119,7 +119,7 @@ impl Overview {
 
     fn parts(&self, scene: Scene, area: Rect) -> Parts {
         let (mut unit, mut values) = (unit(scene, area.width), self.values(scene, area));
-        // Faults are what one looks for: the blank line and what stands below the values make room for them.
+        // Faults are what one looks for: the blank line and what is below the values make room for them.
         let least = if has_faults(scene) { FAULT_ROWS } else { 0 };
         let too_many = |unit: &Vec<_>, values: &Vec<_>| unit.len() + values.len() + least > usize::from(area.height);
         if too_many(&unit, &values) {
@@ -146,7 +146,7 @@ impl Overview {
     }
 }
 
-/// The part of the screen that the page takes: where there is room, the terminal stands beside it.
+/// The part of the screen that the page takes: where there is room, the terminal is beside it.
 fn page(area: Rect) -> Rect {
     if area.width < BESIDE_COLUMNS { area } else { Rect { width: area.width * 3 / 5, ..area } }
 }
@@ -161,7 +161,7 @@ fn is_current(scene: Scene) -> bool {
     scene.view.unit.monitor.stream.source.is_some() && scene.view.why_old().is_none()
 }
 
-/// Digits behind the point, as the product prints them.
+/// Digits after the point, as the product prints them.
 pub fn decimals(view: &View, source: Source) -> usize {
     // A row that has been understood is one of a product that we know, if the unit has named itself or not.
     let channels = &view.unit.monitor.stream.channels;

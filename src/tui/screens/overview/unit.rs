@@ -1,4 +1,4 @@
-//! What the unit is and how it stands, each fact with where it comes from.
+//! What the unit is and its state, each fact with where it comes from.
 
 use ratatui::text::{Line, Span};
 
@@ -68,7 +68,7 @@ pub(super) fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
 }
 
 /// The CANopen state, in `room` columns. Any master on the bus changes it without the unit saying so here: what was
-/// heard a while ago is told with its age, and does not look like what is.
+/// heard a while ago is shown with its age, and does not look like what is.
 fn canopen_state(scene: Scene, room: usize) -> Span<'static> {
     let state = &scene.view.facts.nmt_state;
     let now = known(state, |state| visible::text(state));

@@ -136,7 +136,7 @@ fn value_row(
     ])
 }
 
-/// What stands behind a number that is not known to be a value.
+/// What follows a number that is not known to be a value.
 pub fn plugged_line(channel: &Channel) -> Option<String> {
     let (plugged, value) = (channel.plugged()?, channel.reading.value()?);
     let meaning = plugged.meaning();

@@ -16,7 +16,7 @@ const HEX_BYTES: u64 = 16;
 /// Columns of a row with time and offset.
 const TIMED_COLUMNS: u16 = 88;
 
-/// Where the hex view has been stopped: later bytes are not shown, and so many rows above them neither.
+/// Where the hex view has been stopped: later bytes are not shown, nor are this many rows above them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct HexPlace {
     received: u64,
@@ -30,7 +30,7 @@ impl HexPlace {
         HexPlace { received: record.received(), sent: record.sent(), rows: 0 }
     }
 
-    /// So many rows further up, or down, in a picture of `page` rows; `None` at the newest byte.
+    /// This many rows further up, or down, in a picture of `page` rows; `None` at the newest byte.
     pub(super) fn moved(self, up: i64, record: &Record, page: usize) -> Option<HexPlace> {
         let wanted = usize::try_from((self.rows as i64 + up).max(0)).unwrap_or(0);
         // Up to the page that is wanted, and no further: there may be half a million rows.

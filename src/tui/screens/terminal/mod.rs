@@ -82,7 +82,7 @@ pub const BINDINGS: &[Binding] = &[
 const SENDING_ROWS: u16 = 3;
 /// Rows that are kept free below what was found: the question for words has seven.
 const ROWS_BELOW_FOUND: usize = 8;
-/// Columns of a time with its milliseconds, the blank behind it included.
+/// Columns of a time with its milliseconds, the blank after it included.
 const TIME_COLUMNS: usize = 13;
 
 /// The terminal.
@@ -100,7 +100,7 @@ pub struct Terminal {
 /// What is shown, and from where. Without a position the newest is followed.
 #[derive(Debug, Clone, Copy)]
 enum Mode {
-    /// Lines; the number behind the last line in sight.
+    /// Lines; the number after that of the last line in sight.
     Text(Option<u64>),
     /// Bytes; rows hidden below, counted at the given numbers of bytes received and sent.
     Hex(Option<HexPlace>),
@@ -155,7 +155,7 @@ impl Terminal {
         self.after_prefix
     }
 
-    /// The record begins anew: what the hex view was stopped at is in the one before. The lines go on.
+    /// The record starts again: what the hex view was stopped at is in the one before. The lines go on.
     pub fn begin_record(&mut self) {
         if let Mode::Hex(_) = self.mode {
             self.mode = Mode::Hex(None);
@@ -299,7 +299,7 @@ impl Terminal {
     }
 }
 
-/// Where the lines or bytes stand, and below them what is being sent.
+/// Where the lines or bytes are, and below them what is being sent.
 fn body(view: &View, area: Rect) -> (Rect, Rect) {
     let (_, body) = lines::split(area, 1);
     let below = if view.unit.sending.is_some() { SENDING_ROWS } else { 0 };
@@ -367,7 +367,7 @@ fn text_rows(scene: Scene, area: Rect, place: Option<u64>, with_times: bool, wor
     rows
 }
 
-/// The number behind the last line of a picture that begins with the oldest one.
+/// The number after that of the last line of a picture that begins with the oldest one.
 fn end_of_first_page(scrollback: &Scrollback, area: Rect, with_times: bool) -> u64 {
     let room = usize::from(area.height);
     let mut rows = 0;
