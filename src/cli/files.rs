@@ -58,7 +58,7 @@ impl Destination {
             Place::Stream(opened.map_err(|error| save_error(path, SaveError::Io(error)))?)
         } else {
             admit(path, overwrite)?;
-            // Nobody shall work for what has no place in the end.
+            // Before any work is done for what could not be written in the end.
             let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
             let found = std::fs::metadata(folder).and_then(|found| match found.is_dir() {
                 true => Ok(()),
@@ -114,7 +114,7 @@ impl Destination {
     }
 }
 
-/// Names of standard output. Opened by one of the last three, a file behind it would be written from its beginning.
+/// Names of standard output. Opened by one of the last three, a file that it leads to would be written from its beginning.
 const STANDARD_OUTPUT: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 
 /// Whether a command may write this file: to be asked before the unit is. `overwrite`: the user has said `--yes`.
