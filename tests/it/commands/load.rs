@@ -500,7 +500,7 @@ fn a_units_object_dictionary_is_not_read_before_an_upload_unless_the_user_agrees
     screen.wait("--product NAME");
     assert_eq!(screen.wait_end(), Some(2));
     let recording = fs::read_to_string(bench.world.path("it.cast")).expect("a recording");
-    let sent: Vec<&str> = recording.lines().filter(|line| line.contains(r#", "i", "#)).collect();
+    let sent: Vec<&str> = recording.lines().filter(|line| line.contains(r#","i","#)).collect();
     assert!(!sent.is_empty(), "{recording}");
     assert!(!sent.iter().any(|line| line.to_lowercase().contains(r#""v""#)), "{sent:?}");
 }
