@@ -90,10 +90,14 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     }
     let clock = Clock::start();
     let (sender, inputs) = host::channel();
+    if let Some(log) = &args.log {
+        files::has_folder(log).map_err(|error| log_error(log, error))?;
+    }
     let sending = args.send.as_deref().map(|path| Sending::open(path, args.newline_out)).transpose()?;
     let plan = link::recording(global)?;
     let _signals = waiting::hear_signals(sender.clone())?;
     let connection = link::open(&spec, global, clock, sender.clone(), &inputs)?;
+    // Not before: a port that does not open leaves no file.
     let log = args.log.map(open_log).transpose()?;
     let recorder = link::start_recording(&plan, &connection, clock, output)?;
     let interactive = io::stdin().is_terminal();

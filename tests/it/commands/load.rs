@@ -492,6 +492,8 @@ fn a_unit_whose_menu_does_not_name_it_is_asked_for_its_product_code_before_an_up
 fn a_units_object_dictionary_is_not_read_before_an_upload_unless_the_user_agrees() {
     let mut bench = Bench::new();
     bench.power_up_as("axtc4co", &["--dialect", "42"]);
+    // It says its name at power-up, which the first client hears.
+    bench.run(&["identify"]);
     let mut args = vec!["load", "new.S", "--password-file", "pw", "--record", "it.cast", "--port", "u0"];
     args.extend(FAST);
     let mut screen = Screen::start(bench.world.command(&args), 24, 200);
