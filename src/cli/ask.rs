@@ -1,4 +1,4 @@
-//! Questions at the terminal. Whoever waits for the answer hears signals meanwhile, and reads the line.
+//! Questions at the terminal. While the answer is awaited, signals are heard and the line is read.
 
 use std::io::{self, IsTerminal, Write};
 

@@ -23,7 +23,7 @@ struct Object<'a> {
     product: Option<&'a str>,
     version: Option<String>,
     node_id: Option<u8>,
-    /// `false` where all that came behind the Yes is what the menu shows anyway.
+    /// `false` where all that came after the Yes is what the menu shows anyway.
     restart_seen: bool,
 }
 
@@ -49,7 +49,6 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
         outcome => talk.expect_done(&outcome),
     };
     let facts = talk.session().facts().clone();
-    talk.close(output);
     result?;
     let product = facts.product.as_ref().map(|known| known.value.as_str());
     let version = facts.version.as_ref().map(|known| known.value.to_string());

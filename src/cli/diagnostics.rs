@@ -50,7 +50,7 @@ struct ValueObject {
 /// # Errors
 /// If no unit answers, or shows no pages.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
-    let json = output.format(args.format, Format::Json, Format::Text)? == Format::Json;
+    let json = output.format(args.format, None, Format::Json, Format::Text)? == Format::Json;
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
     let calendar = talk.calendar();
@@ -71,7 +71,6 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
             output.data(format!("{}\n\n", lines.join("\n")).as_bytes())
         }
     });
-    talk.close(output);
     match ended? {
         // Without a count, the interrupt is the way to end.
         Ended::Finished { interrupted: true, .. } => match args.count {

@@ -102,7 +102,7 @@ struct DiffObject<'a> {
     differences: Vec<DifferenceObject<'a>>,
 }
 
-/// What stands for the factory's values on the command line.
+/// What names the factory's values on the command line.
 const FACTORY: &str = "factory:";
 /// Largest dump that is read back; one of the largest product has a tenth of it.
 const LARGEST_DUMP: u64 = 4 << 20;
@@ -114,10 +114,8 @@ const LARGEST_DUMP: u64 = 4 << 20;
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     match args.command {
         Deed::Dump { format, out } => {
-            let format = match (format, out.as_deref().and_then(Format::of_file)) {
-                (None, Some(by_name)) => by_name,
-                (format, _) => output.format(format, Format::Json, Format::Table)?,
-            };
+            let promised = out.as_deref().and_then(Format::of_file);
+            let format = output.format(format, promised, Format::Json, Format::Table)?;
             dump(format, Destination::admit(out.as_deref(), global.yes)?, global, output)
         }
         Deed::Diff { left, right, all } => diff(&left, &right, all, output),
@@ -133,7 +131,6 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     let ended = talk.run(Command::ReadDictionary, |_, _| Ok(()))?;
     let facts = talk.session().facts().clone();
     let unix_millis = talk.calendar().at(talk.now()).as_millisecond();
-    talk.close(output);
     let is_interrupted = matches!(ended, Ended::Finished { interrupted: true, .. });
     let reading = match ended {
         Ended::Finished { outcome: outcome @ Outcome::DictionaryRead(_), .. }
@@ -147,7 +144,7 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
             return Err(CliError::message(Kind::Interrupted, "interrupted; the view has been left"));
         }
         Ended::Lost { error, .. } => {
-            return Err(error.hint("the unit may still stand in its view, with scanning halted: X leaves it"));
+            return Err(error.hint("the unit may still be in its view, with scanning halted: X leaves it"));
         }
     };
     let product = facts.product.as_ref().and_then(|known| Product::named(&known.value));
@@ -182,7 +179,7 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     if dump.complete {
         return written;
     }
-    // That it is not all of it counts, whoever still reads.
+    // That it is not everything counts, even if nobody reads the output any more.
     written.or_else(|error| if error.error.is::<Closed>() { Ok(()) } else { Err(error) })?;
     if is_interrupted {
         let message = format!("interrupted; the view has been left; entries read: {}", dump.entries.len());
@@ -191,7 +188,7 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     Err(not_all(&reading, &dump, talk.is_recorded()))
 }
 
-/// Whether the unit shows its field values (6100h), and not one of them has a value: first values take 3 s behind the
+/// Whether the unit shows its field values (6100h), and not one of them has a value: first values take 3 s after the
 /// power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO).
 fn has_no_reading(dump: &Dump) -> bool {
     let mut inputs = dump.entries.iter().filter(|entry| entry.index == FIELD_VALUE && entry.subindex > 0).peekable();

@@ -143,7 +143,7 @@ impl CliError {
     }
 
     /// The end of a command that has told its finding on standard output: success, or what is left of it, the exit code.
-    /// That stands whoever still reads; that it could not be written is told besides.
+    /// The exit code holds even if nobody reads the finding; that it could not be written is said as well.
     ///
     /// # Errors
     /// If something was found that has an exit code, or `written` failed.
@@ -155,7 +155,7 @@ impl CliError {
         }
     }
 
-    /// What every command says that the user has interrupted.
+    /// What every command says when the user has interrupted it.
     pub fn interrupted() -> Self {
         CliError::message(Kind::Interrupted, "interrupted")
     }
@@ -188,6 +188,6 @@ mod tests {
         assert_eq!(ended(None, full()), Some((Kind::Failed, false)));
         assert_eq!(ended(Some(Kind::ImageRefused), Ok(())), Some((Kind::ImageRefused, true)));
         assert_eq!(ended(Some(Kind::ImageRefused), closed()), Some((Kind::ImageRefused, true)));
-        assert_eq!(ended(Some(Kind::ImageRefused), full()), Some((Kind::ImageRefused, false)), "it is told why");
+        assert_eq!(ended(Some(Kind::ImageRefused), full()), Some((Kind::ImageRefused, false)), "with the reason");
     }
 }

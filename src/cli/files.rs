@@ -58,13 +58,8 @@ impl Destination {
             Place::Stream(opened.map_err(|error| save_error(path, SaveError::Io(error)))?)
         } else {
             admit(path, overwrite)?;
-            // Nobody shall work for what has no place in the end.
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            let found = std::fs::metadata(folder).and_then(|found| match found.is_dir() {
-                true => Ok(()),
-                false => Err(ErrorKind::NotADirectory.into()),
-            });
-            found.map_err(|error| save_error(path, SaveError::Io(error)))?;
+            // Before any work is done for what could not be written in the end.
+            has_folder(path).map_err(|error| save_error(path, SaveError::Io(error)))?;
             Place::File(None)
         };
         Ok(Destination { path: path.to_owned(), overwrite, place })
@@ -114,7 +109,7 @@ impl Destination {
     }
 }
 
-/// Names of standard output. Opened by one of the last three, a file behind it would be written from its beginning.
+/// Names of standard output. Opened by one of the last three, a file that it leads to would be written from its beginning.
 const STANDARD_OUTPUT: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 
 /// Whether a command may write this file: to be asked before the unit is. `overwrite`: the user has said `--yes`.
@@ -123,6 +118,18 @@ const STANDARD_OUTPUT: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self
 /// If something is there that should stay.
 pub fn admit(path: &Path, overwrite: bool) -> Result<(), CliError> {
     save::admit(path, overwrite).map_err(|error| save_error(path, error))
+}
+
+/// Whether there is a folder for a file.
+///
+/// # Errors
+/// If there is not.
+pub fn has_folder(path: &Path) -> io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match std::fs::metadata(folder)?.is_dir() {
+        true => Ok(()),
+        false => Err(ErrorKind::NotADirectory.into()),
+    }
 }
 
 /// A path for the screen: a name may hold anything, a terminal must not get it.

@@ -9,8 +9,9 @@ use super::ask::{READS_DICTIONARY, confirm};
 use super::error::{CliError, Kind};
 use super::journal::Desk;
 use super::link;
+use super::outcome::no_answer_hints;
 use super::output::Output;
-use super::talk::{Talk, no_answer_hints};
+use super::talk::Talk;
 use crate::canopen::ObjectAddress;
 use crate::host::journal::Note;
 use crate::session::{Command, Facts, Known, Origin, UnitState};
@@ -34,7 +35,7 @@ pub struct Args {
 
 /// How long somebody may take to switch the power off and on.
 const POWER_CYCLE: Duration = Duration::from_secs(120);
-/// How long the rest of the power-up messages may take behind product and version.
+/// How long the rest of the power-up messages may take after product and version.
 const REST_OF_BANNER: Duration = Duration::from_millis(1500);
 
 #[derive(Serialize)]
@@ -120,7 +121,6 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     } else {
         Ok(())
     };
-    talk.close(output);
     let is_unsaid = facts.product.is_none() || facts.version.is_none();
     if is_unsaid && facts.state == UnitState::Application && !is_deep && !args.wait && !talk.is_recorded() {
         output.remark(

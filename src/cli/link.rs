@@ -36,7 +36,7 @@ pub fn spec(global: &Global) -> Result<LinkSpec, CliError> {
 pub fn named(text: &str, found: impl FnOnce() -> Vec<Port>) -> Result<LinkSpec, CliError> {
     let spec: LinkSpec = text.parse().map_err(spec_error)?;
     match &spec {
-        // What is no file may be an adapter's serial number: it stays the same, whatever the port is called today.
+        // What is not a file may be an adapter's serial number: it stays the same, whatever the port is called today.
         LinkSpec::Serial(path) if !path.exists() => {
             let named = by_serial_number(&found(), text)?;
             Ok(named.or_else(|| by_id(text)).unwrap_or(spec))
@@ -63,7 +63,7 @@ pub fn same_device(names: &[String]) -> Option<(&str, &str)> {
     })
 }
 
-/// What a name that is no link means to the user.
+/// What a name that is not a link means to the user.
 pub fn spec_error(error: LinkSpecError) -> CliError {
     CliError::new(Kind::Usage, anyhow::Error::new(error).context("--port"))
 }
@@ -106,7 +106,7 @@ pub fn journal_key(spec: &LinkSpec) -> Option<String> {
 }
 
 /// The name of an adapter's port that lasts: `usb:A1`. An adapter may have several ports, and some makers give all their
-/// adapters one number; behind each there is another unit, so the place it is plugged in tells them apart.
+/// adapters one number; each leads to another unit, so the place it is plugged in tells them apart.
 fn adapter_key(found: &[Port], path: &Path) -> Option<String> {
     let number = |port: &Port| port.usb.as_ref().and_then(|usb| usb.serial_number.clone());
     let port = found.iter().find(|port| Path::new(&port.path) == path)?;
@@ -140,7 +140,7 @@ pub fn not_recorded_again(global: &Global) -> Result<(), CliError> {
     }
 }
 
-/// Starts recording. Who names a file wants the recording, so there is no session without it; one that nobody asked for
+/// Starts recording. A user who names a file wants the recording, so there is no session without it; one that nobody asked for
 /// is missed with a warning.
 ///
 /// # Errors
@@ -195,7 +195,7 @@ pub fn link_error(error: LinkError) -> CliError {
             hints.push(format!("join the group that has access, then log in again: sudo usermod -aG {group} $USER"));
         }
         Cause::Denied { group: None } => {
-            hints.push("its owner alone has access: 'ls -l' says who that is; ask them, or set a udev rule".to_owned())
+            hints.push("only its owner has access: 'ls -l' names the owner; ask them, or set a udev rule".to_owned())
         }
         Cause::Busy { holder: Some(holder) } => hints.push(format!("close {holder} first")),
         Cause::Busy { holder: None } => {
@@ -279,13 +279,13 @@ pub fn recording_error(error: RecordingError) -> CliError {
     let is_missing = kind == Kind::PortMissing;
     let error = CliError::new(kind, error);
     match recorder::folder() {
-        Some(folder) if is_missing => error.hint(format!("recordings lie in {}", folder.display())),
+        Some(folder) if is_missing => error.hint(format!("recordings are in {}", folder.display())),
         Some(_) | None => error,
     }
 }
 
 /// What is said of a recording that was read to its end, if it did not end as recordings do.
-pub const CUT_SHORT: &str = "axcon: the recording ends in the middle of a line: whoever wrote it was killed";
+pub const CUT_SHORT: &str = "axcon: the recording ends in the middle of a line: the program that wrote it was killed";
 
 /// Whether the command line names a recording.
 pub fn is_recording(global: &Global) -> bool {
@@ -310,7 +310,7 @@ fn by_id(text: &str) -> Option<LinkSpec> {
     (!text.contains('/') && path.exists()).then_some(LinkSpec::Serial(path))
 }
 
-/// The port of the USB adapter with this serial number; `usb:` may stand before it.
+/// The port of the USB adapter with this serial number; `usb:` may precede it.
 fn by_serial_number(found: &[Port], text: &str) -> Result<Option<LinkSpec>, CliError> {
     let wanted = text.strip_prefix("usb:").unwrap_or(text);
     let number = |port: &Port| port.usb.as_ref().and_then(|usb| usb.serial_number.clone());

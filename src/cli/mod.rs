@@ -1,6 +1,7 @@
 //! The command line: what can be asked for, and where each answer is made.
 
 pub mod ask;
+pub mod calendar;
 pub mod console;
 pub mod defaults;
 pub mod diagnostics;
@@ -17,6 +18,7 @@ pub mod load;
 pub mod manual;
 pub mod names;
 pub mod numbers;
+pub mod outcome;
 pub mod output;
 pub mod password;
 pub mod playback;
@@ -202,7 +204,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let parsed = parsed.and_then(|matches| Cli::from_arg_matches(&matches).map(|cli| (cli, matches)));
     let (mut cli, matches) = match parsed {
         Ok(parsed) => parsed,
-        // Who asked for JSON gets the complaint as JSON; help and version are no complaints.
+        // With --json a complaint is JSON too; help and version are not complaints.
         Err(error) if error.use_stderr() && args.iter().any(|arg| arg == "--json") => {
             let text = error.render().to_string();
             let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
@@ -215,7 +217,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
-    // An empty AXCON_PORT is none.
+    // An empty AXCON_PORT counts as unset.
     if std::env::var_os("AXCON_PORT").is_some_and(|port| port.is_empty()) {
         cli.global.ports.retain(|port| !port.is_empty());
     }
@@ -226,7 +228,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     output::conclude(&mut output, result)
 }
 
-/// Makes sure that no named link is forgotten: behind the command a global option takes the place of the same one before
+/// Makes sure that no named link is forgotten: after the command a global option takes the place of the same one before
 /// it, and of several units one would never get its software.
 fn all_ports(global: &Global, args: &[OsString]) -> Result<(), CliError> {
     let options = args.iter().take_while(|arg| *arg != "--").map(|arg| arg.to_string_lossy());
@@ -234,8 +236,8 @@ fn all_ports(global: &Global, args: &[OsString]) -> Result<(), CliError> {
     if named <= global.ports.len() {
         return Ok(());
     }
-    Err(CliError::message(error::Kind::Usage, "--port stands both before the command and behind it")
-        .hint("name all links behind the command"))
+    Err(CliError::message(error::Kind::Usage, "--port is given both before the command and after it")
+        .hint("name all links after the command"))
 }
 
 /// Makes sure that no option for the link to a unit is given to a command that uses none; a default in the environment
@@ -299,7 +301,7 @@ mod tests {
         assert_eq!(grouped, all);
         for help in [command.clone().render_help(), command.clone().render_long_help()] {
             let help = help.to_string();
-            let (listed, options) = help.split_once("Options:\n").expect("options behind the commands");
+            let (listed, options) = help.split_once("Options:\n").expect("options after the commands");
             for (title, names) in GROUPS {
                 assert!(listed.contains(&format!("\n{title}:\n  {}", names[0])), "{title}:\n{listed}");
             }

@@ -5,7 +5,7 @@ use crate::device::{LoaderKind, Product};
 /// A product by its name, in any case.
 ///
 /// # Errors
-/// If there is none of this name; the message says which there are.
+/// If there is no such name; the message lists those there are.
 pub fn product(name: &str) -> Result<&'static Product, String> {
     Product::named(name).ok_or_else(|| {
         let known: Vec<String> = Product::all().iter().map(|product| product.name.to_lowercase()).collect();
@@ -16,7 +16,7 @@ pub fn product(name: &str) -> Result<&'static Product, String> {
 /// A loader by its name, in any case.
 ///
 /// # Errors
-/// If there is none of this name; the message says which there are.
+/// If there is no such name; the message lists those there are.
 pub fn loader(name: &str) -> Result<LoaderKind, String> {
     LoaderKind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
         let known = LoaderKind::ALL.map(LoaderKind::name).join(", ");

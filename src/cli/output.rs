@@ -56,20 +56,27 @@ impl Output {
         Output { json, out: Box::new(io::stdout()), err: Remarks::to(io::stderr()) }
     }
 
-    /// The format of a command's data: the one that was named, else the one that `--json` means, or the usual one.
+    /// The format of a command's data: the one that was named, else the one that the file's ending promises, else the one
+    /// that `--json` means, or the usual one.
     ///
     /// # Errors
     /// If another one was named than `--json` means.
-    pub fn format<F: ValueEnum + PartialEq>(&self, named: Option<F>, json: F, usual: F) -> Result<F, CliError> {
-        match named {
-            Some(named) if self.json && named != json => {
+    pub fn format<F: ValueEnum + PartialEq>(
+        &self,
+        named: Option<F>,
+        promised: Option<F>,
+        json: F,
+        usual: F,
+    ) -> Result<F, CliError> {
+        match (named, promised) {
+            (Some(named), _) if self.json && named != json => {
                 let name = named.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
                 let message = format!("--json and --format {name} contradict each other");
                 Err(CliError::message(Kind::Usage, message).hint("leave out one of them"))
             }
-            Some(named) => Ok(named),
-            None if self.json => Ok(json),
-            None => Ok(usual),
+            (Some(format), _) | (None, Some(format)) => Ok(format),
+            (None, None) if self.json => Ok(json),
+            (None, None) => Ok(usual),
         }
     }
 
@@ -172,7 +179,7 @@ mod tests {
         }
         let chosen = |json, named| {
             let output = Output { json, out: Box::new(io::sink()), err: Remarks::to(io::sink()) };
-            output.format(named, Format::Json, Format::Csv).map_err(|error| error.to_string())
+            output.format(named, None, Format::Json, Format::Csv).map_err(|error| error.to_string())
         };
         assert_eq!([chosen(false, None), chosen(true, None)], [Ok(Format::Csv), Ok(Format::Json)]);
         assert_eq!(chosen(false, Some(Format::Json)), Ok(Format::Json));

@@ -10,7 +10,7 @@ use super::ask::{READS_DICTIONARY, confirm};
 use super::error::{CliError, Kind};
 use super::files::Destination;
 use super::output::{Closed, Output};
-use super::stream::{leave_as_found, watch};
+use super::stream::found::{leave_as_found, watch};
 use super::talk::{Ended, Talk};
 use super::{Global, link};
 use crate::device::Product;
@@ -25,7 +25,7 @@ use crate::wire::stream::Source;
 /// Arguments of `axcon report`.
 ///
 /// Of a unit: values are read for some seconds, then a page of diagnostics and the object dictionary; the stream is left
-/// as it was found. Of a recording: what somebody asked then. If the unit dies meanwhile, the page says what is missing, and
+/// as it was found. Of a recording: what was asked then. If the unit dies meanwhile, the page says what is missing, and
 /// the exit code is 4, or 3 if the port has gone.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -98,7 +98,6 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
     } else {
         died = findings.of_unit(&mut talk, args, output)?;
     }
-    talk.close(output);
     let facts = talk.session().facts().clone();
     let product = facts.product.as_ref().and_then(|known| Product::named(&known.value));
     let dump = findings.reading.as_ref().map(|reading| Dump::of(reading, product, &facts));
@@ -118,7 +117,7 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
     };
     let saved = out.save(contents.html().as_bytes(), output);
     if let Some(died) = died {
-        // What became of the unit counts, whoever still reads.
+        // What became of the unit counts, even if nobody reads the output any more.
         saved.or_else(|error| if error.error.is::<Closed>() { Ok(()) } else { Err(error) })?;
         let place = if out.is_standard_output() { "standard output".to_owned() } else { out.shown() };
         return Err(died.hint(format!("what was found out before is in the report all the same: {place}")));
@@ -183,12 +182,14 @@ impl Findings {
 
     /// Watches the stream for some seconds; one that is off is switched on for as long.
     fn watch_values(&mut self, talk: &mut Talk, seconds: u64, output: &mut Output) -> Result<(), CliError> {
-        let found = watch(talk)?;
-        if found.is_some() {
+        let mut before = watch(talk)?;
+        if before.seen().is_some() {
             return self.listen(talk, seconds);
         }
         let begun = self.ask(talk, Command::StreamOn { source: Source::FieldValue, period: PERIOD }, "the stream");
-        let was_on = matches!(begun, Ok(Outcome::StreamRuns { was_on: true }));
+        if matches!(begun, Ok(Outcome::StreamRuns { was_on: true })) {
+            before.was_on();
+        }
         let watched = match begun {
             Ok(Outcome::StreamRuns { .. }) => self.listen(talk, seconds),
             // Nothing has been switched on, and nobody knows what the unit would make of another T.
@@ -197,7 +198,7 @@ impl Findings {
             Err(error) => Err(error),
         };
         // However it ended.
-        watched.and(leave_as_found(talk, was_on, found, output))
+        watched.and(leave_as_found(talk, before, output))
     }
 
     fn listen(&mut self, talk: &mut Talk, seconds: u64) -> Result<(), CliError> {

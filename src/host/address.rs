@@ -73,13 +73,13 @@ impl FromStr for Address {
     fn from_str(text: &str) -> Result<Self, AddressError> {
         let (host, port) = if let Some(rest) = text.strip_prefix('[') {
             let bad = || AddressError::BadBrackets { text: text.to_owned() };
-            let (host, behind) = rest.split_once(']').ok_or_else(bad)?;
+            let (host, after) = rest.split_once(']').ok_or_else(bad)?;
             // Behind a percent sign: the interface of a link-local address.
             let address = host.split_once('%').map_or(host, |(address, _)| address);
             address.parse::<Ipv6Addr>().map_err(|_| bad())?;
-            match behind.strip_prefix(':') {
+            match after.strip_prefix(':') {
                 Some(port) => (host, port),
-                None if behind.is_empty() => (host, ""),
+                None if after.is_empty() => (host, ""),
                 None => return Err(bad()),
             }
         } else {
@@ -94,7 +94,7 @@ impl FromStr for Address {
             if host.is_empty() {
                 return Err(AddressError::NoHost);
             }
-            // Names of other scripts are the resolver's business; these signs stand in no name.
+            // Names of other scripts are the resolver's business; no name has these characters.
             if host.chars().any(|c| c.is_whitespace() || c.is_control() || "/\\@?#[]%,;'\"<>".contains(c)) {
                 return Err(AddressError::BadHost { host: host.to_owned() });
             }

@@ -1,4 +1,4 @@
-//! The only clock. It is asked once for each input and each wake-up; everything else is told.
+//! The only clock. It is asked once for each input and each wake-up; everything else is told the time.
 
 use std::time::SystemTime;
 
@@ -50,7 +50,7 @@ pub fn time_of_day(unix_millis: i64) -> Duration {
     Duration::from_secs(seconds.unsigned_abs()) + Duration::from_millis(local.millisecond().unsigned_abs().into())
 }
 
-/// The time of day so long before another one.
+/// The time of day this long before another one.
 pub fn day_before(time_of_day: Duration, earlier: Duration) -> Duration {
     const DAY: u128 = 24 * 3600 * 1_000_000_000;
     let nanos = (time_of_day.as_nanos() % DAY + DAY - earlier.as_nanos() % DAY) % DAY;

@@ -3,11 +3,89 @@
 use std::path::PathBuf;
 use std::sync::mpsc::SyncSender;
 
-use super::Input;
 use super::clock::Clock;
 use super::link::{Connection, LinkSpec, Options};
 use super::ports::{self, Port};
-use crate::time::Duration;
+use super::{Inbox, Input};
+use crate::endpoint::Arrived;
+use crate::time::{Duration, Instant};
+
+/// A link that may be lost and come back.
+#[derive(Debug)]
+pub struct Cable {
+    /// `None` while the link is lost.
+    connection: Option<Connection>,
+    /// `None` where a lost link does not come back.
+    comeback: Option<Comeback>,
+    /// When a lost link is tried again.
+    retry_at: Option<Instant>,
+    port: String,
+}
+
+impl Cable {
+    /// An open link, and what has to come back when it is lost.
+    pub fn new(connection: Connection, comeback: Option<Comeback>) -> Self {
+        let port = connection.port().to_owned();
+        Cable { connection: Some(connection), comeback, retry_at: None, port }
+    }
+
+    /// The connection, while there is one.
+    pub fn connection(&self) -> Option<&Connection> {
+        self.connection.as_ref()
+    }
+
+    /// The port as it is called, or was when the link was lost.
+    pub fn port(&self) -> &str {
+        &self.port
+    }
+
+    /// Whether a lost link is looked for.
+    pub fn may_come_back(&self) -> bool {
+        self.comeback.is_some()
+    }
+
+    /// When a lost link is tried again.
+    pub fn retry_at(&self) -> Option<Instant> {
+        self.retry_at
+    }
+
+    /// What the link has brought and nobody has taken: where the writer has noticed the loss first, the reader had more to
+    /// hand out.
+    pub fn rest(&self, inbox: &mut Inbox) -> Vec<Arrived> {
+        self.connection.as_ref().map_or_else(Vec::new, |connection| inbox.rest(connection.id()))
+    }
+
+    /// The link is lost: closes it, and gives the last bytes that it has brought.
+    pub fn lose(&mut self, inbox: &mut Inbox, now: Instant) -> Vec<Arrived> {
+        if let Some(comeback) = &mut self.comeback {
+            comeback.lost();
+            self.retry_at = Some(now + Comeback::RETRY);
+        }
+        let rest = self.rest(inbox);
+        if let Some(connection) = self.connection.take() {
+            let id = connection.id();
+            // An adapter whose old name is still open gets another one when it comes back.
+            drop(connection);
+            inbox.forget(id);
+        }
+        rest
+    }
+
+    /// Opens a lost link again if it is time to try, and it is back.
+    pub fn try_again(&mut self, now: Instant, clock: Clock, inputs: &SyncSender<Input>) -> Option<&Connection> {
+        if self.retry_at.is_none_or(|at| at > now) {
+            return None;
+        }
+        let connection = self.comeback.as_ref()?.open(clock, inputs.clone());
+        let Some(connection) = connection else {
+            self.retry_at = Some(now + Comeback::RETRY);
+            return None;
+        };
+        self.retry_at = None;
+        self.port = connection.port().to_owned();
+        Some(self.connection.insert(connection))
+    }
+}
 
 /// What has to come back.
 #[derive(Clone, Debug)]

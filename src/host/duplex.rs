@@ -146,7 +146,7 @@ impl Worker {
         self.outlet.report(operation, cause, |time| self.is_closing(time));
     }
 
-    /// Waits for so long, and says whether the connection is being closed.
+    /// Waits for this long, and says whether the connection is being closed.
     fn is_closing(&self, time: Duration) -> bool {
         thread::sleep(time);
         self.stop.load(Ordering::Relaxed)

@@ -20,7 +20,7 @@ const TAIL: u64 = 64 << 10;
 pub struct Library {
     /// Newest first.
     pub listed: Vec<Listed>,
-    /// How many older ones nobody has looked into.
+    /// How many older ones were not looked into.
     pub older: usize,
 }
 
@@ -38,11 +38,11 @@ pub struct Listed {
 /// What a recording holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Content {
-    /// What stands at its head.
+    /// What its head says.
     pub header: Header,
     /// How long it is, where its last line can be read.
     pub length: Option<Duration>,
-    /// A program writes it just now, this one or another.
+    /// A program, this one or another, is writing it.
     pub is_being_written: bool,
 }
 
@@ -67,13 +67,13 @@ pub fn list(folder: &Path) -> io::Result<Library> {
     Ok(Library { listed: files.into_iter().filter_map(look).collect(), older })
 }
 
-/// One recording, wherever it lies; `None` if there is no such file.
+/// One recording, wherever it is; `None` if there is no such file.
 pub fn look(path: PathBuf) -> Option<Listed> {
     let (bytes, content) = match fs::metadata(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
         Err(error) => (0, Err(error.to_string())),
         // To open anything else, a pipe without a writer for example, may wait for ever.
-        Ok(metadata) if !metadata.is_file() => (0, Err("it is no plain file".to_owned())),
+        Ok(metadata) if !metadata.is_file() => (0, Err("it is not a plain file".to_owned())),
         Ok(metadata) => (metadata.len(), content(&path)),
     };
     Some(Listed { path, bytes, content })
@@ -85,7 +85,7 @@ fn content(path: &Path) -> Result<Content, String> {
     Ok(Content { header, length, is_being_written: recording_file::is_being_written(path) })
 }
 
-/// Why a recording cannot be read, for where its name stands already.
+/// Why a recording cannot be read, for where its name is shown already.
 fn reason(error: RecordingError) -> String {
     match error {
         RecordingError::File { error, .. } if error.kind() == io::ErrorKind::PermissionDenied => {
@@ -141,7 +141,7 @@ mod tests {
         );
         let why = seen[0].as_ref().expect_err("no recording");
         assert!(why.starts_with("line 1: "), "{why}");
-        assert_eq!(seen[3], Err(&"it is no plain file".to_owned()));
+        assert_eq!(seen[3], Err(&"it is not a plain file".to_owned()));
         assert_eq!((found.listed.len(), found.older), (4, 0));
         assert_eq!(list(&folder.path().join("nowhere")).expect("empty"), Library::default());
     }

@@ -1,4 +1,4 @@
-//! The threads behind an open connection, whatever it goes through.
+//! The threads of an open connection, whatever it goes through.
 
 use std::io;
 

@@ -57,7 +57,7 @@ pub enum LinkSpecError {
         /// What there is, as links.
         known: Vec<String>,
     },
-    /// Something before `://` that is no kind of link.
+    /// Something before `://` that is not a kind of link.
     #[error(
         "there are no links of the kind '{kind}'; there are {TCP}HOST:PORT, {RFC2217}HOST:PORT, {EMULATED}PRODUCT and {REPLAY}FILE"
     )]
@@ -436,7 +436,7 @@ impl Connection {
         };
         match Verb::read(line, product) {
             Err(error) => answered(Err(error.to_string())),
-            // An order that is not taken is never answered: what waits is a person, who sees that.
+            // An order that is not taken is never answered: a person waits for it, and sees that.
             Ok(verb) => {
                 unit.order(verb, answered);
             }

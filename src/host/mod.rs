@@ -57,7 +57,7 @@ pub enum Input {
         /// What, at least one byte.
         bytes: Vec<u8>,
     },
-    /// The port is gone. Told once for each connection; what was read before may still come behind it.
+    /// The port is gone. Comes once for each connection; what was read before may still follow it.
     Gone {
         /// Which connection has ended.
         link: LinkId,
@@ -89,7 +89,7 @@ impl LinkId {
     }
 }
 
-/// Inputs that wait at most: with the reader's 4 KiB each, a quarter of a megabyte, behind which the reader stops
+/// Inputs that wait at most: with the reader's 4 KiB each, a quarter of a megabyte, after which the reader stops
 /// reading and the system's own flow control takes over.
 pub const INPUTS: usize = 64;
 
@@ -174,7 +174,7 @@ impl Inbox {
         Ok(if is_bytes { None } else { self.waiting.pop_front() })
     }
 
-    /// All bytes that have come over one connection, also those from behind its loss: for whoever is about to close it.
+    /// All bytes that have come over one connection, also those after its loss: for an owner that is about to close it.
     /// What another one has brought stays.
     pub fn rest(&mut self, link: LinkId) -> Vec<Arrived> {
         // The channel may be full, whatever waits here already.

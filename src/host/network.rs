@@ -69,7 +69,7 @@ fn missing(awaited: Awaited) -> &'static str {
 pub const LOOK_UP_PATIENCE: Duration = Duration::from_secs(8);
 
 /// How long the other side may take to accept a connection, all its addresses together: three lost packets on a slow
-/// network, and as long as a person believes that something happens.
+/// network, and as long as a person assumes that something happens.
 pub const CONNECT_PATIENCE: Duration = Duration::from_secs(4);
 
 /// How long a server may take to set up its port: some messages there and back, and a serial port that is opened.
@@ -96,7 +96,7 @@ pub fn connect(address: &Address, clock: Clock) -> Result<TcpStream, NetworkErro
     let deadline = clock.now() + CONNECT_PATIENCE;
     let mut failure = unknown(io::Error::new(ErrorKind::NotFound, "it has no address"));
     for (left, address) in (1..=found.len() as u32).rev().zip(found) {
-        // An address that does not answer must not take the time of those behind it. Nothing is no timeout.
+        // An address that does not answer must not take the time of those after it. Zero would be no timeout.
         let share = (clock.until(deadline) / left).max(Duration::from_millis(1));
         failure = match TcpStream::connect_timeout(address, share) {
             Ok(socket) => {

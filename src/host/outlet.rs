@@ -14,7 +14,7 @@ use crate::time::{Duration, Instant};
 /// the channel itself could not be called off.
 const RETRY: Duration = Duration::from_millis(2);
 
-/// The threads' way to whoever owns the connection.
+/// The threads' way to the owner of the connection.
 #[derive(Debug)]
 pub(super) struct Outlet {
     /// The port as the user named it.
@@ -30,7 +30,7 @@ impl Outlet {
         Outlet { port, link, inputs, gone: AtomicBool::new(false) }
     }
 
-    /// Hands over what has been read; `false` if nobody wants it any more. `wait` waits for so long, and says whether
+    /// Hands over what has been read; `false` if nobody wants it any more. `wait` waits for this long, and says whether
     /// the connection is being closed.
     pub(super) fn deliver(&self, at: Instant, bytes: Vec<u8>, wait: impl Fn(Duration) -> bool) -> bool {
         self.put(Input::Bytes { link: self.link, at, bytes }, wait)

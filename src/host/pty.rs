@@ -39,7 +39,7 @@ impl Pty {
         ));
         let keeper = open_keeper(&master, &path)?;
         rustix::fs::fcntl_setfl(&master, rustix::fs::fcntl_getfl(&master)? | rustix::fs::OFlags::NONBLOCK)?;
-        // Watching begins behind the keeper's own opening.
+        // Watching begins after the keeper's own opening.
         let watch = watch::Watch::start(&path)?;
         let mut settings = tcgetattr(&keeper)?;
         settings.input_modes -= InputModes::IXON;

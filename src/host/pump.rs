@@ -2,30 +2,28 @@
 //! after each step.
 
 use std::ops::ControlFlow;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender};
 
 use super::clock::Clock;
+use super::comeback::Cable;
 use super::link::{Connection, LinkError, SendError};
 use super::recorder::Recorder;
 use super::replay::RecordingError;
 use super::{Closed, Inbox, Input};
-use crate::endpoint::Endpoint;
+use crate::endpoint::{Arrived, Endpoint};
 use crate::record::Record;
 use crate::time::{Duration, Instant};
 
 /// A connection with the loop that serves it.
 #[derive(Debug)]
 pub struct Pump {
-    /// `None` while a lost link is away.
-    connection: Option<Connection>,
-    /// The port as the user named it.
-    port: String,
+    cable: Cable,
     inbox: Inbox,
     clock: Clock,
     recorder: Recorder,
 }
 
-/// Why a loop ended before the command was content. The endpoint is as it was, and the pump can run it again: to
+/// Why a loop ended before the command had what it wanted. The endpoint is as it was, and the pump can run it again: to
 /// cancel what it does, for example.
 #[derive(Debug, thiserror::Error)]
 pub enum PumpError {
@@ -49,7 +47,7 @@ pub enum PumpError {
     /// The recording that was played has ended.
     #[error("the recording has ended")]
     Over,
-    /// The recording that was played is none from some place on.
+    /// The recording that was played is not one from some place on.
     #[error(transparent)]
     Recording(RecordingError),
 }
@@ -58,10 +56,9 @@ pub enum PumpError {
 const LONGEST_WAIT: Duration = Duration::from_secs(3600);
 
 impl Pump {
-    /// A pump for an open connection, whose inputs (and signals) come on this channel.
-    pub fn new(connection: Connection, inputs: Receiver<Input>, clock: Clock, recorder: Recorder) -> Self {
-        let port = connection.port().to_owned();
-        Pump { connection: Some(connection), port, inbox: Inbox::new(inputs), clock, recorder }
+    /// A pump for an open link, whose inputs (and signals) come on this channel.
+    pub fn new(cable: Cable, inputs: Receiver<Input>, clock: Clock, recorder: Recorder) -> Self {
+        Pump { cable, inbox: Inbox::new(inputs), clock, recorder }
     }
 
     /// Runs until `look` breaks with what the command wanted, or `deadline`. `look` sees the endpoint after each step, and
@@ -78,11 +75,7 @@ impl Pump {
     ) -> Result<T, PumpError> {
         loop {
             let arrived = self.inbox.arrived();
-            let now = self.clock.now();
-            if !arrived.is_empty() {
-                endpoint.handle_backlog(now, &arrived);
-                self.recorder.follow(record(endpoint));
-            }
+            let now = self.hand_over(&arrived, endpoint, &record);
             endpoint.handle_timeout(now);
             self.drain(endpoint, &record)?;
             if let ControlFlow::Break(result) = look(endpoint, self.recorder.take_warning()) {
@@ -96,13 +89,9 @@ impl Pump {
             }
             let wake = endpoint.poll_timeout().unwrap_or(Instant::NEVER).min(deadline);
             match self.inbox.next(self.clock.until(wake).min(LONGEST_WAIT)) {
-                Ok(Some(Input::Gone { link, error })) => {
-                    // Where the writer has noticed it first, the reader had more to tell.
-                    let rest = self.inbox.rest(link);
-                    if !rest.is_empty() {
-                        endpoint.handle_backlog(self.clock.now(), &rest);
-                        self.recorder.follow(record(endpoint));
-                    }
+                Ok(Some(Input::Gone { error, .. })) => {
+                    let rest = self.cable.rest(&mut self.inbox);
+                    self.hand_over(&rest, endpoint, &record);
                     return Err(PumpError::Link(error));
                 }
                 Ok(Some(Input::Signal(_))) => return Err(PumpError::Interrupted),
@@ -113,20 +102,23 @@ impl Pump {
         }
     }
 
-    /// Closes a lost link. What it has put on the channel and nobody has taken is forgotten.
-    pub fn disconnect(&mut self) {
-        if let Some(link) = self.connection.take() {
-            self.inbox.forget(link.id());
-        }
+    /// Whether a lost link is looked for.
+    pub fn may_come_back(&self) -> bool {
+        self.cable.may_come_back()
     }
 
-    /// Goes on over another connection, which puts its inputs on the same channel.
-    pub fn replace(&mut self, connection: Connection) {
-        self.port = connection.port().to_owned();
-        self.connection = Some(connection);
+    /// Closes a lost link; `endpoint` gets the last of what it has brought.
+    pub fn lose<E: Endpoint>(&mut self, endpoint: &mut E, record: impl Fn(&E) -> &Record) {
+        let rest = self.cable.lose(&mut self.inbox, self.clock.now());
+        self.hand_over(&rest, endpoint, &record);
     }
 
-    /// Waits so long, whatever else comes; a signal ends it.
+    /// Opens a lost link again if it is time to try, and it is back. Gives its name, which may be another one.
+    pub fn try_again(&mut self, inputs: &SyncSender<Input>) -> Option<&str> {
+        self.cable.try_again(self.clock.now(), self.clock, inputs).map(Connection::port)
+    }
+
+    /// Waits for this long, whatever else comes; a signal ends it.
     ///
     /// # Errors
     /// If a signal comes.
@@ -154,27 +146,46 @@ impl Pump {
     fn drain<E: Endpoint>(&mut self, endpoint: &mut E, record: &impl Fn(&E) -> &Record) -> Result<(), PumpError> {
         while let Some(transmit) = endpoint.poll_transmit() {
             self.recorder.follow(record(endpoint));
-            let sent = self.connection.as_ref().map_or(Err(SendError::Gone), |link| link.send(transmit.bytes));
-            sent.map_err(|error| self.send_error(error))?;
+            let sent = self.cable.connection().map_or(Err(SendError::Gone), |link| link.send(transmit.bytes));
+            if let Err(error) = sent {
+                let rest = self.cable.rest(&mut self.inbox);
+                self.hand_over(&rest, endpoint, record);
+                return Err(self.send_error(error));
+            }
         }
         Ok(())
     }
 
+    /// Hands over what has arrived, before the clock goes on. Gives the moment it is.
+    fn hand_over<E: Endpoint>(
+        &mut self,
+        arrived: &[Arrived],
+        endpoint: &mut E,
+        record: &impl Fn(&E) -> &Record,
+    ) -> Instant {
+        let now = self.clock.now();
+        if !arrived.is_empty() {
+            endpoint.handle_backlog(now, arrived);
+            self.recorder.follow(record(endpoint));
+        }
+        now
+    }
+
     fn send_error(&self, error: SendError) -> PumpError {
-        PumpError::Send { port: self.port.clone(), error }
+        PumpError::Send { port: self.cable.port().to_owned(), error }
     }
 }
 
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
-    use crate::endpoint::{Arrived, Secrecy, Transmit};
+    use crate::endpoint::{Secrecy, Transmit};
     use crate::host::LinkId;
     use crate::host::link::{LinkSpec, Options};
     use crate::host::pty::Pty;
     use crate::record::Direction;
 
-    /// Notes in which order it is told what.
+    /// Notes what it hears, in order.
     #[derive(Default)]
     struct Notes {
         record: Record,
@@ -213,7 +224,7 @@ mod tests {
         let spec = LinkSpec::Serial(pty.path().to_owned());
         let connection =
             Connection::open(&spec, Options { baud: 115_200 }, clock, sender.clone()).expect("the link opens");
-        (pty, Pump::new(connection, inputs, clock, recorder), sender)
+        (pty, Pump::new(Cable::new(connection, None), inputs, clock, recorder), sender)
     }
 
     #[test]
@@ -228,6 +239,25 @@ mod tests {
         let ended = pump.run(&mut notes, Instant::ZERO, |notes| &notes.record, |_, _| ControlFlow::<()>::Continue(()));
         assert!(matches!(ended, Err(PumpError::Deadline)), "{ended:?}");
         assert_eq!(notes.told, ["XOFF of 1ns", "XON of 2ns", "it is late"]);
+    }
+
+    #[test]
+    fn what_the_reader_has_brought_after_the_writer_noticed_the_loss_is_handed_over() {
+        let (_pty, mut pump, sender) = pump(Recorder::nothing());
+        let link = pump.cable.connection().expect("open").id();
+        let error = LinkError {
+            port: "u0".into(),
+            operation: crate::host::link::Operation::Write,
+            cause: crate::host::link::Cause::Gone,
+        };
+        let last = Input::Bytes { link, at: Instant::ZERO, bytes: b"last words".to_vec() };
+        for input in [Input::Gone { link, error }, last] {
+            sender.send(input).expect("there is room");
+        }
+        let mut notes = Notes::default();
+        let ended = pump.run(&mut notes, Instant::NEVER, |notes| &notes.record, |_, _| ControlFlow::<()>::Continue(()));
+        assert!(matches!(ended, Err(PumpError::Link(_))), "{ended:?}");
+        assert_eq!(notes.told.last().map(String::as_str), Some("last words of 0ns"));
     }
 
     #[test]

@@ -16,7 +16,7 @@ use crate::time::{Duration, Instant};
 /// Where a session is recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Plan {
-    /// In the state directory, oldest recordings making room.
+    /// In the state directory, the oldest recordings making room.
     Unasked,
     /// In this file, without a limit; an existing one is overwritten.
     File(PathBuf),
@@ -26,7 +26,7 @@ pub enum Plan {
 
 impl Plan {
     /// Where a later session of the same program is recorded, the first being number 1: beside the file of the first
-    /// one, whose recording stays, under a name that nobody has.
+    /// one, whose recording stays, under a new name.
     pub fn of_session(&self, number: u32) -> Plan {
         match self {
             Plan::File(first) if number > 1 => {
@@ -98,7 +98,7 @@ impl Recorder {
         Recorder::start_ahead(plan, connection, clock, Duration::ZERO)
     }
 
-    /// The same for a program whose time is so far ahead of the clock: what it records is dated by its own time.
+    /// The same for a program whose time is this far ahead of the clock: what it records is dated by its own time.
     pub fn start_ahead(plan: &Plan, connection: &Connection, clock: Clock, ahead: Duration) -> Self {
         let now = clock.now();
         let header = Header {
@@ -175,14 +175,14 @@ impl Recorder {
         self.open.as_ref().map(|open| open.path.as_path())
     }
 
-    /// What went wrong, to be told once.
+    /// What went wrong, once.
     pub fn take_warning(&mut self) -> Option<String> {
         self.warning.take()
     }
 }
 
 impl Drop for Open {
-    /// The numbers of the session stand at its end; those of a killed one can be counted from its bytes.
+    /// The numbers of the session are at its end; those of a killed one can be counted from its bytes.
     fn drop(&mut self) {
         let _ = self.cast.mark(self.last, &format!("end: {}", self.tally.summary(self.last)));
     }
@@ -206,7 +206,7 @@ impl Open {
 impl Series {
     fn open(&self, now: Instant) -> io::Result<(Cast<File>, PathBuf)> {
         make_room(&self.folder, self.limits)?;
-        // The parts of a session stand in their order behind its first one, whose name ends here.
+        // The parts of a session sort in order after its first one, whose name ends here.
         let name = match self.part {
             1 => format!("{}{ENDING}", self.stem),
             part => format!("{}.p{part:05}{ENDING}", self.stem),
@@ -245,7 +245,7 @@ fn part(path: &Path, header: &Header, begun: Instant, existing: Existing) -> io:
 }
 
 /// Deletes the oldest recordings until a full part more fits. Their names begin with the time, so their order is their
-/// age. One that is being written is left alone.
+/// age. A recording that is being written is left alone.
 fn make_room(folder: &Path, limits: Limits) -> io::Result<()> {
     let mut recordings: Vec<(PathBuf, u64)> = fs::read_dir(folder)?
         .flatten()

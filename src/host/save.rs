@@ -32,7 +32,7 @@ pub fn admit(path: &Path, overwrite: bool) -> Result<(), SaveError> {
     }
 }
 
-/// Whether bytes go there one behind the other, and no file may take its place.
+/// Whether bytes go there one after the other, and no file may take its place.
 #[cfg(unix)]
 pub fn is_stream(path: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt;
@@ -41,16 +41,16 @@ pub fn is_stream(path: &Path) -> bool {
     kind.is_ok_and(|kind| kind.is_fifo() || kind.is_char_device())
 }
 
-/// The same where devices are no files.
+/// The same where devices are not files.
 #[cfg(not(unix))]
 pub fn is_stream(_path: &Path) -> bool {
     false
 }
 
-/// Writes a file. What is there already is replaced only if that is wanted; behind a symbolic link, what it leads to.
+/// Writes a file. An existing one is replaced only if that is wanted; of a symbolic link, what it leads to.
 ///
 /// # Errors
-/// If a file is there and should stay, if the place is no file, or the system refuses. Then nothing has changed.
+/// If a file is there and should stay, if the place is not a file, or the system refuses. Then nothing has changed.
 pub fn save(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), SaveError> {
     admit(path, overwrite)?;
     let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());

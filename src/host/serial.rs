@@ -202,7 +202,7 @@ impl Worker {
     }
 }
 
-/// Who has a port that cannot be had: another process, or else this one itself, which has just opened it too.
+/// The holder of a port that is taken: another process, or else this one, which has just opened it too.
 fn who_has(path: &Path) -> Option<ports::Holder> {
     ports::other_holder(path).or_else(|| ports::holder(path))
 }
@@ -292,8 +292,8 @@ fn cause(error: Errno) -> Cause {
     }
 }
 
-/// The group whose members may read and write: whoever joins one that may not has gained nothing, and nobody should join
-/// that of root.
+/// The group whose members may read and write: joining one that may not gains nothing, and nobody should join that of
+/// root.
 fn group_with_access(metadata: &fs::Metadata) -> Option<String> {
     let may = may_be_joined(metadata.mode(), metadata.gid());
     may.then(|| group_name(metadata.gid())).flatten()

@@ -92,7 +92,7 @@ impl Delivery {
         Delivery { inputs, unsent: Some(Input::Signal(caught)), taken }
     }
 
-    /// Hands it over as soon as there is room. Says whether the loop has taken it, or is no more.
+    /// Hands it over as soon as there is room. Says whether the loop has taken it, or is gone.
     fn is_over(&mut self) -> bool {
         if let Some(input) = self.unsent.take()
             && let Err(TrySendError::Full(back)) = self.inputs.try_send(input)

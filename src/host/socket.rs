@@ -42,7 +42,7 @@ pub struct Lines {
 /// Bytes read at once.
 const READ: usize = 4096;
 
-/// A connection that has come about, with its port set up where there is one to set up; nobody reads from it yet.
+/// An established connection, with its port set up where there is one to set up; nobody reads from it yet.
 #[derive(Debug)]
 pub struct Dialled {
     name: String,
@@ -256,7 +256,7 @@ impl Shared {
         }
     }
 
-    /// Waits for so long, and says whether the connection is being closed.
+    /// Waits for this long, and says whether the connection is being closed.
     fn is_closing(&self, time: Duration) -> bool {
         thread::sleep(time);
         self.closing.load(Ordering::Relaxed)

@@ -81,7 +81,7 @@ pub enum StateError {
     OtherProduct {
         /// The directory.
         folder: PathBuf,
-        /// Which. It is in the message, so it is no cause that would be said behind it again.
+        /// Which. It is in the message, so it is not a cause, which would be said again after it.
         found: ParametersError,
     },
     /// The system refused.
@@ -171,8 +171,8 @@ impl State {
     }
 }
 
-/// Removes what processes left that were killed while they replaced a file. Whoever writes here holds the lock, so nobody
-/// is at work on them; that one cannot be removed is no reason to have no unit.
+/// Removes what processes left that were killed while they replaced a file. A process that writes here holds the lock, so none is
+/// at work on them; a unit is hosted even if one cannot be removed.
 fn remove_parts(folder: &Path) {
     let Ok(found) = fs::read_dir(folder) else { return };
     for path in found.flatten().map(|entry| entry.path()) {
@@ -194,7 +194,7 @@ fn lock(folder: &Path) -> Result<File, StateError> {
 
 /// What lies in a file.
 enum Found {
-    /// This, and nothing behind it.
+    /// This, and nothing after it.
     Whole(Vec<u8>),
     /// More than there may be.
     Longer,
@@ -216,7 +216,7 @@ fn read(file: &Path, most: usize) -> Result<Option<Found>, StateError> {
     Ok(Some(if bytes.len() > most { Found::Longer } else { Found::Whole(bytes) }))
 }
 
-/// What lies in the file; `initial` from now on if there is none, or something is wrong with it.
+/// What is in the file; `initial` from now on if there is none, or something is wrong with it.
 fn settle(
     file: &Path,
     found: Result<Option<Vec<u8>>, String>,

@@ -59,7 +59,7 @@ impl Screen {
     /// Takes the terminal: raw mode, alternate screen, pastes in one piece.
     ///
     /// # Errors
-    /// If standard output is no terminal, or it refuses.
+    /// If standard output is not a terminal, or it refuses.
     pub fn enter() -> io::Result<Self> {
         if !stdout().is_terminal() {
             return Err(io::Error::new(io::ErrorKind::Unsupported, "standard output is not a terminal"));
@@ -70,7 +70,7 @@ impl Screen {
         Ok(Screen { terminal, has_mouse: false })
     }
 
-    /// Says whether clicks and the wheel shall come to us, or be the terminal program's own: to select text.
+    /// Says whether clicks and the wheel come to us, or stay the terminal program's own: to select text.
     ///
     /// # Errors
     /// If the terminal refuses.
@@ -96,7 +96,7 @@ impl Screen {
         self.retake()
     }
 
-    /// Takes the terminal again, whatever a shell has made of it meanwhile. Everything is drawn anew with the next frame.
+    /// Takes the terminal again, whatever a shell has made of it meanwhile. The next frame draws everything again.
     ///
     /// # Errors
     /// If the terminal refuses.
@@ -120,7 +120,7 @@ impl RawMode {
     /// Switches the terminal to raw mode.
     ///
     /// # Errors
-    /// If standard input is no terminal, or it refuses.
+    /// If standard input is not a terminal, or it refuses.
     pub fn enter() -> io::Result<Self> {
         restore_on_panic();
         enable_raw_mode()?;
@@ -164,8 +164,8 @@ impl Drop for RawMode {
 }
 
 /// Delivers what the user does at the terminal on a channel of its own, from a thread that lives as long as the process:
-/// nothing ends a read of the terminal. Whoever waits for `inputs` is woken. Keys do not queue behind what a port floods
-/// that channel with. Started once, behind [`Screen::enter`].
+/// nothing ends a read of the terminal. A wait for `inputs` is woken. Keys do not queue behind what a port floods that
+/// channel with. Started once, after [`Screen::enter`].
 ///
 /// # Errors
 /// If the system gives no thread.

@@ -118,9 +118,9 @@ fn a_host_that_nobody_knows_is_missing() {
 fn an_address_that_is_none_is_a_usage_error_that_says_what_is_wrong() {
     let world = World::new();
     for (link, complaint) in [
-        ("tcp://bench", "'bench' has no port number behind it: such a link is tcp://HOST:PORT"),
+        ("tcp://bench", "'bench' has no port number after it: such a link is tcp://HOST:PORT"),
         ("rfc2217://bench:ttyS0", "'ttyS0' is not a port number (1 to 65535): such a link is rfc2217://HOST:PORT"),
-        ("tcp://::1:2000", "has to stand in brackets"),
+        ("tcp://::1:2000", "has to be in brackets"),
         ("tcp://", "no host is named"),
     ] {
         let ran = world.run(&["identify", "--port", link], b"");

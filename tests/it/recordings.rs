@@ -166,7 +166,7 @@ fn what_is_no_recording_is_said_with_its_place() {
     }
     let ran = world.run(&["stream", "--port", "replay:missing"], b"");
     assert_eq!(ran.code, Some(3), "{}", ran.err);
-    assert!(ran.err.contains("recordings lie in"), "{}", ran.err);
+    assert!(ran.err.contains("recordings are in"), "{}", ran.err);
     // A killed writer's last line is no fault, and is told.
     fs::write(world.path("cut"), format!("{head}[0.1,\"o\",\"hello\\r\\n\"]\n[0.2,\"o\",\"wor")).expect("written");
     let ran = world.run(&["terminal", "--port", "replay:cut"], b"");

@@ -283,7 +283,7 @@ fn serve(
     }
 }
 
-/// An answer like any other: whoever waits for an object behind each verb gets one.
+/// An answer like any other: a script that waits for an object after each verb gets one.
 fn tell_help(verb: &str, text: &str, output: &mut Output) -> Result<(), CliError> {
     let text = text.trim_end();
     if output.json {
@@ -349,7 +349,7 @@ fn listen_for_lines(news: SyncSender<News>) -> Result<(), CliError> {
     let lines = move || {
         let mut input = std::io::stdin().lock();
         let mut line = Vec::new();
-        // What is no UTF-8, or goes on for ever, is a verb that nobody knows, and answered so.
+        // What is not UTF-8, or goes on for ever, is an unknown verb, and answered as such.
         while matches!(input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line), Ok(1..)) {
             let text = String::from_utf8_lossy(&line).trim_end_matches(['\r', '\n']).to_owned();
             line.clear();
@@ -389,7 +389,7 @@ mod tests {
         let latency = Fault::Adapter(Setting::Latency(Duration::from_millis(16)));
         let queue = Fault::Adapter(Setting::Queue(64));
         assert_eq!(read(&["latency 16", " 2 queue 64"]), Ok(vec![vec![latency], vec![latency, queue]]));
-        // Only the second unit has so much flash.
+        // Only the second unit has this much flash.
         assert!(read(&["2 flash stuck at word 0x20000"]).is_ok());
         let complaint = read(&["flash stuck at word 0x20000"]).expect_err("the first has not");
         assert!(

@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(
         );
     }
     let bytes = image::convert(image, &shape).map_err(|error| inexpressible(error, &name))?;
-    // Addresses that general tools want are not a loader's, and that is no mistake here.
+    // Addresses that general tools want are not a loader's, which is not a mistake here.
     allow.push(DefectId::AddressUnit);
     let written = checked(&bytes[..], &args.out, &targets(), None, &allow)?;
     if !written.is_ok() {

@@ -56,7 +56,7 @@ struct CheckArgs {
     /// The product it should be for.
     #[arg(long, value_name = "NAME", value_parser = names::product)]
     product: Option<&'static Product>,
-    /// The loader it is judged for; by default the one the product is believed to have.
+    /// The loader it is judged for; by default the one the product is assumed to have.
     #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
     loader: Option<LoaderKind>,
     /// Let this error pass. What is allowed is still listed.
@@ -177,7 +177,7 @@ pub fn read_for(
     };
     let file = File::open(path).map_err(|error| unreadable(path, error))?;
     let mut report = checked(file, path, targets, expected, allow)?;
-    // What is no image is not read to its end, and has its size all the same.
+    // What is not an image is not read to its end, but its size is known.
     report.facts.size = size.map_or(report.facts.size, |size| size.max(report.facts.size));
     Ok(report)
 }

@@ -188,7 +188,7 @@ pub fn defect_objects(report: &Report) -> Vec<DefectObject<'_>> {
         .collect()
 }
 
-/// What speaks against a sound file for one unit, as JSON: it stands in no line.
+/// What speaks against a sound file for one unit, as JSON: it is on no line of the file.
 pub fn misfit_object(id: DefectId, message: &str) -> DefectObject<'_> {
     DefectObject { id: id.name(), severity: id.severity().name(), line: 0, column: 0, message, allowed: false }
 }

@@ -22,7 +22,7 @@ enum Style {
     Json,
     Bar,
     Phases,
-    /// The so-manieth line of a board.
+    /// A line of a board, by its number.
     Line(Arc<Board>, usize),
 }
 
@@ -42,12 +42,12 @@ struct ProgressObject<'a> {
     again: bool,
 }
 
-/// Characters of the bar at most, and so few that it shows nothing.
+/// Characters of the bar at most, and at least: a shorter one shows nothing.
 const LONGEST_BAR: usize = 30;
 const SHORTEST_BAR: usize = 4;
 /// Columns and rows where nobody says how many there are.
 const SIZE: (usize, usize) = (80, 24);
-/// A hold that lasts so long is told.
+/// A hold that lasts this long is shown.
 const LONG_HOLD: Duration = Duration::from_secs(1);
 
 impl Meter {
@@ -66,7 +66,7 @@ impl Meter {
         Meter { port: port.to_owned(), style: Style::Line(board, line), phase: None }
     }
 
-    /// Shows how far it is. That nobody reads it any more is no reason to end an upload.
+    /// Shows how far it is. An upload does not end because nobody reads this any more.
     pub fn show(&mut self, progress: &Progress, output: &mut Output) {
         let is_new_phase = self.phase.replace(progress.phase) != Some(progress.phase);
         match &self.style {
@@ -113,7 +113,7 @@ fn size() -> (usize, usize) {
     terminal::size().unwrap_or(SIZE)
 }
 
-/// One line of fewer than so many columns: a line that fills its terminal wraps on many. What is left of them is the bar.
+/// One line of fewer than this many columns: a line that fills its terminal wraps on many. What is left of them is the bar.
 fn text(progress: &Progress, columns: usize) -> String {
     let Progress { records, records_total, bytes, bytes_total, address, .. } = *progress;
     let share = if bytes_total == 0 { 0.0 } else { bytes as f64 / bytes_total as f64 };
@@ -146,7 +146,7 @@ fn cut(line: &str, columns: usize) -> String {
     line.chars().take(columns).collect()
 }
 
-/// A line for each of several uploads: repainted in place on a terminal that has room for all of them, printed anew
+/// A line for each of several uploads: repainted in place on a terminal that has room for all of them, printed again
 /// elsewhere when its phase changes.
 pub struct Board {
     state: Mutex<State>,
@@ -157,7 +157,7 @@ pub struct Board {
 
 struct State {
     lines: Vec<String>,
-    /// The lines stand right above the cursor.
+    /// The lines are right above the cursor.
     painted: bool,
     to: Box<dyn Write + Send>,
 }
@@ -175,7 +175,7 @@ impl Board {
         Board { state: Mutex::new(State { lines, painted: false, to }), names, on_terminal, size }
     }
 
-    /// Columns of a line behind its name.
+    /// Columns of a line after its name.
     pub fn room(&self) -> usize {
         let name = self.names.first().map_or(0, |name| name.chars().count() + 2);
         (self.size)().0.saturating_sub(name)
@@ -187,7 +187,7 @@ impl Board {
         let is_news = first_word(&state.lines[line]) != first_word(&text);
         state.lines[line] = text;
         let (columns, rows) = (self.size)();
-        // The cursor stands below the lines, and goes up to no line that has left the screen.
+        // The cursor is below the lines, and cannot go up to a line that has left the screen.
         let in_place = self.on_terminal && self.names.len() < rows;
         let painted = if in_place {
             let up = if state.painted { format!("\x1b[{}A", state.lines.len()) } else { String::new() };

@@ -1,4 +1,4 @@
-//! `axcon load`: check, plan, upload, and believe only the new banner.
+//! `axcon load`: check, plan, upload, and trust only the new banner.
 
 mod meter;
 mod several;
@@ -10,8 +10,9 @@ use super::error::{CliError, Kind};
 use super::image as image_cli;
 use super::journal::Desk;
 use super::numbers::counted;
+use super::outcome::no_answer_hints;
 use super::output::Output;
-use super::talk::{Ended, Talk, no_answer_hints};
+use super::talk::{Ended, Talk};
 use super::{Global, ask, files, link, names, password};
 use crate::device::{self, LoaderKind, Product};
 use crate::host::journal::Note;
@@ -41,7 +42,7 @@ pub struct Args {
     #[arg(long)]
     pack: bool,
     /// The loader the unit has, where it is known to be another than its product's (g1, g2, g3, g3-1.3); what it really
-    /// does shows behind the first record in any case.
+    /// does shows after the first record in any case.
     #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
     loader: Option<LoaderKind>,
     /// Read the password from FILE; otherwise AXCON_PASSWORD is taken, or it is asked for.
@@ -120,9 +121,7 @@ fn upload(prepared: &Prepared, global: &Global, meter: Meter, output: &mut Outpu
         return Err(link::read_only("take new software"));
     }
     let mut talk = Talk::open(global, output)?;
-    let result = upload_over(&mut talk, prepared, global, meter, output);
-    talk.close(output);
-    result
+    upload_over(&mut talk, prepared, global, meter, output)
 }
 
 fn upload_over(
@@ -146,8 +145,8 @@ fn upload_over(
     }
     let noted = journal.note.as_ref().map(|note| note.product.clone());
     let said = facts.product.as_ref().map(|known| known.value.clone());
-    let believed = said.clone().or(args.product.map(|product| product.name.clone())).or_else(|| noted.clone());
-    let ran = believed.and_then(|product| journal.ran(&product));
+    let assumed = said.clone().or(args.product.map(|product| product.name.clone())).or_else(|| noted.clone());
+    let ran = assumed.and_then(|product| journal.ran(&product));
     let talks = matches!(facts.state, UnitState::Loader | UnitState::Application);
     if talks && facts.version.is_none() && ran.is_none() && image.identity().is_some() {
         output.remark("axcon: which version the unit ran is not known, so nobody can say whether the image is older");
@@ -166,7 +165,7 @@ fn upload_over(
     let password = consent(talk, password.as_ref(), &facts, global, output)?;
     // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
     let product = args.product.map(|product| product.name.clone()).or(said).or(noted);
-    // Whom nobody but the note has told of the product has to learn how a wrong note is corrected.
+    // A user who relies on the note alone has to learn how a wrong one is corrected.
     let doubt = journal.note.as_ref().filter(|_| args.product.is_none() && facts.product.is_none()).map(doubt);
     let note = journal.compose(&facts, product.as_deref(), name, talk);
     let order = LoadOrder {
@@ -187,7 +186,7 @@ fn upload_over(
     }
 }
 
-/// The user's word that it shall be done, and the password where the unit will want it.
+/// The user's consent, and the password where the unit will ask for it.
 fn consent(
     talk: &mut Talk,
     password: Option<&Secret>,
@@ -402,6 +401,6 @@ fn plan(
     };
     let records = size.map_or_else(String::new, |size| format!(" in {} records", size.records_total));
     say(format!(
-        "plan   {enter}send {characters} characters{records} (some {seconds:.0} s), then believe only the new banner"
+        "plan   {enter}send {characters} characters{records} (some {seconds:.0} s), then trust only the new banner"
     ))
 }

@@ -81,7 +81,7 @@ pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut 
             .enumerate()
             .map(|(line, port)| {
                 let board = board.clone();
-                // Who answered for all has answered for each.
+                // The answer for all was the answer for each.
                 let global = Global { ports: vec![port.clone()], yes: true, ..global.clone() };
                 scope.spawn(move || {
                     let (out, err) = (Lines(Arc::default()), Lines(Arc::default()));

@@ -5,8 +5,8 @@ use serde::Serialize;
 use crate::cli::error::{CliError, Kind};
 use crate::cli::image::{self as image_cli, DefectObject};
 use crate::cli::numbers::counted;
+use crate::cli::outcome::no_answer_hints;
 use crate::cli::output::{Closed, Output};
-use crate::cli::talk::no_answer_hints;
 use crate::image::{DefectId, Report};
 use crate::session::{Facts, LoadReport, Phase, UnitNow, UnitState, Verdict};
 
@@ -217,7 +217,7 @@ fn next_step(report: &LoadReport) -> String {
     }
 }
 
-/// The verdict could not be written: what is true of the unit is worth more than that, and is told beside it.
+/// The verdict could not be written: what is true of the unit matters more than that, and is said as well.
 fn untold(report: &LoadReport, error: CliError, output: &mut Output) -> CliError {
     if !error.error.is::<Closed>() {
         output.remark(&format!("axcon: {}: {}", verdict_name(report.verdict), report.what));
@@ -290,7 +290,7 @@ mod tests {
     use crate::time::Duration;
 
     #[test]
-    fn whoever_has_to_say_which_product_it_is_is_told_how() {
+    fn a_user_who_has_to_name_the_product_is_told_how() {
         let report = LoadReport {
             verdict: Verdict::Refused,
             proof: Proof::Banner,

@@ -44,7 +44,7 @@ pub struct Sending {
     path: PathBuf,
     file: File,
     new_line: NewLine,
-    /// The last byte of the piece before was a CR: an LF at the beginning of the next belongs to it.
+    /// The last byte of the previous piece was a CR: an LF at the beginning of the next belongs to it.
     after_return: bool,
     sent: u64,
 }
@@ -56,7 +56,7 @@ impl Sending {
     /// A file from its beginning.
     ///
     /// # Errors
-    /// If it cannot be opened, or is no plain file: whoever waits for a pipe hears neither the unit nor the user.
+    /// If it cannot be opened, or is not a plain file: while waiting for a pipe, neither the unit nor the user would be heard.
     pub fn open(path: &Path, new_line: NewLine) -> Result<Self, CliError> {
         match std::fs::metadata(path) {
             Ok(found) if found.is_dir() => return Err(failed(path, ErrorKind::IsADirectory.into())),
@@ -144,7 +144,7 @@ mod tests {
                 assert_eq!(String::from_utf8(all).expect("ASCII"), expected, "{new_line:?}, {shift}");
             }
         }
-        assert!(Sending::open(folder.path(), NewLine::Cr).is_err(), "a folder is no file");
+        assert!(Sending::open(folder.path(), NewLine::Cr).is_err(), "a folder is not a file");
         #[cfg(unix)]
         assert!(Sending::open(Path::new("/dev/zero"), NewLine::Cr).is_err(), "nor is what has no end");
     }

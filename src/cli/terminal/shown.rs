@@ -39,7 +39,7 @@ pub struct Shown {
     /// What a new line is on the way out.
     new_line: &'static str,
     visible: Visible,
-    /// The last byte ended a line, and was this one: its partner behind it belongs to it.
+    /// The last byte ended a line, and was this one: the partner that follows belongs to it.
     ended_by: Option<u8>,
     at_start: bool,
     row: Row,

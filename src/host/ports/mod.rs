@@ -229,7 +229,7 @@ fn sysfs(path: &str) -> Option<PathBuf> {
     cfg!(target_os = "linux").then(|| Path::new("/sys/class/tty").join(path.strip_prefix("/dev/").unwrap_or(path)))
 }
 
-/// Orders `ttyUSB10` behind `ttyUSB9`.
+/// Orders `ttyUSB10` after `ttyUSB9`.
 fn natural_key(path: &str) -> (String, u64) {
     let digits = path.bytes().rev().take_while(u8::is_ascii_digit).count();
     let (name, number) = path.split_at(path.len() - digits);

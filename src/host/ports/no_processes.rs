@@ -1,4 +1,4 @@
-//! Open files of processes, on systems of which nobody knows here how to ask them: none is open.
+//! Open files of processes, on systems that cannot be asked for them here: none is open.
 
 use std::path::Path;
 

@@ -46,9 +46,9 @@ fn was_told_to_link(pid: u32, path: &Path) -> bool {
     let Ok(folder) = fs::read_link(format!("/proc/{pid}/cwd")) else { return false };
     let Ok(path) = std::path::absolute(path) else { return false };
     let words: Vec<String> = line.split(|&byte| byte == 0).map(|word| String::from_utf8_lossy(word).into()).collect();
-    let behind = words.windows(2).filter(|pair| pair[0] == "--link").map(|pair| pair[1].as_str());
+    let following = words.windows(2).filter(|pair| pair[0] == "--link").map(|pair| pair[1].as_str());
     let joined = words.iter().filter_map(|word| word.strip_prefix("--link="));
-    behind.chain(joined).any(|named| {
+    following.chain(joined).any(|named| {
         let named = folder.join(named);
         path.to_string_lossy().starts_with(&*named.to_string_lossy())
     })
@@ -122,7 +122,7 @@ fn look_at(processes: &OwnedFd, pid: u32, counts: &impl Fn(u32) -> bool, wanted:
     each_entry(&files, |file| {
         let open = match readlinkat_raw(&files, file, &mut link) {
             Ok((open, _)) => open,
-            // Of a process that shows how many files it has and not which, none is shown.
+            // A process that shows how many files it has and not which shows none.
             Err(Errno::ACCESS | Errno::PERM) => return ControlFlow::Break(()),
             // Closed meanwhile.
             Err(_) => return ControlFlow::Continue(()),

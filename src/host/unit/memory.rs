@@ -197,7 +197,7 @@ impl Cable {
         }
     }
 
-    /// Waits for so long, and says whether the client has closed its end.
+    /// Waits for this long, and says whether the client has closed its end.
     fn is_closed_within(&self, time: Duration) -> bool {
         self.wait_until(time, |ends| ends.closed).closed
     }
@@ -329,7 +329,7 @@ mod tests {
             match received.recv_timeout(Duration::from_secs(20)) {
                 Ok(Input::Bytes { bytes, .. }) => heard.push_str(&String::from_utf8_lossy(&bytes)),
                 Ok(Input::Gone { error, .. }) => return format!("{heard}<{error}>"),
-                other => panic!("{other:?} behind {heard:?}"),
+                other => panic!("{other:?} after {heard:?}"),
             }
         }
         heard

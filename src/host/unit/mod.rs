@@ -99,7 +99,7 @@ pub struct HostedUnit {
 /// What has become of the cable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Plug<'a> {
-    /// It has been pulled: what a client opened before is no port any more.
+    /// It has been pulled: what a client opened before is not a port any more.
     Out,
     /// It is in again; this is what a client opens from then on.
     In(&'a Path),
@@ -145,7 +145,7 @@ pub enum Power {
     AtFirstClient,
 }
 
-/// What a hosted unit is told, and who hears the answer.
+/// What a hosted unit has to do, and what hears the answer.
 struct Order {
     verb: Verb,
     answered: Box<dyn FnOnce(Answer) + Send>,
@@ -263,7 +263,7 @@ pub fn factory_setup(product: &'static Product, seed: u64) -> Setup {
     Setup { product, loader, seed, dialect: 0, flash: factory_flash(product), parameters: Vec::new() }
 }
 
-/// The program flash of a unit as it leaves the factory: the sample image of its first version, erased behind it.
+/// The program flash of a unit as it leaves the factory: the sample image of its first version, erased after it.
 pub fn factory_flash(product: &Product) -> Vec<u8> {
     let mut flash = vec![0xFF; product.flash.program_words as usize * 2];
     let target = product.target();

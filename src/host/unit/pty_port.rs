@@ -69,7 +69,7 @@ impl UnitPort for PtyPort {
     }
 
     fn pull(&mut self) -> io::Result<()> {
-        // The new one is there before the old one goes, so it cannot get its name: who opens that finds no port.
+        // The new one is there before the old one goes, so it cannot get its name: a client that opens that finds no port.
         self.pty = Pty::open(BAUD)?;
         Ok(())
     }

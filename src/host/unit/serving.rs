@@ -29,7 +29,7 @@ use crate::time::{Duration, Instant, character_time};
 const TICK: Duration = Duration::from_millis(1);
 
 /// A thread that wakes up later than this does not make up for all of it: the rest has not been for the unit. While it
-/// catches up, bytes reach the unit faster than a client can answer an XOFF; no more of them may than behind a USB
+/// catches up, bytes reach the unit faster than a client can answer an XOFF; no more of them may than after a USB
 /// adapter with its 16 ms of latency.
 const CATCH_UP: Duration = Duration::from_millis(16);
 
@@ -151,7 +151,7 @@ impl<U: Hosted, P: UnitPort> Host<U, P> {
             match orders.try_recv() {
                 Ok(Order { verb, answered }) => {
                     let answer = self.plugged.unit_mut().perform(now, &verb);
-                    // Whoever hears that the cable is in finds the port.
+                    // A listener that hears that the cable is in finds the port.
                     self.note_cable()?;
                     answered(answer);
                 }
@@ -265,7 +265,7 @@ impl<U: Hosted, P: UnitPort> Host<U, P> {
             }
             return Ok(0);
         }
-        // Whoever sends is there, even if the system would not show us. And it may have changed its settings since it
+        // A client that sends is there, even if the system would not show us. And it may have changed its settings since it
         // opened the port.
         self.attended |= !self.leaving;
         self.client = self.port.client_settings().map_err(failed("ask"))?;

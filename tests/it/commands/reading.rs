@@ -391,6 +391,9 @@ fn a_file_that_cannot_be_written_is_said_before_the_port_is_looked_at() {
     let ran = world.run(&["terminal", "--log", "nowhere/log", "--port", "no-such-port"], b"");
     assert_eq!(ran.code, Some(1), "{}", ran.err);
     assert!(ran.err.starts_with("axcon: cannot write the log 'nowhere/log': "), "{}", ran.err);
+    let ran = world.run(&["terminal", "--log", "log", "--port", "no-such-port"], b"");
+    assert_eq!(ran.code, Some(3), "{}", ran.err);
+    assert!(!world.path("log").exists(), "a port that does not open leaves no file");
 }
 
 #[test]

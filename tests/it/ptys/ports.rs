@@ -53,7 +53,7 @@ fn a_port_without_permission_names_the_group_that_has_it_if_one_has() {
     let told = refused(0o060);
     assert_eq!(told.contains("usermod -aG "), group != 0, "{told}");
     let told = refused(0o000);
-    assert!(told.contains("its owner alone has access") && !told.contains("usermod"), "{told}");
+    assert!(told.contains("only its owner has access") && !told.contains("usermod"), "{told}");
 }
 
 /// What a user without any rights is told who opens this port.

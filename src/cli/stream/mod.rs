@@ -1,7 +1,10 @@
 //! `axcon stream`: the unit's data stream as CSV, JSON lines or as it is.
 
+pub mod found;
+mod rows;
+
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use serde::Serialize;
@@ -10,12 +13,14 @@ use super::error::{CliError, Kind};
 use super::files::Destination;
 use super::numbers::counted;
 use super::output::{Closed, Output};
-use super::talk::{Calendar, Ended, Talk};
+use super::talk::{Ended, Talk};
 use super::{Global, link};
 use crate::device::Product;
 use crate::session::{Command, Event, Outcome};
 use crate::time::{BITS_PER_CHARACTER, Duration, Instant};
-use crate::wire::stream::{Layout, Reading, Row, Source};
+use crate::wire::stream::{Layout, Source};
+use found::{Before, leave_as_found, watch};
+use rows::{AnotherUnit, Format, Sink, another_unit};
 
 /// Arguments of `axcon stream`.
 ///
@@ -33,7 +38,7 @@ pub struct Args {
     /// How rows are written. Otherwise FILE's ending says so (.csv, .jsonl), or --json.
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// Write to FILE instead of standard output. It is made with the first row; one that is there needs --yes.
+    /// Write to FILE instead of standard output. It is made with the first row; an existing one needs --yes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// End after N rows. Exit code 130 if an interrupt comes first, as with --duration; without both it is the normal end.
@@ -59,29 +64,14 @@ enum SourceName {
     Pv,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Format {
-    Csv,
-    Jsonl,
-    Raw,
-}
-
-impl Format {
-    /// The format that a file's name promises.
-    fn of_file(file: &Path) -> Option<Self> {
-        match file.extension()?.to_str()?.to_lowercase().as_str() {
-            "csv" => Some(Format::Csv),
-            "jsonl" | "ndjson" => Some(Format::Jsonl),
-            _ => None,
-        }
-    }
-}
-
 /// Repetition time asked for where the user says nothing (errata E-105: the units' own default).
 const PERIOD: Duration = Duration::from_millis(1000);
 
-/// How long the beginnings of a running stream are watched for.
-const LISTEN_FIRST: Duration = Duration::from_millis(1200);
+#[derive(Serialize)]
+struct OffObject {
+    schema: &'static str,
+    stream: &'static str,
+}
 
 /// Streams.
 ///
@@ -89,10 +79,8 @@ const LISTEN_FIRST: Duration = Duration::from_millis(1200);
 /// If the link does not open, no unit answers, or the unit does not do as asked.
 pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
     let duration = args.duration.map(seconds).transpose()?;
-    let format = match (args.format, args.out.as_deref().and_then(Format::of_file)) {
-        (None, Some(by_name)) => by_name,
-        (format, _) => output.format(format, Format::Jsonl, Format::Csv)?,
-    };
+    let promised = args.out.as_deref().and_then(Format::of_file);
+    let format = output.format(args.format, promised, Format::Jsonl, Format::Csv)?;
     let wanted = args.source.map(|source| match source {
         SourceName::Fv => Source::FieldValue,
         SourceName::Pv => Source::ProcessValue,
@@ -105,7 +93,6 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     talk.find_application()?;
     if args.off {
         let outcome = talk.ask(Command::StreamOff)?;
-        talk.close(output);
         talk.expect_done(&outcome)?;
         if output.json {
             return output.object(&OffObject { schema: "axcon.stream-off/1", stream: "off" });
@@ -115,25 +102,22 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     }
     let sink = Sink { out, format, source: wanted, calendar: talk.calendar(), channels: None, rows: 0 };
     let period = args.period.map(Duration::from_millis);
-    let limits = Limits { count: args.count, duration };
+    let limits = Limits::new(args.count, duration);
     let mut stream = Stream {
         talk,
         sink,
         limits,
-        until: Instant::NEVER,
         setting: None,
-        was_on: false,
+        before: Before::Off,
         is_known: true,
         patience: PATIENCE + SLOWEST * 3,
     };
     if stream.talk.is_recorded() {
-        let written = stream.write_rows(output);
-        stream.talk.close(output);
-        return written;
+        return stream.write_rows(output);
     }
-    let found = watch(&mut stream.talk)?;
+    stream.before = watch(&mut stream.talk)?;
+    let found = stream.before.seen();
     let joins = found.is_some_and(|found| period.is_none() && wanted.is_none_or(|wanted| wanted == found.source));
-    stream.was_on = found.is_some();
     if let Some(period) = found.and_then(|found| found.period) {
         stream.patience = PATIENCE + period * 3;
     }
@@ -146,7 +130,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         stream.switch_on(source, period, output)
     };
     let written = begun.and_then(|()| stream.keep_writing(Duration::from_secs(args.reconnect), output));
-    let Stream { mut talk, setting, was_on, is_known, .. } = stream;
+    let Stream { mut talk, setting, before, is_known, .. } = stream;
     // However it ended, and also if the first row never came: what has been changed is changed back.
     let is_gone = written.as_ref().is_err_and(|error| {
         error.kind == Kind::PortGone || error.error.is::<AnotherUnit>() || error.error.is::<NoRows>()
@@ -154,14 +138,13 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let left = if setting.is_none() || args.keep || is_gone {
         Ok(())
     } else if is_known {
-        leave_as_found(&mut talk, was_on, found, output)
+        leave_as_found(&mut talk, before, output)
     } else {
         output.remark("axcon: the unit has not shown itself again, so no key is pressed: its stream is left as it is");
         Ok(())
     };
-    talk.close(output);
     let written = match written {
-        // Whoever read our output has enough: that is a way to end.
+        // The reader of our output has enough: that is a way to end.
         Err(error) if error.error.is::<Closed>() => Ok(()),
         written => written,
     };
@@ -172,6 +155,31 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 struct Limits {
     count: Option<u64>,
     duration: Option<Duration>,
+    /// When the time is over, once the first row has begun it.
+    until: Instant,
+}
+
+impl Limits {
+    fn new(count: Option<u64>, duration: Option<Duration>) -> Self {
+        Limits { count, duration, until: Instant::NEVER }
+    }
+
+    /// Whether it is enough, with this many rows at this moment. The first row begins the time.
+    fn reached(&mut self, rows: u64, now: Instant) -> bool {
+        self.begin(rows, now);
+        self.has_all(rows) || self.until <= now
+    }
+
+    /// Begins the time if there is one and it has not begun; says whether it has now.
+    fn begin(&mut self, rows: u64, at: Instant) -> bool {
+        let Some(duration) = self.duration.filter(|_| rows > 0 && self.until == Instant::NEVER) else { return false };
+        self.until = at + duration;
+        true
+    }
+
+    fn has_all(&self, rows: u64) -> bool {
+        self.count.is_some_and(|count| rows >= count)
+    }
 }
 
 /// A stream being written down.
@@ -179,12 +187,10 @@ struct Stream {
     talk: Talk,
     sink: Sink,
     limits: Limits,
-    /// When the time is over.
-    until: Instant,
     /// What the stream was switched to, if that was begun.
     setting: Option<(Source, Duration)>,
-    /// Whether it was on before, as far as is known.
-    was_on: bool,
+    /// What it was before, as far as is known.
+    before: Before,
     /// Whether the unit has shown itself since the link was opened: another one, or something else, may be behind a
     /// cable that is back, and takes every key for its own.
     is_known: bool,
@@ -192,21 +198,21 @@ struct Stream {
     patience: Duration,
 }
 
-/// How long no row may come, beside three periods: a unit that starts anew needs up to 6 s, goes on by itself, and may do
+/// How long no row may come, beside three periods: a unit that restarts needs up to 6 s, goes on by itself, and may do
 /// so twice; later than that it is not coming back.
 const PATIENCE: Duration = Duration::from_secs(15);
 
 /// The longest period a unit takes: that of a stream of which too little was seen to know it.
 const SLOWEST: Duration = Duration::from_secs(60);
 
-/// How long the rows of a unit that was on all the time may take to come behind a cable that is back, beside their
+/// How long the rows of a unit that was on all the time may take to come after a cable is back, beside their
 /// period: a unit that was switched off as well has none for up to 5 s (AXRTD8CO manual, section 1.1).
 const ROWS_AGAIN: Duration = Duration::from_secs(7);
 
 impl Stream {
     /// Switches the stream on. The row that proves it is the first one written.
     fn switch_on(&mut self, source: Source, period: Duration, output: &mut Output) -> Result<(), CliError> {
-        // What is found on behind a cable that is back is our own.
+        // What is found on after the cable has come back is our own.
         let is_first = self.setting.replace((source, period)).is_none();
         self.patience = PATIENCE + period * 3;
         let mut proof = None;
@@ -218,7 +224,9 @@ impl Stream {
         })?;
         match ended {
             Ended::Finished { outcome: Outcome::StreamRuns { was_on }, interrupted: false } => {
-                self.was_on |= was_on && is_first;
+                if was_on && is_first {
+                    self.before.was_on();
+                }
             }
             Ended::Finished { outcome, interrupted: false } => return self.talk.expect_done(&outcome),
             Ended::Finished { interrupted: true, .. } => return Err(CliError::interrupted()),
@@ -274,50 +282,35 @@ impl Stream {
     }
 
     fn write_rows(&mut self, output: &mut Output) -> Result<(), CliError> {
-        let Limits { count, duration } = self.limits;
-        if count.is_some_and(|count| self.sink.rows >= count) {
-            return Ok(());
-        }
         let mut last = self.talk.now();
-        loop {
-            // The first row begins the time.
-            if let Some(duration) = duration
-                && self.until == Instant::NEVER
-                && self.sink.rows > 0
-            {
-                self.until = last + duration;
-            }
-            let awaits_first = duration.is_some() && self.until == Instant::NEVER;
+        while !self.limits.reached(self.sink.rows, self.talk.now()) {
             // A recording ends by itself.
             let silent_at = if self.talk.is_recorded() { Instant::NEVER } else { last + self.patience };
-            let before = self.sink.rows;
-            let sink = &mut self.sink;
-            let mut has_all = false;
-            let undisturbed = self.talk.listen(self.until.min(silent_at), |session, event| {
-                if let Event::Row { at, span, row } = event {
-                    sink.row(*at, row, &session.record().bytes(*span), output)?;
-                    last = *at;
-                }
-                has_all = count.is_some_and(|count| sink.rows >= count) || (awaits_first && sink.rows > 0);
-                Ok(if has_all { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+            let until = self.limits.until.min(silent_at);
+            let (sink, limits) = (&mut self.sink, &mut self.limits);
+            let mut is_limited = false;
+            let undisturbed = self.talk.listen(until, |session, event| {
+                let Event::Row { at, span, row } = event else { return Ok(ControlFlow::Continue(())) };
+                sink.row(*at, row, &session.record().bytes(*span), output)?;
+                last = *at;
+                // Either it is enough, or the time has got an end.
+                is_limited = limits.begin(sink.rows, *at) || limits.has_all(sink.rows);
+                Ok(if is_limited { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             })?;
-            let is_enough = count.is_some_and(|count| self.sink.rows >= count);
-            if !undisturbed && !has_all {
+            if !undisturbed {
                 return self.had_enough();
             }
-            if !is_enough && awaits_first && self.sink.rows > 0 {
+            if is_limited || self.limits.until <= self.talk.now() {
                 continue;
-            }
-            if is_enough || self.until <= self.talk.now() {
-                return Ok(());
             }
             if self.talk.is_recorded() {
                 return self.recording_is_over(output);
             }
-            if self.sink.rows == before && last + self.patience <= self.talk.now() {
+            if last + self.patience <= self.talk.now() {
                 return Err(self.no_rows());
             }
         }
+        Ok(())
     }
 
     /// A recording has no more rows than it has.
@@ -341,7 +334,7 @@ impl Stream {
 
     /// The user has interrupted: the normal end where nothing else was to end it and something has come.
     fn had_enough(&self) -> Result<(), CliError> {
-        let Limits { count, duration } = self.limits;
+        let Limits { count, duration, .. } = self.limits;
         let rows = counted(self.sink.rows, "row");
         let message = match (count, duration) {
             (Some(count), _) => format!("interrupted: {rows} of {count} written"),
@@ -371,79 +364,11 @@ impl Stream {
     }
 }
 
-/// The unit is silent that has streamed.
+/// A unit that has streamed is silent.
 #[derive(Debug, thiserror::Error)]
 #[error("no row has come for {seconds} s: the unit does not stream any more")]
 struct NoRows {
     seconds: f64,
-}
-
-/// A stream that was on before we came.
-#[derive(Clone, Copy, Debug)]
-pub struct Found {
-    source: Source,
-    /// Time between its rows, as far as two were seen.
-    period: Option<Duration>,
-}
-
-/// Looks for a stream that runs already.
-///
-/// # Errors
-/// If the link is lost or the user interrupts.
-pub fn watch(talk: &mut Talk) -> Result<Option<Found>, CliError> {
-    let mut first: Option<Instant> = None;
-    let mut last = None;
-    let mut rows = 0u32;
-    let until = talk.now() + LISTEN_FIRST;
-    talk.hear(until, |_, event| {
-        if let Event::Row { at, row, .. } = event {
-            first.get_or_insert(*at);
-            last = Some((*at, row.source));
-            rows += 1;
-        }
-        Ok(ControlFlow::Continue(()))
-    })?;
-    Ok(first.zip(last).map(|(begun, (ended, source))| {
-        let period = (rows > 1).then(|| ended.since(begun) / (rows - 1));
-        // Rows come at whole milliseconds; the clock that saw them is not that exact.
-        let period = period.map(|period| Duration::from_millis(likely_millis(period)));
-        Found { source, period }
-    }))
-}
-
-/// What a person will have typed where this is measured: the roundest number within a hundredth and a millisecond.
-fn likely_millis(period: Duration) -> u64 {
-    const STEPS: [u64; 6] = [1000, 500, 100, 50, 10, 5];
-    let measured = period.as_secs_f64() * 1000.0;
-    let mut round = STEPS.into_iter().map(|step| (measured / step as f64).round() as u64 * step);
-    let is_close = |millis: &u64| *millis > 0 && (*millis as f64 - measured).abs() <= (measured / 100.0).max(1.0);
-    round.find(is_close).unwrap_or((measured.round() as u64).max(1))
-}
-
-/// Puts the stream back to what it was.
-///
-/// # Errors
-/// If the unit does not do as asked.
-pub fn leave_as_found(
-    talk: &mut Talk,
-    was_on: bool,
-    found: Option<Found>,
-    output: &mut Output,
-) -> Result<(), CliError> {
-    match (was_on, found) {
-        (false, _) => {
-            let outcome = talk.ask(Command::StreamOff)?;
-            talk.expect_done(&outcome)
-        }
-        (true, Some(Found { source, period: Some(period) })) => {
-            let outcome = talk.ask(Command::StreamOn { source, period })?;
-            talk.expect_done(&outcome)
-        }
-        (true, _) => {
-            output.remark("axcon: the stream was on before, at a rate too slow to be seen; it is left at the new one");
-            Ok(())
-        }
-    }
 }
 
 /// Says so if the line cannot carry the rate.
@@ -465,101 +390,6 @@ fn warn_of_rate(talk: &Talk, source: Source, period: Duration, baud: u32, output
 fn layout(talk: &Talk) -> Option<&'static Layout> {
     let product = talk.session().facts().product.as_ref()?;
     Product::named(&product.value).map(|product| &product.stream)
-}
-
-/// Where rows go.
-struct Sink {
-    out: Destination,
-    format: Format,
-    /// Rows of another source are left out.
-    source: Option<Source>,
-    calendar: Calendar,
-    /// How many channels the rows have, once one was written.
-    channels: Option<usize>,
-    rows: u64,
-}
-
-#[derive(Serialize)]
-struct OffObject {
-    schema: &'static str,
-    stream: &'static str,
-}
-
-#[derive(Serialize)]
-struct RowObject<'a> {
-    schema: &'static str,
-    time: String,
-    source: &'static str,
-    values: Vec<ValueObject<'a>>,
-}
-
-#[derive(Serialize)]
-struct ValueObject<'a> {
-    channel: &'a str,
-    value: Option<serde_json::Number>,
-    state: &'static str,
-}
-
-impl Sink {
-    fn row(&mut self, at: Instant, row: &Row, raw: &[u8], output: &mut Output) -> Result<(), CliError> {
-        let now = row.readings.len();
-        if let Some(before) = self.channels.filter(|&before| before != now) {
-            return Err(another_unit(format!("the unit's rows have {now} values now and had {before}")));
-        }
-        if self.source.is_some_and(|source| source != row.source) {
-            return Ok(());
-        }
-        let channels = channels_of(row);
-        let time = self.calendar.text(at);
-        let mut text = Vec::new();
-        match self.format {
-            Format::Raw => text.extend_from_slice(raw),
-            Format::Csv => {
-                if self.channels.is_none() {
-                    text.extend_from_slice(Row::csv_heading(channels).as_bytes());
-                }
-                text.extend_from_slice(row.csv(&time).trim_end().as_bytes());
-            }
-            Format::Jsonl => {
-                let values = channels.iter().zip(&row.readings);
-                let values = values.map(|(channel, reading)| json_value(channel, row.source, *reading)).collect();
-                let object = RowObject { schema: "axcon.stream/1", time, source: row.source.short(), values };
-                serde_json::to_writer(&mut text, &object).map_err(|error| CliError::new(Kind::Failed, error))?;
-            }
-        }
-        text.push(b'\n');
-        self.channels = Some(now);
-        self.rows += 1;
-        self.out.append(&text, output)
-    }
-}
-
-/// Another unit answers than the one that was asked.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct AnotherUnit(String);
-
-fn another_unit(what: String) -> CliError {
-    CliError::new(Kind::Failed, AnotherUnit(what))
-        .hint("another unit answers: its values are not written behind those of the first one, and it is left as it is")
-}
-
-/// Names of a row's fields, from the layout that has as many.
-fn channels_of(row: &Row) -> &'static [String] {
-    Product::all()
-        .iter()
-        .map(|product| product.stream.channels.as_slice())
-        .find(|channels| channels.len() == row.readings.len())
-        .unwrap_or_default()
-}
-
-fn json_value(channel: &str, source: Source, reading: Reading) -> ValueObject<'_> {
-    let value = match reading {
-        Reading::Value(value) if source == Source::ProcessValue => Some(serde_json::Number::from(value as i64)),
-        Reading::Value(value) => serde_json::Number::from_f64(value),
-        Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => None,
-    };
-    ValueObject { channel, value, state: reading.state() }
 }
 
 fn seconds(seconds: f64) -> Result<Duration, CliError> {
@@ -595,12 +425,12 @@ mod tests {
         let talk = Talk::open(&global, &mut nowhere()).expect("an emulated unit");
         let out = Destination::admit(None, false).expect("always there");
         let sink = Sink { out, format: Format::Csv, source: None, calendar: talk.calendar(), channels: None, rows: 0 };
-        Stream { talk, sink, limits, until: Instant::NEVER, setting: None, was_on: false, is_known: true, patience }
+        Stream { talk, sink, limits, setting: None, before: Before::Off, is_known: true, patience }
     }
 
     #[test]
     fn a_unit_that_streams_no_more_is_not_waited_for_for_ever() {
-        let mut stream = stream(Limits { count: None, duration: None }, Duration::from_millis(200));
+        let mut stream = stream(Limits::new(None, None), Duration::from_millis(200));
         stream.setting = Some((Source::FieldValue, PERIOD));
         let error = stream.write_rows(&mut nowhere()).expect_err("nothing comes");
         assert_eq!(error.kind, Kind::NoAnswer);
@@ -613,38 +443,16 @@ mod tests {
     }
 
     #[test]
-    fn a_period_that_was_measured_is_the_one_that_somebody_has_typed() {
-        for (measured_us, millis) in [
-            (703_000, 700),
-            (198_400, 200),
-            (1_003_000, 1_000),
-            (59_600, 60),
-            (473_000, 470),
-            (1_040, 1),
-            (10, 1),
-            (251_000, 250),
-        ] {
-            assert_eq!(likely_millis(Duration::from_micros(measured_us)), millis, "{measured_us}");
-        }
-    }
-
-    #[test]
     fn an_interrupt_is_the_normal_end_only_where_nothing_else_is_awaited() {
-        let mut stream = stream(Limits { count: None, duration: None }, SLOWEST);
+        let mut stream = stream(Limits::new(None, None), SLOWEST);
         let said = |stream: &Stream| stream.had_enough().map_err(|error| (error.kind, error.to_string()));
         let interrupted = |what: &str| Err((Kind::Interrupted, what.to_owned()));
         assert_eq!(said(&stream), interrupted("interrupted: no row has come"));
         stream.sink.rows = 3;
         assert_eq!(said(&stream), Ok(()));
-        stream.limits = Limits { count: Some(9), duration: None };
+        stream.limits = Limits::new(Some(9), None);
         assert_eq!(said(&stream), interrupted("interrupted: 3 rows of 9 written"));
-        stream.limits = Limits { count: None, duration: Some(Duration::from_millis(1500)) };
+        stream.limits = Limits::new(None, Some(Duration::from_millis(1500)));
         assert_eq!(said(&stream), interrupted("interrupted before 1.5 s were over: 3 rows written"));
-    }
-
-    #[test]
-    fn the_ending_of_a_file_says_what_is_written() {
-        let of = |name| Format::of_file(Path::new(name));
-        assert_eq!([of("a.jsonl"), of("a.CSV"), of("a.txt")], [Some(Format::Jsonl), Some(Format::Csv), None]);
     }
 }

@@ -1,0 +1,139 @@
+//! Rows as they are written: CSV, JSON lines or as they came.
+
+use std::path::Path;
+
+use clap::ValueEnum;
+use serde::Serialize;
+
+use crate::cli::calendar::Calendar;
+use crate::cli::error::{CliError, Kind};
+use crate::cli::files::Destination;
+use crate::cli::output::Output;
+use crate::device::Product;
+use crate::time::Instant;
+use crate::wire::stream::{Reading, Row, Source};
+
+/// How rows are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    Csv,
+    Jsonl,
+    Raw,
+}
+
+impl Format {
+    /// The format that a file's name promises.
+    pub fn of_file(file: &Path) -> Option<Self> {
+        match file.extension()?.to_str()?.to_lowercase().as_str() {
+            "csv" => Some(Format::Csv),
+            "jsonl" | "ndjson" => Some(Format::Jsonl),
+            _ => None,
+        }
+    }
+}
+
+/// Where rows go.
+pub struct Sink {
+    pub out: Destination,
+    pub format: Format,
+    /// Rows of another source are left out.
+    pub source: Option<Source>,
+    pub calendar: Calendar,
+    /// How many channels the rows have, once one was written.
+    pub channels: Option<usize>,
+    /// Rows written so far.
+    pub rows: u64,
+}
+
+#[derive(Serialize)]
+struct RowObject<'a> {
+    schema: &'static str,
+    time: String,
+    source: &'static str,
+    values: Vec<ValueObject<'a>>,
+}
+
+#[derive(Serialize)]
+struct ValueObject<'a> {
+    channel: &'a str,
+    value: Option<serde_json::Number>,
+    state: &'static str,
+}
+
+impl Sink {
+    /// Writes a row, unless it is of another source than is wanted.
+    ///
+    /// # Errors
+    /// If it is another unit's, or cannot be written.
+    pub fn row(&mut self, at: Instant, row: &Row, raw: &[u8], output: &mut Output) -> Result<(), CliError> {
+        let now = row.readings.len();
+        if let Some(before) = self.channels.filter(|&before| before != now) {
+            return Err(another_unit(format!("the unit's rows have {now} values now and had {before}")));
+        }
+        if self.source.is_some_and(|source| source != row.source) {
+            return Ok(());
+        }
+        let channels = channels_of(row);
+        let time = self.calendar.text(at);
+        let mut text = Vec::new();
+        match self.format {
+            Format::Raw => text.extend_from_slice(raw),
+            Format::Csv => {
+                if self.channels.is_none() {
+                    text.extend_from_slice(Row::csv_heading(channels).as_bytes());
+                }
+                text.extend_from_slice(row.csv(&time).trim_end().as_bytes());
+            }
+            Format::Jsonl => {
+                let values = channels.iter().zip(&row.readings);
+                let values = values.map(|(channel, reading)| json_value(channel, row.source, *reading)).collect();
+                let object = RowObject { schema: "axcon.stream/1", time, source: row.source.short(), values };
+                serde_json::to_writer(&mut text, &object).map_err(|error| CliError::new(Kind::Failed, error))?;
+            }
+        }
+        text.push(b'\n');
+        self.channels = Some(now);
+        self.rows += 1;
+        self.out.append(&text, output)
+    }
+}
+
+/// Another unit answers than the one that was asked.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct AnotherUnit(String);
+
+/// The error of a command that another unit answers.
+pub fn another_unit(what: String) -> CliError {
+    CliError::new(Kind::Failed, AnotherUnit(what))
+        .hint("another unit answers: its values are not written after those of the first one, and it is left as it is")
+}
+
+/// Names of a row's fields, from the layout that has as many.
+fn channels_of(row: &Row) -> &'static [String] {
+    Product::all()
+        .iter()
+        .map(|product| product.stream.channels.as_slice())
+        .find(|channels| channels.len() == row.readings.len())
+        .unwrap_or_default()
+}
+
+fn json_value(channel: &str, source: Source, reading: Reading) -> ValueObject<'_> {
+    let value = match reading {
+        Reading::Value(value) if source == Source::ProcessValue => Some(serde_json::Number::from(value as i64)),
+        Reading::Value(value) => serde_json::Number::from_f64(value),
+        Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => None,
+    };
+    ValueObject { channel, value, state: reading.state() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ending_of_a_file_says_what_is_written() {
+        let of = |name| Format::of_file(Path::new(name));
+        assert_eq!([of("a.jsonl"), of("a.CSV"), of("a.txt")], [Some(Format::Jsonl), Some(Format::Csv), None]);
+    }
+}
