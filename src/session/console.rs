@@ -251,7 +251,7 @@ impl Work for StreamOn {
         match self.stage {
             OnStage::Toggled => matches!(prompt, Prompt::Source(_) | Prompt::Period),
             OnStage::Source { .. } => prompt == Prompt::Period,
-            OnStage::Period { .. } | OnStage::Row | OnStage::Left { .. } => false,
+            OnStage::Period { .. } | OnStage::Row | OnStage::Leaving(_) => false,
         }
     }
 }

@@ -263,7 +263,7 @@ impl Work for RestoreDefaults {
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {
-        self.stage == Stage::Asked && prompt == Prompt::ConfirmDefaults
+        matches!(self.stage, Stage::Asked) && prompt == Prompt::ConfirmDefaults
     }
 }
 
