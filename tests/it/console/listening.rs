@@ -29,7 +29,7 @@ fn overview(desk: &mut Desk, label: &str) -> String {
 fn pages_that_a_hand_has_switched_on_are_shown_and_s_stops_them() {
     let mut desk = Desk::new();
     by_hand(&mut desk, "s");
-    desk.run(Duration::from_secs(4));
+    desk.run(Duration::from_millis(4_300));
     let shown = desk.picture();
     assert!(shown.contains("page 5") && shown.contains("running, S stops them"), "{shown}");
     assert!(shown.contains("Supply Voltage"), "{shown}");
