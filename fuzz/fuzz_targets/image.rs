@@ -68,9 +68,8 @@ fn compare(before: &Report, image: &Image, shape: &Shape, written: &[u8]) {
     if shape.format == Format::SRecord {
         assert!(image.header.starts_with(&again.header) && image.header.len() <= again.header.len() + 2);
     }
-    // What addresses count may not show: a single record does not advance.
+    // What addresses count is seen from how they advance, and longer records advance less often.
     if again.address_unit != shape.address_unit {
-        assert_eq!(after.facts.address_unit, None, "{shape:?}\n{image:?}");
         return;
     }
     assert!(image::diff(image, again).is_none(), "{shape:?}\n{image:?}\n{again:?}");
@@ -110,6 +109,9 @@ fuzz_target!(|input: (u8, &[u8])| {
         let image = checked.image();
         assert!(!image.blocks.is_empty());
         assert!(image::diff(image, image).is_none());
-        convert(&lenient, image, size);
+        // What runs past the last address continues at 0 for some readers only.
+        if !errors(&lenient).contains(&DefectId::AddressWrap) {
+            convert(&lenient, image, size);
+        }
     }
 });
