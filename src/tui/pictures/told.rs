@@ -415,7 +415,7 @@ fn a_path_used_before_that_depends_on_a_folder_says_so() {
         (0..5).for_each(|_| {
             stage.press(KeyCode::Down);
         });
-        assert!(stage.shows("Was connected before"), "{port}: {}", stage.picture());
+        assert!(stage.shows("Connected before"), "{port}: {}", stage.picture());
         assert_eq!(stage.shows("A path from the folder of that time"), depends, "{port}: {}", stage.picture());
     }
 }

@@ -196,7 +196,7 @@ fn files_are_written_in_their_order_beside_the_loop_and_are_whole_when_it_ends()
     console.perform(vec![Effect::CreateFile { path: theirs.clone(), bytes: "ours".into() }, more]);
     assert!(matches!(answer(&console), Input::FileWritten { result: Ok(()), .. }));
     assert!(matches!(answer(&console), Input::FileWritten { result: Err(_), .. }), "it already exists");
-    assert_eq!(console.into_writer().finish(std::time::Duration::from_secs(60)), [PathBuf::new(); 0]);
+    assert_eq!(console.into_writer().finish(std::time::Duration::from_secs(60)), Vec::<PathBuf>::new());
     let written = |path| std::fs::read_to_string(path).expect("there");
     assert_eq!((written(&path), written(&theirs)), ("abc".into(), "theirs".into()));
 }

@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -132,11 +132,11 @@ impl Unwritten {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn add(&self, path: &PathBuf) {
-        *self.pieces().entry(path.clone()).or_default() += 1;
+    fn add(&self, path: &Path) {
+        *self.pieces().entry(path.to_path_buf()).or_default() += 1;
     }
 
-    fn remove(&self, path: &PathBuf) {
+    fn remove(&self, path: &Path) {
         let mut pieces = self.pieces();
         if let Some(count) = pieces.get_mut(path) {
             *count -= 1;
