@@ -131,22 +131,23 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     let ended = talk.run(Command::ReadDictionary, |_, _| Ok(()))?;
     let facts = talk.session().facts().clone();
     let unix_millis = talk.calendar().at(talk.now()).as_millisecond();
-    let is_interrupted = matches!(ended, Ended::Finished { interrupted: true, .. });
-    let reading = match ended {
-        Ended::Finished { outcome: outcome @ Outcome::DictionaryRead(_), .. }
-        | Ended::Finished { outcome, interrupted: false } => {
-            talk.expect_reading(outcome).map_err(|error| match error.kind {
-                Kind::UnitRefused => error.hint(PRE_OPERATIONAL),
-                _ => error,
-            })?
+    let (outcome, stopped_by) = match ended {
+        Ended::Finished { outcome, interrupted: false } => (outcome, None),
+        Ended::Finished { outcome, interrupted: true } => {
+            (outcome, Some(CliError::message(Kind::Interrupted, "interrupted; the view has been left")))
         }
-        Ended::Finished { interrupted: true, .. } => {
-            return Err(CliError::message(Kind::Interrupted, "interrupted; the view has been left"));
-        }
-        Ended::Lost { error, .. } => {
-            return Err(error.hint("the unit may still be in its view, with scanning halted: X leaves it"));
+        Ended::Lost { outcome, error } => {
+            (outcome, Some(error.hint("the unit may still be in its view, with scanning halted: X leaves it")))
         }
     };
+    let stopped_by = match stopped_by {
+        Some(error) if !matches!(outcome, Outcome::DictionaryRead(_)) => return Err(error),
+        stopped_by => stopped_by,
+    };
+    let reading = talk.expect_reading(outcome).map_err(|error| match error.kind {
+        Kind::UnitRefused => error.hint(PRE_OPERATIONAL),
+        _ => error,
+    })?;
     let product = facts.product.as_ref().and_then(|known| Product::named(&known.value));
     let dump = Dump::of(&reading, product, &facts);
     let text = match format {
@@ -181,11 +182,13 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     }
     // That it is not everything counts, even if nobody reads the output any more.
     written.or_else(|error| if error.error.is::<Closed>() { Ok(()) } else { Err(error) })?;
-    if is_interrupted {
-        let message = format!("interrupted; the view has been left; entries read: {}", dump.entries.len());
-        return Err(CliError::message(Kind::Interrupted, message).hint("what was read is written all the same"));
+    match stopped_by {
+        Some(error) => {
+            let entries = dump.entries.len();
+            Err(error.hint(format!("what was read is written all the same; entries read: {entries}")))
+        }
+        None => Err(not_all(&reading, &dump, talk.is_recorded())),
     }
-    Err(not_all(&reading, &dump, talk.is_recorded()))
 }
 
 /// Whether the unit shows its field values (6100h), and not one of them has a value: first values take 3 s after the

@@ -62,13 +62,22 @@ impl Cable {
             self.retry_at = Some(now + Comeback::RETRY);
         }
         let rest = self.rest(inbox);
+        self.unplug(inbox);
+        rest
+    }
+
+    /// Closes the link for good; what it has brought and nobody has taken is forgotten.
+    pub fn close(mut self, inbox: &mut Inbox) {
+        self.unplug(inbox);
+    }
+
+    fn unplug(&mut self, inbox: &mut Inbox) {
         if let Some(connection) = self.connection.take() {
             let id = connection.id();
-            // An adapter whose old name is still open gets another one when it comes back.
+            // Its threads end here, and an adapter whose old name is still open gets another one when it comes back.
             drop(connection);
             inbox.forget(id);
         }
-        rest
     }
 
     /// Opens a lost link again if it is time to try, and it is back.

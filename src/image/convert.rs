@@ -78,6 +78,13 @@ pub fn convert(image: &Image, shape: &Shape) -> Result<Vec<u8>, ConvertError> {
         &kept
     };
     let entry = address_in(u64::from(image.entry) * u64::from(image.address_unit.bytes()), unit)?;
+    // Readers disagree where what runs past the last address goes on; an S-record keeps it as it is.
+    let ends = blocks.iter().map(|block| u64::from(block.address) + unit.addresses(block.data.len()));
+    if shape.format == Format::IntelHex
+        && let Some(end) = ends.max().filter(|&end| end > ADDRESSES)
+    {
+        return Err(ConvertError::TooHigh { address: end - 1 });
+    }
     let mut file = File { bytes: Vec::new(), end: shape.line_end.text() };
     match shape.format {
         Format::SRecord => file.srecords(&image.header, blocks, entry),
@@ -189,6 +196,8 @@ impl File {
 
 /// Offsets a base has.
 const OFFSETS: u32 = 0x1_0000;
+/// Addresses a file can name.
+const ADDRESSES: u64 = 1 << 32;
 
 #[cfg(test)]
 mod tests {
@@ -281,6 +290,11 @@ mod tests {
         let to_words = shape(Format::SRecord, AddressUnit::Word);
         let odd = image(AddressUnit::Byte, 0, &[(3, &[1, 2])]);
         assert_eq!(convert(&odd, &to_words), Err(ConvertError::Odd { address: 3 }));
+        let past_the_end = image(AddressUnit::Word, 0, &[(0xFFFF_FFFF, &[1, 2, 3, 4])]);
+        let hex = shape(Format::IntelHex, AddressUnit::Word);
+        assert_eq!(convert(&past_the_end, &hex), Err(ConvertError::TooHigh { address: 0x1_0000_0000 }));
+        let last = image(AddressUnit::Word, 0, &[(0xFFFF_FFFF, &[1, 2])]);
+        assert!(convert(&last, &hex).is_ok());
         let entry = image(AddressUnit::Byte, 5, &[(0, &[1, 2])]);
         assert_eq!(convert(&entry, &to_words), Err(ConvertError::Odd { address: 5 }));
         for bytes in [0, 251, 255] {

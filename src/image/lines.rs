@@ -269,7 +269,7 @@ mod tests {
         }
     }
 
-    /// Is interrupted before each byte, and fails behind the last.
+    /// Is interrupted before each byte, and fails after the last.
     struct Interrupted(Vec<u8>, bool);
 
     impl Read for Interrupted {

@@ -122,7 +122,7 @@ mod tests {
             assert!(dialogue.shows_pages(at(second * 1000 + 10)));
         }
         dialogue.named();
-        assert!(!dialogue.shows_pages(at(99_500)), "the unit has started anew");
+        assert!(!dialogue.shows_pages(at(99_500)), "the unit has restarted");
         sent(&mut dialogue, at(100_000), b"s");
         assert!(dialogue.shows_pages(at(102_000)));
         assert!(!dialogue.owns(at(103_001), "noise") && !dialogue.shows_pages(at(103_001)));

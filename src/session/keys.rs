@@ -8,11 +8,6 @@ pub(super) const LONGEST_TYPED: usize = 16;
 
 const ESCAPE: u8 = 0x1B;
 
-/// Whether what comes in one piece may be words. A key that sends several characters begins with Escape.
-fn is_text(piece: &[u8]) -> bool {
-    !piece.contains(&ESCAPE)
-}
-
 /// One key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Key {
@@ -74,8 +69,19 @@ pub(super) enum TypedBy {
 pub(super) struct KeyReader {
     /// The key, D or L, after which what is typed is an answer: the `s` of `Yes` is not a key.
     question: Option<MenuKey>,
-    /// Characters that are not keys have come in the same piece, so an `l` is part of a word.
-    in_word: bool,
+    place: Place,
+}
+
+/// Where in a piece the next character is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Place {
+    /// Where an `l` is a key.
+    #[default]
+    Open,
+    /// After characters that are not keys, so an `l` is part of a word.
+    Word,
+    /// Within what one key sends that has no character: Escape, `[` or `O`, parameters, and a letter or `~`.
+    Escape,
 }
 
 impl KeyReader {
@@ -84,22 +90,20 @@ impl KeyReader {
         if bytes.len() > LONGEST_TYPED {
             return Typed::File;
         }
-        self.in_word = false;
-        let is_text = is_text(bytes);
-        Typed::Keys(bytes.iter().map(|&byte| self.key(byte, is_text)).collect())
+        self.place = Place::Open;
+        Typed::Keys(bytes.iter().map(|&byte| self.key(byte)).collect())
     }
 
     /// Reads what has been typed, and gives it in parts: Enter ends one, and so does an L of the menu.
     pub(super) fn strokes<'a>(&mut self, typed: &'a [u8], by: TypedBy) -> Vec<Stroke<'a>> {
         if by == TypedBy::Hand {
-            self.in_word = false;
+            self.place = Place::Open;
         }
-        let is_text = is_text(typed);
         let (mut strokes, mut rest) = (Vec::new(), typed);
         let mut length = 0;
         for &byte in typed {
             length += 1;
-            let (enter, opens) = match self.key(byte, is_text) {
+            let (enter, opens) = match self.key(byte) {
                 Key::Enter => (1, None),
                 Key::Menu(MenuKey::Load) => (0, Some(MenuKey::Load)),
                 Key::Menu(_) | Key::Leave | Key::Other => continue,
@@ -115,12 +119,12 @@ impl KeyReader {
         strokes
     }
 
-    fn key(&mut self, byte: u8, is_text: bool) -> Key {
+    fn key(&mut self, byte: u8) -> Key {
         let key = match byte.to_ascii_lowercase() {
             // Enter is CR; a script may send the line feeds of its file.
             b'\r' | b'\n' => Key::Enter,
             _ if self.question.is_some() && byte != ESCAPE => return Key::Other,
-            b'l' if self.in_word => Key::Other,
+            b'l' if self.place == Place::Word => Key::Other,
             b'm' => Key::Menu(MenuKey::Menu),
             b'v' => Key::Menu(MenuKey::View),
             b'd' => Key::Menu(MenuKey::Default),
@@ -134,10 +138,12 @@ impl KeyReader {
             Key::Menu(key @ (MenuKey::Default | MenuKey::Load)) => Some(key),
             _ => None,
         };
-        self.in_word = match key {
-            Key::Enter => false,
-            Key::Other => is_text,
-            Key::Menu(_) | Key::Leave => self.in_word,
+        self.place = match (self.place, key) {
+            _ if byte == ESCAPE => Place::Escape,
+            (Place::Escape, _) if matches!(byte, b'[' | b'O' | b';') || byte.is_ascii_digit() => Place::Escape,
+            (Place::Escape, _) | (_, Key::Enter) => Place::Open,
+            (_, Key::Other) => Place::Word,
+            (place, Key::Menu(_) | Key::Leave) => place,
         };
         key
     }
@@ -179,10 +185,10 @@ mod tests {
             pieces.iter().flat_map(|piece| reader.strokes(piece, by)).find_map(|stroke| stroke.opens)
         };
         let load = Some(MenuKey::Load);
-        for piece in ["l", "ml", "hello\rl", "\x1B[Al", "t1000\nl"] {
+        for piece in ["l", "ml", "hello\rl", "\x1B[Al", "\x1B[15~l", "he\x1BOPl", "t1000\nl"] {
             assert_eq!(opens(&[piece.as_bytes()], TypedBy::Hand), load, "{piece:?}");
         }
-        for piece in ["hello", "all", "S1l"] {
+        for piece in ["hello", "all", "S1l", "hello\x1BOP\x03"] {
             assert_eq!(opens(&[piece.as_bytes()], TypedBy::Hand), None, "{piece:?}");
         }
         // Keys come one at a time; a file goes on.

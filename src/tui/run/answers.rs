@@ -100,7 +100,7 @@ impl Console {
 
     /// Has the emulated unit do something.
     pub(super) fn order(&mut self, line: String) {
-        let refusal = match &self.link {
+        let refusal = match self.connection() {
             // The unit was on its link.
             None => "the unit is gone with its link, C starts a new one",
             Some(_) if self.orders.len() >= MOST_ORDERS => "too many orders wait for the unit",

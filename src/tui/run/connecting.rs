@@ -6,7 +6,7 @@ use super::Console;
 use super::answers::Found;
 use super::player::Player;
 use crate::host::clock;
-use crate::host::comeback::Comeback;
+use crate::host::comeback::{Cable, Comeback};
 use crate::host::link::{self, Connection, LinkError, LinkSpec};
 use crate::host::recorder::Recorder;
 use crate::host::replay::Recording;
@@ -83,8 +83,7 @@ impl Console {
         self.recorder = Recorder::start_ahead(&plan, &connection, self.clock, self.skew);
         let recording = self.recorder.path().map(|path| path.display().to_string());
         let options = link::Options { baud: self.world.baud };
-        self.comeback = Comeback::of(&spec, options);
-        self.link = Some(connection);
+        self.cable = Some(Cable::new(connection, Comeback::of(&spec, options)));
         let start_of_day = clock::day_before(self.clock.time_of_day(), self.skew);
         let opened = Input::LinkOpened(LinkInfo {
             link: name.to_owned(),
@@ -105,35 +104,27 @@ impl Console {
 
     /// The open link has ended by itself.
     pub(super) fn lose_link(&mut self, failure: Failure) {
+        let now = self.clock.now();
+        let Some(cable) = self.cable.as_mut().filter(|cable| cable.connection().is_some()) else { return };
+        let may_come_back = cable.may_come_back();
         // What the reader has brought since the writer noticed the loss, or before a write that was refused.
-        self.take_rest();
-        if self.link.is_none() {
-            return;
-        }
-        let recorder = std::mem::take(&mut self.recorder);
-        let mut comeback = self.comeback.take();
-        self.close_link();
-        if let Some(comeback) = &mut comeback {
-            comeback.lost();
-            self.recorder = recorder;
+        let rest = cable.lose(&mut self.inbox, now);
+        self.hand_in(rest, Input::Arrived);
+        if may_come_back {
             self.recorder.mark(self.now(), LINK_LOST);
-            self.retry = Some(self.clock.now() + Comeback::RETRY);
+        } else {
+            self.close_link();
         }
-        self.comeback = comeback;
         self.handle(Input::LinkGone(failure));
     }
 
-    /// Looks whether the lost link is there again.
+    /// Looks whether a lost link is there again, if it is time to look.
     pub(super) fn look_for_link(&mut self) {
-        let Some(comeback) = &self.comeback else { return self.retry = None };
-        let Some(connection) = comeback.open(self.clock, self.sender.clone()) else {
-            self.retry = Some(self.clock.now() + Comeback::RETRY);
-            return;
-        };
-        self.retry = None;
+        let now = self.clock.now();
+        let Some(cable) = &mut self.cable else { return };
+        let Some(connection) = cable.try_again(now, self.clock, &self.sender) else { return };
         let name = connection.port().to_owned();
         self.recorder.mark(self.now(), &format!("{LINK_BACK}as {name}"));
-        self.link = Some(connection);
         self.handle(Input::LinkBack(name));
     }
 
@@ -143,22 +134,22 @@ impl Console {
         let now = self.now();
         self.player = None;
         self.skew += now.since(self.now());
-        self.comeback = None;
-        self.retry = None;
-        if let Some(link) = self.link.take() {
-            let id = link.id();
-            // Its threads end here, and what they bring meanwhile is nobody's.
-            drop(link);
-            self.inbox.forget(id);
+        if let Some(cable) = self.cable.take() {
+            cable.close(&mut self.inbox);
         }
         self.recorder = Recorder::nothing();
     }
 
     /// Hands the app what the open link has brought and nobody has taken, as the last of it.
     fn take_rest(&mut self) {
-        if let Some(link) = &self.link {
-            let rest = self.inbox.rest(link.id());
+        if let Some(cable) = &self.cable {
+            let rest = cable.rest(&mut self.inbox);
             self.hand_in(rest, Input::Arrived);
         }
+    }
+
+    /// The open link.
+    pub(super) fn connection(&self) -> Option<&Connection> {
+        self.cable.as_ref().and_then(Cable::connection)
     }
 }

@@ -32,7 +32,7 @@ use crate::endpoint::Arrived;
 use crate::host;
 use crate::host::Inbox;
 use crate::host::clock::Clock;
-use crate::host::comeback::Comeback;
+use crate::host::comeback::Cable;
 use crate::host::link::{Connection, LinkError, LinkSpec};
 use crate::host::ports;
 use crate::host::recorder::{Plan, Recorder};
@@ -193,10 +193,8 @@ struct Console {
     answers: Answers,
     /// Orders to the emulated unit that it has not answered yet, oldest first.
     orders: VecDeque<PendingOrder>,
-    link: Option<Connection>,
-    /// What has to come back should the link be lost, and when it is looked for next once it is.
-    comeback: Option<Comeback>,
-    retry: Option<Instant>,
+    /// The link, which may be lost and come back.
+    cable: Option<Cable>,
     /// The last dial, by number: whatever an earlier one brings is no longer wanted.
     dial: u64,
     /// A recording that is being played.
@@ -238,10 +236,8 @@ impl Console {
             reporter,
             answers,
             orders: VecDeque::new(),
-            link: None,
+            cable: None,
             dial: 0,
-            comeback: None,
-            retry: None,
             player: None,
             skew: Duration::ZERO,
             recorder: Recorder::nothing(),
@@ -317,9 +313,7 @@ impl Console {
         if self.timer_at().is_some_and(|due| due <= now) {
             self.handle(Input::Timeout);
         }
-        if self.retry.is_some_and(|due| due <= now) {
-            self.look_for_link();
-        }
+        self.look_for_link();
         self.play();
     }
 
@@ -327,7 +321,8 @@ impl Console {
         let now = self.clock.now();
         let picture = self.app.is_dirty().then(|| self.pace.due());
         let played = self.player.as_ref().and_then(|player| player.wake_at(now));
-        let wake = [picture, self.retry, played, self.timer_at()].into_iter().flatten().min();
+        let retry = self.cable.as_ref().and_then(Cable::retry_at);
+        let wake = [picture, retry, played, self.timer_at()].into_iter().flatten().min();
         let patience = wake.unwrap_or(Instant::NEVER).since(now).min(LONGEST_WAIT);
         // The channel cannot be closed, since this struct holds a sender.
         let Ok(Some(input)) = self.inbox.next(patience) else { return };
@@ -437,7 +432,7 @@ impl Console {
             }
             Effect::DoNotOpen => self.dial += 1,
             Effect::Transmit(transmit) => {
-                if let Some(link) = &self.link
+                if let Some(link) = self.connection()
                     && let Err(error) = link.send(transmit.bytes)
                 {
                     let text = format!("{}: {error}", link.port());
@@ -464,7 +459,7 @@ impl Console {
             Effect::Play(playback) => self.steer(playback),
             Effect::Order(line) => self.order(line),
             Effect::Break => {
-                let sent = match &self.link {
+                let sent = match self.connection() {
                     Some(link) => link.send_break().map_err(|error| error.to_string()),
                     None => Err("no link is open".to_owned()),
                 };

@@ -9,6 +9,7 @@ use ratatui::crossterm::event::KeyCode;
 use super::answers::Found;
 use super::*;
 use crate::host::LinkId;
+use crate::host::comeback::Comeback;
 use crate::host::link::Options as LinkOptions;
 use crate::host::pty::Pty;
 
@@ -102,7 +103,7 @@ fn type_keys(console: &mut Console, keys: &str) {
 
 /// What the unit says over the open link just now.
 fn say(console: &Console, text: &str) {
-    let link = console.link.as_ref().expect("a link").id();
+    let link = console.connection().expect("a link").id();
     let bytes = host::Input::Bytes { link, at: console.clock.now(), bytes: text.into() };
     console.sender.send(bytes).expect("there is room");
 }
@@ -171,14 +172,15 @@ fn a_lost_link_is_looked_for_also_after_c_was_pressed_too_early() {
     plug_in();
     let mut console = console();
     type_keys(&mut console, &format!("1p{}\r", name.display()));
-    assert!(console.link.is_some());
+    assert!(console.connection().is_some());
     std::fs::remove_file(&name).expect("removed");
     console.lose_link(failure());
     type_keys(&mut console, "c");
-    assert!(console.link.is_none() && console.retry.is_some(), "there is nothing to open yet");
+    assert!(console.connection().is_none(), "there is nothing to open yet");
     plug_in();
+    std::thread::sleep(Comeback::RETRY);
     console.look_for_link();
-    assert!(console.link.is_some() && console.retry.is_none());
+    assert!(console.connection().is_some());
 }
 
 #[test]

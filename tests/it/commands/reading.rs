@@ -180,6 +180,20 @@ fn an_interrupt_in_the_middle_of_a_dump_leaves_the_view() {
 }
 
 #[test]
+fn what_was_read_before_the_cable_is_pulled_is_written_and_the_link_is_the_error() {
+    let world = World::new();
+    let fault = "unplug from-unit at byte 4000";
+    let unit = world.start(&["emulate", "axtc4co", "--link", "u1", "--fault", fault]);
+    unit.wait_out("serial: ");
+    let ran = world.run(&["dictionary", "dump", "--yes", "--port", "u1", "--out", "unit.json"], b"");
+    assert_eq!(ran.code, Some(3), "{}{}", ran.out, ran.err);
+    assert!(ran.err.contains("what was read is written all the same; entries read: "), "{}", ran.err);
+    let dump = json(&std::fs::read_to_string(world.path("unit.json")).expect("a dump"));
+    assert_eq!(dump["complete"], false);
+    assert!(dump["entries"].as_array().is_some_and(|entries| entries.len() > 10), "{dump}");
+}
+
+#[test]
 fn diagnostics_and_defaults_are_commands_of_their_own() {
     let world = World::new();
     let mut unit = world.start(&["emulate", "axrtd8co", "--link", "u1"]);

@@ -370,7 +370,7 @@ mod tests {
             ("S30A00000080112233445576\r", vec![0x2211, 0x4433, 0x7655], true),
         ] {
             let mut reader = Reader::new(Version::V1_3);
-            let reads: Vec<Read> = text.bytes().map(|character| reader.take(character, true)).flatten().collect();
+            let reads: Vec<Read> = text.bytes().flat_map(|character| reader.take(character, true)).collect();
             let said: Vec<&Read> = reads.iter().filter(|read| **read != Read::Nothing).collect();
             let end = if is_lost { &[][..] } else { &[&Read::End(Kind::Data)] };
             assert_eq!(said, [&[&Read::Words { address: 0x80, words }], end].concat(), "{text}");
