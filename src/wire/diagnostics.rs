@@ -56,7 +56,7 @@ fn of_cell(cell: &str, name: &mut Name, found: &mut Vec<Quantity>) {
     while let Some((word, is_equated)) = words.next() {
         let Some((value, decimals, glued)) = number(word) else {
             if word.contains(char::is_alphanumeric) || is_unit(word) {
-                label.push(word);
+                label.push(word.trim_end_matches(':'));
             }
             continue;
         };
@@ -106,7 +106,7 @@ fn words(cell: &str) -> Vec<(&str, bool)> {
     for (at, sign) in cell.char_indices().chain([(cell.len(), ' ')]) {
         let within_number = sign == ','
             && at > start
-            && is_digit(bytes.get(at - 1))
+            && matches!(bytes[at - 1], b'0'..=b'9' | b'+' | b'-')
             && is_digit(bytes.get(at + 1))
             && cell[start..at].bytes().all(|byte| byte.is_ascii_digit() || b"+-.,".contains(&byte));
         if !matches!(sign, ' ' | '\t' | '=' | ';' | ',') || within_number {
@@ -143,7 +143,14 @@ pub fn switch(line: &str) -> Option<bool> {
 /// A word without the signs around it.
 fn bare(word: &str) -> &str {
     let word = word.trim_matches(['(', ')', '[', ']', '<', '>', '*', '"', '\'']);
-    word.trim_end_matches([':', '.']).trim_start_matches([':', '.'])
+    // `RTD 5:` names something; a number alone does not end with a colon.
+    let is_ordinal = word.strip_suffix(':').is_some_and(|digits| digits.bytes().all(|digit| digit.is_ascii_digit()));
+    let word = if is_ordinal { word } else { word.trim_end_matches([':', '.']) };
+    let inner = word.trim_start_matches([':', '.']);
+    // `.5` is a number, and `....5` leads to one.
+    let dots = word.len() - inner.len();
+    let is_fraction = dots == 1 && word.starts_with('.') && inner.starts_with(|first: char| first.is_ascii_digit());
+    if is_fraction { word } else { inner }
 }
 
 /// A decimal number, the digits after its point, and a unit that is glued to it: `24.1V`. With a comma it has a value
@@ -254,6 +261,12 @@ mod tests {
             ("╔══════════════╗", vec![]),
             ("TC1,24.5,C", vec![quantity("TC1", 24.5, Some("C"))]),
             ("Gain 1.5e-3 V", vec![quantity("Gain", 0.0015, Some("V"))]),
+            ("Load .5 A", vec![quantity("Load", 0.5, Some("A"))]),
+            ("Offset -.25 V", vec![quantity("Offset", -0.25, Some("V"))]),
+            ("Load ....5 A", vec![quantity("Load", 5.0, Some("A"))]),
+            ("Supply 2: ---", vec![]),
+            ("RTD 5: not ready", vec![]),
+            ("RTD 5: 23.5 C", vec![quantity("RTD 5", 23.5, Some("C"))]),
             ("Diagnostics   up 0:00:12", vec![]),
             ("CAN State  Pre-Operational", vec![]),
             ("12.5", vec![]),
@@ -276,6 +289,7 @@ mod tests {
             ("TC1: 1,919800E+02 ; 7440 ; 00h", vec![quantity("TC1", 191.98, None), quantity("TC1", 7440.0, None)]),
             ("Supply 24.1, cold 23.5", vec![quantity("Supply", 24.1, None), quantity("Supply cold", 23.5, None)]),
             ("Errors 1,2-4", vec![]),
+            ("Offset = -,5 V", vec![unknown("Offset", Some("V"))]),
             ("Code 1E5", vec![]),
             ("Supply 1.0e999 V", vec![unknown("Supply", Some("V"))]),
             ("Supply -1,0e999 V", vec![unknown("Supply", Some("V"))]),

@@ -44,6 +44,8 @@ pub(in crate::session) struct Collector {
     /// The same, each once: what a unit repeats hides no entry. And which of them came first.
     unread: BTreeSet<String>,
     first_unread: Option<String>,
+    /// Entries whose lines were among them.
+    unread_entries: BTreeSet<ObjectAddress>,
     /// Lines that were taken for the heading of an object, and have a number.
     headings: BTreeMap<u16, String>,
     /// All lines, as long as the product is not known: with it they say more. And whether they mean something else.
@@ -96,7 +98,8 @@ impl Collector {
             Some(_) => self.missing(),
             None => self.count(),
         };
-        let hides = missing > 0 && self.unread.len() >= missing.min(MANY_UNREAD);
+        let shows_one = self.unread_entries.iter().any(|at| !self.entries.contains_key(at));
+        let hides = missing > 0 && (shows_one || self.unread.len() >= missing.min(MANY_UNREAD));
         self.first_unread.as_ref().filter(|_| hides)
     }
 
@@ -154,7 +157,12 @@ impl Collector {
             }
             // The heading of a variable whose value is below it.
             (None, Some(_)) if line.sub.is_none() => Read::Understood,
-            (None, Some(_)) => Read::Nothing,
+            (None, Some(_)) => {
+                if may_be_an_entry(&line.rest) {
+                    self.unread_entries.insert(at);
+                }
+                Read::Nothing
+            }
             (None, None) => Read::PerhapsHeading,
         }
     }

@@ -80,8 +80,11 @@ pub fn value(rest: &str, expected: &Expected<'_>) -> Option<Reading> {
     let hexadecimal = unmarked_hexadecimal(&tokens, expected.data_type);
     let Some(place) = found.iter().map(|(place, _)| *place).min() else {
         // Nothing that could be read otherwise.
-        let [numeral] = hexadecimal[..] else { return None };
-        return Some(Reading { shown: Shown::Hexadecimal, numeral: numeral.to_owned(), plain: false });
+        return match hexadecimal[..] {
+            [numeral] => Some(Reading { shown: Shown::Hexadecimal, numeral: numeral.to_owned(), plain: false }),
+            [] => no_number(&tokens),
+            _ => None,
+        };
     };
     let mut meant = found.iter().filter(|(at, _)| *at == place).map(|(_, reading)| reading);
     let one = meant.next()?.clone();
@@ -98,12 +101,40 @@ pub fn value(rest: &str, expected: &Expected<'_>) -> Option<Reading> {
     Some(Reading { plain: plain && hexadecimal.is_empty(), ..one })
 }
 
+/// What stands for a value where the unit has no number: words without a digit after an equals sign, as in `= not set`, or
+/// signs alone at the end, as in `****`.
+fn no_number(tokens: &[Token<'_>]) -> Option<Reading> {
+    let nothing = |numeral: String| Some(Reading { shown: Shown::Nothing, numeral, plain: false });
+    let texts: Vec<&str> = tokens.iter().filter_map(|token| token.text).collect();
+    if let Some(at) = texts.iter().rposition(|text| text.contains('=')) {
+        let after = texts[at].rsplit_once('=').map_or("", |(_, after)| after);
+        let said = [&[after][..], &texts[at + 1..]].concat().join(" ");
+        let said = said.trim();
+        return if said.is_empty() || said.contains(|c: char| c.is_ascii_digit()) {
+            None
+        } else {
+            nothing(said.to_owned())
+        };
+    }
+    let signs = |text: &&str| text.len() >= 2 && text.bytes().all(|sign| matches!(sign, b'*' | b'?' | b'#'));
+    texts.last().copied().filter(signs).and_then(|signs| nothing(signs.to_owned()))
+}
+
+/// Whether what comes after a number says that the number belongs to a name: `Scaling 9: ...`, `Type 3 = ...`.
+fn is_in_name(text: &str, next: Option<&str>) -> bool {
+    (text.ends_with(':') && next.is_some()) || next.is_some_and(|next| next.starts_with('=') || next == ":")
+}
+
 /// Numbers that may be the value, with their places. `None` if one of them may be meant in another way.
 fn candidates(tokens: &[Token<'_>], expected: &Expected<'_>) -> Option<Vec<(Place, Reading)>> {
     let mut found = Vec::new();
     let mut place = Place::Anywhere;
     // The word directly before, whatever signs are between.
     let mut label = String::new();
+    // `3 -> 1` may mean either.
+    if tokens.iter().any(|token| matches!(token.text, Some("->" | "=>"))) {
+        return None;
+    }
     for (at, token) in tokens.iter().enumerate() {
         let Some(text) = token.text else {
             place = if place == Place::Equals { place } else { Place::Anywhere };
@@ -124,7 +155,9 @@ fn candidates(tokens: &[Token<'_>], expected: &Expected<'_>) -> Option<Vec<(Plac
         if is_with_comma(bare) && !text.starts_with(['(', '[']) {
             return None;
         }
-        if let Some(reading) = read(bare, expected) {
+        let next = tokens.get(at + 1).map(|token| token.text.unwrap_or_default());
+        let is_value = !is_in_name(text, next) && !is_before_signs(tokens, at);
+        if let Some(reading) = read(bare, expected).filter(|_| is_value) {
             let mut behind = tokens[at + 1..].iter().map(|token| token.text.unwrap_or_default());
             let (next, further) = (behind.next().unwrap_or_default(), behind.next().unwrap_or_default());
             // `500 min 0 max 65535` is about limits, and not about minutes.
@@ -140,7 +173,7 @@ fn candidates(tokens: &[Token<'_>], expected: &Expected<'_>) -> Option<Vec<(Plac
             }
         }
         place = match place {
-            _ if read(bare, expected).is_some() => Place::Anywhere,
+            _ if is_value && read(bare, expected).is_some() => Place::Anywhere,
             _ if word.ends_with(':') || (word.len() >= 2 && word.bytes().all(|sign| sign == b'.' || sign == b'_')) => {
                 Place::Colon
             }
@@ -153,6 +186,14 @@ fn candidates(tokens: &[Token<'_>], expected: &Expected<'_>) -> Option<Vec<(Plac
         }
     }
     Some(found)
+}
+
+/// Whether a number ends a name in a column of its own, and signs alone follow in the value's: `Scaling 9 | ****`.
+fn is_before_signs(tokens: &[Token<'_>], at: usize) -> bool {
+    let column = tokens[at].column;
+    let has_words_before = tokens[..at].iter().any(|token| token.column == column);
+    let mut later = tokens.iter().filter(|token| token.column > column).filter_map(|token| token.text);
+    has_words_before && later.next().is_some_and(|text| !text.contains(char::is_alphanumeric))
 }
 
 /// Whether a word before a number says that it is not the present value.
@@ -319,6 +360,16 @@ mod tests {
             ("TC1 = nan", Some(Shown::Nothing)),
             ("TC1 = 0xFFFFFFFF", Some(Shown::Nothing)),
             ("TC1 = ----", Some(Shown::Nothing)),
+            ("TC1 Scaling 9: ****", Some(Shown::Nothing)),
+            ("TC1 Scaling 9 = not set", Some(Shown::Nothing)),
+            ("TC1 Scaling 9 = ERROR", Some(Shown::Nothing)),
+            ("TC1 Scaling 9 = 12abc", None),
+            ("TC1 Scaling 9 = 1.5.2", None),
+            ("TC1 Scaling 9 = 3 -> 1", None),
+            ("TC1 Scaling 9 = 16.0", number(16.0)),
+            ("TC1 Scaling 9  ****", Some(Shown::Nothing)),
+            ("TC1 Scaling 9  16.0", number(16.0)),
+            ("TC1 Scaling 9: 16.0", number(16.0)),
             ("input 1 factor = 16.0", number(16.0)),
             ("input 1 factor 16.0", None),
             ("REAL32 RW -1000.0 1000.0 16.0", None),
