@@ -4,11 +4,11 @@ use serde::Serialize;
 
 use super::Global;
 use super::ask::confirm;
-use super::error::{CliError, Kind};
+use super::error::CliError;
 use super::link;
 use super::output::Output;
 use super::talk::Talk;
-use crate::session::{Awaited, Command, Outcome};
+use crate::session::{Command, Outcome};
 
 /// Arguments of `axcon defaults`.
 ///
@@ -40,16 +40,8 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
     talk.find_application()?;
     let outcome = talk.ask(Command::RestoreDefaults)?;
     let restart_seen = outcome != Outcome::DefaultsTaken;
-    let result = match outcome {
-        Outcome::NoAnswer { awaited: awaited @ Awaited::Banner, .. } => {
-            let message = format!("the answer Yes has been given, but {awaited}");
-            Err(CliError::message(Kind::NoAnswer, message)
-                .hint("'axcon identify' says whether the unit runs; 'axcon dictionary dump' shows its parameters"))
-        }
-        outcome => talk.expect_done(&outcome),
-    };
+    talk.expect_done(&outcome)?;
     let facts = talk.session().facts().clone();
-    result?;
     let product = facts.product.as_ref().map(|known| known.value.as_str());
     let version = facts.version.as_ref().map(|known| known.value.to_string());
     if output.json {

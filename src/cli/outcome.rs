@@ -101,6 +101,10 @@ fn unanswered(awaited: Awaited) -> CliError {
         Awaited::SourceQuestion | Awaited::PeriodQuestion => error
             .hint("no guess was made: the question was left with Enter. A unit that then takes a value of its own may keep it")
             .hint(BY_HAND),
+        Awaited::Banner | Awaited::NothingElse => {
+            CliError::message(Kind::NoAnswer, format!("the answer Yes has been given, but {awaited}"))
+                .hint("'axcon identify' says whether the unit runs; 'axcon dictionary dump' shows its parameters")
+        }
         Awaited::DefaultsQuestion => {
             error.hint("no guess was made: whatever the unit asked was answered with No").hint(BY_HAND)
         }

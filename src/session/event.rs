@@ -316,6 +316,9 @@ pub enum Awaited {
     /// The banner of a unit that restores its defaults.
     #[error("the banner after the reset did not come")]
     Banner,
+    /// The same, where the unit asked something other than for a Yes.
+    #[error("the unit asked something else after it and was answered No, so nobody can say what it has restored")]
+    NothingElse,
     /// Anything after V.
     #[error("the unit did not show its object dictionary")]
     Dictionary,

@@ -160,7 +160,8 @@ impl RestoreDefaults {
                     None
                 }
                 None => {
-                    let no_answer = self.no_answer(Awaited::Banner, desk);
+                    let is_asked = desk.pending.is_some();
+                    let no_answer = self.no_answer(if is_asked { Awaited::NothingElse } else { Awaited::Banner }, desk);
                     self.end_without_question(no_answer, desk)
                 }
             },

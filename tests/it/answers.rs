@@ -481,7 +481,7 @@ fn the_question_for_yes_is_answered_twice_at_most_and_only_a_banner_is_the_end()
     // It never comes back.
     let mut alone = Alone::with(&[("d", 3, question), ("Yes~", 50, question), ("Yes~", 50, question)]);
     let (outcome, time) = alone.ask(Command::RestoreDefaults);
-    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::Banner, heard: Some(_), .. }));
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::NothingElse, heard: Some(_), .. }));
     assert_eq!((alone.sent.len(), time), (4, alone.sent[2].0 + 10_000 + 1_500), "{}", alone.log());
     assert!(alone.log().ends_with(":No~"), "{}", alone.log());
 }
@@ -716,6 +716,9 @@ fn of_an_image_without_identity_nobody_says_that_it_is_what_the_unit_runs() {
     assert_eq!((report.verdict, report.proof), (Verdict::Done, Proof::Missing), "{report:?}");
     assert!(report.what.contains("cannot be told"), "{}", report.what);
     assert!(report.advice().starts_with("compare"), "{}", report.advice());
+    let (report, _, _) = end_of_an_upload_of(order(nameless_image("AXTC4CO")), &[(100, "AXRTD8CO V1.2.0\r\n")], &[]);
+    assert_eq!((report.verdict, report.unit), (Verdict::WrongApplication, UnitNow::Application), "{report:?}");
+    assert_eq!(report.what, "the unit runs AXRTD8CO V1.2.0, but the file was sent to an AXTC4CO");
     let (report, _, _) = end_of_an_upload(&[(100, "AXTC4CO V1.2.0\r\n")], &[]);
     assert_eq!((report.proof, report.what.as_str()), (Proof::Banner, "the unit runs AXTC4CO V1.2.0"));
 }

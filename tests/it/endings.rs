@@ -487,7 +487,7 @@ fn a_user_who_has_said_yes_is_sure_and_a_refusal_is_told_as_one() {
     let mut thrice = Asker { confirmations: 3, ..unit };
     let told = ask(&mut thrice, &Command::RestoreDefaults, Meanwhile::Nothing);
     assert!(
-        matches!(told.outcome, Outcome::NoAnswer { awaited: Awaited::Banner, heard: Some(_), .. }),
+        matches!(told.outcome, Outcome::NoAnswer { awaited: Awaited::NothingElse, heard: Some(_), .. }),
         "{:?}",
         told.outcome
     );

@@ -167,7 +167,7 @@ impl Diagnostics {
                 if desk.pending.is_some() {
                     desk.leave_dialogue();
                 }
-                return Some(self.no_answer(Awaited::Page));
+                return Some(self.no_answer(if self.taken > 0 { Awaited::NextPage } else { Awaited::Page }));
             }
             // They may only be late.
             Stage::Reading => {

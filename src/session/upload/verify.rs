@@ -124,17 +124,22 @@ impl Upload {
                     transfer.take_all_sent();
                 }
                 self.report_progress_of(Phase::Verify, desk);
-                match image {
-                    None => {
+                let others = self.product.clone().filter(|meant| !meant.eq_ignore_ascii_case(&product));
+                match (image, others) {
+                    (None, Some(meant)) => {
+                        let what = format!("{runs}, but the file was sent to an {meant}");
+                        self.end(desk, Verdict::WrongApplication, UnitNow::Application, what)
+                    }
+                    (None, None) => {
                         let what = format!(
                             "{runs}; whether that is what was sent cannot be told, since the file has no identity"
                         );
                         self.end(desk, Verdict::Done, UnitNow::Application, what)
                     }
-                    Some(sent) if sent.product.eq_ignore_ascii_case(&product) && sent.version == version => {
+                    (Some(sent), _) if sent.product.eq_ignore_ascii_case(&product) && sent.version == version => {
                         self.end(desk, Verdict::Done, UnitNow::Application, runs)
                     }
-                    Some(sent) => {
+                    (Some(sent), _) => {
                         let what = format!("{runs}, but {} V{} was sent", sent.product, sent.version);
                         self.end(desk, Verdict::WrongApplication, UnitNow::Application, what)
                     }
@@ -149,7 +154,8 @@ impl Upload {
                 None
             }
             _ if self.after.application => {
-                let what = "the file was sent and the unit runs, but which software is not known: it has not said so";
+                let what =
+                    "the file was sent and the unit runs, but which software it runs cannot be told from what it says";
                 self.end(desk, Verdict::Failed, UnitNow::Unknown, what)
             }
             _ => {
