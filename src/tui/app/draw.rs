@@ -8,6 +8,7 @@ use crate::session::Job;
 use crate::tui::frame;
 use crate::tui::keymap::{Binding, Cmd};
 use crate::tui::popup::{self, Popup, Question};
+use crate::tui::screens::bench::Bench;
 use crate::tui::screens::recordings::Recordings;
 use crate::tui::screens::stream::Stream;
 use crate::tui::screens::{Scene, ScreenId, overview};
@@ -56,6 +57,7 @@ impl App {
             ScreenId::Stream => Stream::footer(&self.view),
             ScreenId::Recordings => Recordings::footer(&self.view),
             ScreenId::Dictionary => self.dictionary.footer(&self.view),
+            ScreenId::Bench => Bench::footer(&self.view),
             screen => screen.bindings().to_vec(),
         };
         let meant = bindings.into_iter().filter(|binding| self.means_something(binding.cmd)).collect();

@@ -204,6 +204,7 @@ impl App {
             Input::Signal => self.leave(Next::Quit, &mut effects),
         }
         self.drain(&mut effects);
+        self.close_settled();
         self.go_on_leaving(&mut effects);
         effects
     }
@@ -245,13 +246,23 @@ impl App {
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
         self.now = self.now.max(now);
         self.view.fold(now, event, facts);
-        let is_over = matches!(event, Event::Finished(Outcome::Loaded(_)));
-        if is_over && matches!(self.popup, Some(Popup::Asking(Question::CancelLoad))) {
-            // There is nothing left to cancel, and what would come of it is not true any more.
-            self.popup = None;
-        }
+        self.close_settled();
         // A raw line alone changes the terminal, and whatever else shows it.
         self.dirty = true;
+    }
+
+    /// Closes a question about something that has ended meanwhile: there is nothing left to give up, and what would come
+    /// of it is not true any more.
+    fn close_settled(&mut self) {
+        let is_settled = match &self.popup {
+            Some(Popup::Asking(Question::CancelLoad)) => self.view.job != Some(Job::Load),
+            Some(Popup::Asking(Question::Quit)) => !self.view.would_be_left(),
+            _ => false,
+        };
+        if is_settled {
+            self.popup = None;
+            self.dirty = true;
+        }
     }
 
     /// Shows what went over the line.

@@ -40,6 +40,8 @@ impl App {
             }
             Action::ListFiles(directory) => effects.push(Effect::ListFiles(directory)),
             Action::CheckImage(path) => {
+                // It was about the file as it was, or about another one.
+                self.view.forget_notice();
                 let path = self.expanded(path);
                 self.load.check(path.clone());
                 let (loader, allow) = (self.load.loader(), self.load.allowed().to_vec());
@@ -192,12 +194,14 @@ impl App {
             Command::Keys(keys) if !session.password_open() => opens_view(keys),
             _ => None,
         };
+        let ends = matches!(command, Command::Cancel | Command::DiagnosticsOff);
         // A user who wants something else need not wait minutes for a slow stream's first row.
         if self.view.awaits_first_row() && !matches!(command, Command::Cancel) {
             let _ = session.command(self.now, Command::Cancel);
         }
         match session.command(self.now, command) {
             Ok(()) => {
+                self.view.is_ending = ends || (self.view.is_ending && job.is_none());
                 if let Some(job) = job {
                     self.view.job = Some(job);
                     self.view.forget_notice();

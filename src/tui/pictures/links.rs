@@ -353,6 +353,25 @@ fn a_refusal_stays_for_some_seconds_before_other_news() {
 }
 
 #[test]
+fn diagnostics_that_are_being_stopped_are_called_that() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("s").wait(2000).bytes(b"Supply: 24 V\r\nCurrent: 1 A\r\n").wait(1000);
+    stage.keys("v");
+    assert!(stage.shows("Not sent: the unit prints its diagnostics: S stops them first."), "{}", stage.picture());
+    stage.keys("sv");
+    assert!(stage.shows("Not sent: the diagnostics are being stopped: wait a moment."), "{}", stage.picture());
+}
+
+#[test]
+fn a_link_that_is_not_listed_says_whether_it_is_connected_now() {
+    let mut stage = Stage::with_ports(SMALL);
+    stage.press(KeyCode::Enter).opened("tcp://hall-4:4001").keys("1");
+    assert!(stage.shows("Connected now."), "{}", stage.picture());
+    stage.lost();
+    assert!(stage.shows("Connected last: the link is lost."), "{}", stage.picture());
+}
+
+#[test]
 fn the_bytes_of_a_new_connection_are_in_sight_wherever_the_hex_view_was_stopped() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("3").prefix().keys("h").press(KeyCode::Home);

@@ -66,6 +66,20 @@ fn leaving_a_unit_in_its_loader_says_what_it_waits_for() {
 }
 
 #[test]
+fn a_question_about_an_upload_says_what_is_true_once_it_has_ended_or_goes_with_it() {
+    let ended = |unit| Event::Finished(Outcome::Loaded(Box::new(report(Verdict::Failed, unit))));
+    let mut stage = Stage::loading(SMALL);
+    stage.keys("q");
+    assert!(stage.shows("Leave axcon?") && stage.shows("New software is being loaded."), "{}", stage.picture());
+    stage.fold(ended(UnitNow::Application));
+    assert!(stage.shows("── Verdict") && !stage.shows("Leave axcon?"), "{}", stage.picture());
+    let mut stage = Stage::loading(SMALL);
+    let in_loader = Facts { state: UnitState::Loader, ..Facts::default() };
+    stage.keys("q").fold_with(Event::FactsChanged, &in_loader).fold_with(ended(UnitNow::Loader), &in_loader);
+    assert!(stage.shows("Leave axcon?") && stage.shows("The unit waits in its loader"), "{}", stage.picture());
+}
+
+#[test]
 fn findings_that_are_all_in_sight_are_not_offered_to_be_moved() {
     let stage = Stage::connected(SMALL).with_image(nameless_image(&[]));
     assert!(stage.shows("one finding") && !stage.shows("↑↓ findings"), "{}", stage.picture());
@@ -281,6 +295,20 @@ fn enter_says_what_stands_against_an_upload() {
     let mut stage = Stage::connected(SMALL).with_image(bad_image());
     stage.press(KeyCode::Enter);
     assert!(stage.shows("Not started: the file has errors"), "{}", stage.picture());
+}
+
+#[test]
+fn what_stood_against_one_file_is_not_said_of_the_next() {
+    let for_another = ImageFacts { product: Some("AXRTD8CO".into()), ..good_image() };
+    let mut stage = Stage::connected(SMALL).with_image(for_another);
+    stage.press(KeyCode::Enter);
+    assert!(stage.shows("Not started: the file is for an AXRTD8CO"), "{}", stage.picture());
+    stage.press(KeyCode::Esc);
+    stage.input(Input::FilesListed { directory: "/home/service/images".into(), entries: Ok(files()) });
+    stage.click("AXTC4CO_V1.1.0").click("AXTC4CO_V1.1.0");
+    let path = "/home/service/images/AXTC4CO_V1.1.0.elf.S".into();
+    stage.input(Input::ImageChecked(Box::new(ImageFacts { path, ..good_image() })));
+    assert!(stage.shows("Enter start") && !stage.shows("Not started"), "{}", stage.picture());
 }
 
 /// A unit of this product that runs this version, or says nothing of it; the file is V1.2.0.

@@ -178,6 +178,18 @@ fn v_reads_no_dictionary_where_no_unit_is() {
 }
 
 #[test]
+fn a_dictionary_that_is_being_read_is_nowhere_said_to_wait_for_v() {
+    let mut stage = Stage::connected(SMALL);
+    stage.keys("v").press(KeyCode::Enter);
+    assert!(stage.shows("reading: 0 so far") && stage.shows("Value       being read"), "{}", stage.picture());
+    for key in ["e", "w"] {
+        stage.keys(key);
+        let picture = stage.picture();
+        assert!(picture.contains("is being read: wait until") && !picture.contains("V reads"), "{key}: {picture}");
+    }
+}
+
+#[test]
 fn a_file_without_a_name_is_sound_named_once_and_goes_if_the_user_answers_for_it() {
     let facts = nameless_image(&[]);
     assert_eq!(facts.defects.iter().filter(|text| text.contains("no-identity")).count(), 1, "{:?}", facts.defects);
@@ -233,6 +245,19 @@ fn keys_that_do_nothing_now_are_not_offered_and_say_why() {
     }
     let stage = Stage::with_ports(SMALL).with_image(good_image());
     assert!(!stage.shows("findings"), "{}", stage.picture());
+}
+
+#[test]
+fn a_bench_whose_unit_is_gone_takes_no_orders_and_offers_a_new_one() {
+    let mut stage = on_the_bench();
+    assert!(stage.shows("O open") && !stage.shows("C new unit"), "{}", stage.picture());
+    stage.lost().asked();
+    assert!(!stage.shows("O open") && stage.shows("C new unit"), "{}", stage.picture());
+    stage.keys("o").press(KeyCode::Enter);
+    assert_eq!(stage.asked(), []);
+    assert!(stage.shows("The emulated unit is gone with its link: C starts a new one."), "{}", stage.picture());
+    stage.click("C new unit");
+    assert!(stage.shows("as the factory made it"), "{}", stage.picture());
 }
 
 #[test]

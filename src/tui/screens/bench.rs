@@ -17,7 +17,7 @@ use crate::time::Instant;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::popup::Question;
-use crate::tui::view::View;
+use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 use crate::wire::stream::Source;
@@ -69,6 +69,10 @@ pub const BINDINGS: &[Binding] = &[
     },
 ];
 
+/// What the footer shows once the unit is gone with its link: nothing can be done to it any more.
+const LOST_KEYS: &[Binding] =
+    &[Binding { keys: &[Press::Plain(KeyCode::Char('c'))], cmd: Cmd::Reconnect, short: "new unit", long: "" }];
+
 /// What an arrow changes.
 const STEP: f64 = 10.0;
 /// Where a sensor begins whose temperature nobody knows.
@@ -77,6 +81,8 @@ const ROOM_TEMPERATURE: f64 = 20.0;
 const ORDER_COLUMNS: usize = 28;
 /// What there is to do where nothing is emulated.
 pub const NO_UNIT: &str = "No emulated unit is connected: press 1 and choose one.";
+/// What there is to do once the unit is gone with its link.
+const GONE: &str = "The emulated unit is gone with its link: C starts a new one.";
 /// Orders that are remembered.
 const KEPT_ORDERS: usize = 100;
 
@@ -139,6 +145,9 @@ impl Bench {
     /// What a command does here.
     pub fn on(&mut self, cmd: Cmd, view: &View) -> Option<Action> {
         let Some(product) = view.emulated() else { return Some(Action::Tell(NO_UNIT.to_owned())) };
+        if !view.can_send() && !matches!(cmd, Cmd::Up | Cmd::Down) {
+            return Some(Action::Tell(GONE.to_owned()));
+        }
         let last = usize::from(product.measurement.channels).saturating_sub(1);
         let number = self.input + 1;
         let warmer = |by: f64| {
@@ -162,6 +171,14 @@ impl Bench {
             _ => {}
         }
         None
+    }
+
+    /// The keys that mean something now, for the footer.
+    pub fn footer(view: &View) -> Vec<Binding> {
+        match view.link.state {
+            LinkState::Lost(_) => LOST_KEYS.to_vec(),
+            LinkState::Closed | LinkState::Opening | LinkState::Open => BINDINGS.to_vec(),
+        }
     }
 
     /// What the newest order that has not been answered yet sets an input to.

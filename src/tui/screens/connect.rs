@@ -303,9 +303,12 @@ impl Connect {
                 shown.push(text("Behaves as the manual says. Its password for loading software is AXIO-2010.".into()));
             }
             Entry::Recent(name) => {
-                shown.push(text(match scene.view.link.name.as_deref() == Some(*name) {
-                    true => "Connected now, or last.".into(),
-                    false => "Connected before, according to the recordings.".into(),
+                let is_ours = scene.view.link.name.as_deref() == Some(*name);
+                shown.push(text(match &scene.view.link.state {
+                    LinkState::Open if is_ours => "Connected now.".into(),
+                    LinkState::Opening if is_ours => "Being opened.".into(),
+                    LinkState::Lost(_) if is_ours => "Connected last: the link is lost.".into(),
+                    _ => "Connected before, according to the recordings.".into(),
                 }));
                 // Which folder that was is not recorded.
                 if name.contains('/') && !name.starts_with('/') && !name.contains("://") {

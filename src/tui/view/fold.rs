@@ -10,6 +10,7 @@ use crate::session::{
     Awaited, DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitNow, UnitState, Verdict, WalkEnd,
 };
 use crate::time::Instant;
+use crate::tui::visible::sentence;
 use crate::tui::widgets::format;
 use crate::wire::visible;
 
@@ -135,7 +136,7 @@ impl View {
                     self.dictionary_read(now, reading);
                 }
                 if is_cancelled {
-                    self.tell(Tone::Quiet, format!("Cancelled, {}.", Job::ReadDictionary.doing()));
+                    self.tell(Tone::Quiet, cancelled(Job::ReadDictionary));
                 }
             }
             Outcome::Identified => self.identified(),
@@ -180,7 +181,7 @@ impl View {
             Outcome::Cancelled(Job::Diagnostics) => {
                 self.tell_until(Refutation::Page, Tone::Quiet, done(Job::Diagnostics));
             }
-            Outcome::Cancelled(job) => self.tell(Tone::Quiet, format!("Cancelled, {}.", job.doing())),
+            Outcome::Cancelled(job) => self.tell(Tone::Quiet, cancelled(*job)),
             Outcome::FileSent { sent, total, end } => self.file_sent(*sent, *total, *end),
             Outcome::Loaded(report) => {
                 self.load.progress = None;
@@ -293,6 +294,10 @@ impl Refutation {
             Refutation::Stream => facts.stream.is_some(),
         }
     }
+}
+
+fn cancelled(job: Job) -> String {
+    format!("{} was cancelled.", sentence(job.doing()))
 }
 
 fn done(job: Job) -> &'static str {

@@ -38,6 +38,8 @@ pub struct View {
     pub facts: Facts,
     /// The job that runs.
     pub job: Option<Job>,
+    /// The job has been told to end, and is on its way to that.
+    pub is_ending: bool,
     /// The file that rows are written to.
     pub export: Option<Export>,
     /// After a lost link has come back: the unit of before, until it is known who is there now.
@@ -323,6 +325,7 @@ impl View {
     pub fn busy(&self) -> Option<&'static str> {
         match self.job.filter(|_| !self.awaits_first_row())? {
             Job::SendFile => Some("a file is being sent: Esc on the terminal screen stops it"),
+            Job::Diagnostics if self.is_ending => Some("the diagnostics are being stopped: wait a moment"),
             Job::Diagnostics => Some("the unit prints its diagnostics: S stops them first"),
             Job::Identify => Some("the unit is being asked who it is: wait a moment"),
             Job::ReadDictionary => Some("the object dictionary is being read: Esc on its screen cancels that"),

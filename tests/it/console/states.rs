@@ -175,7 +175,7 @@ fn reading_the_dictionary_is_cancelled_by_esc_and_the_unit_measures_again() {
     desk.keys("d");
     assert!(desk.picture().contains("Esc on its screen cancels that"), "{}", desk.picture());
     desk.press(KeyCode::Esc);
-    desk.wait_for("Cancelled, reading the object dictionary.");
+    desk.wait_for("Reading the object dictionary was cancelled.");
     assert!(desk.picture().contains("incomplete: "), "what was read of it is not all of it: {}", desk.picture());
     desk.run(Duration::from_secs(2)).keys("2");
     assert!(!desk.picture().contains("values are"), "{}", desk.picture());

@@ -66,6 +66,22 @@ fn a_cancelled_upload_can_be_sent_again_after_the_label_has_been_read() {
 }
 
 #[test]
+fn a_question_that_an_upload_has_outrun_goes_with_it() {
+    for key in [KeyCode::Char('q'), KeyCode::Esc] {
+        let mut desk = Desk::new();
+        desk.about_to_load().keys("AXIO-2010").press(KeyCode::Enter);
+        desk.wait_for("50 %");
+        desk.press(key);
+        let asked = desk.picture();
+        assert!(asked.contains("Leave axcon?") || asked.contains("Cancel the upload?"), "{asked}");
+        let verdict = desk.wait_for("after 1.2.0");
+        assert!(verdict.contains("Done") && !verdict.contains("╭"), "{verdict}");
+        desk.keys("q");
+        assert!(desk.over, "there is nothing left to ask: {}", desk.picture());
+    }
+}
+
+#[test]
 fn a_unit_that_loses_its_power_in_an_upload_is_not_said_to_wait() {
     let mut desk = Desk::new();
     desk.about_to_load().keys("AXIO-2010").press(KeyCode::Enter);

@@ -7,6 +7,7 @@ use super::row::Row;
 use super::{Scene, without_unit};
 use crate::device::dictionary::{Access, Bound, Entry, Limits};
 use crate::dump::{self, Measure};
+use crate::session::Job;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
@@ -52,6 +53,7 @@ impl Row<'_> {
             None => match &scene.view.unit.dictionary {
                 Some(read) if !read.reading.is_complete() => value = "not read: the reading was not completed".into(),
                 Some(_) => value = "not shown by the unit".into(),
+                None if scene.view.job == Some(Job::ReadDictionary) => value = "being read".into(),
                 None if scene.view.can_send() => value = "not read yet: V reads it".into(),
                 None => value = format!("not read. {}", without_unit(scene.view)),
             },

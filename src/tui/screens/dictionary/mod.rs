@@ -164,9 +164,12 @@ impl Dictionary {
                 self.words.clear();
             }
             Cmd::Compare | Cmd::Export if view.unit.dictionary.is_none() => {
-                let what = match view.can_send() {
-                    true => "Nothing has been read yet: V reads the object dictionary.".to_owned(),
-                    false => format!("Nothing has been read. {}", without_unit(view)),
+                let what = match view.job {
+                    Some(Job::ReadDictionary) => {
+                        "The object dictionary is being read: wait until it is complete.".to_owned()
+                    }
+                    _ if view.can_send() => "Nothing has been read yet: V reads the object dictionary.".to_owned(),
+                    _ => format!("Nothing has been read. {}", without_unit(view)),
                 };
                 return Some(Action::Tell(what));
             }
