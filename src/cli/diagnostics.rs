@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Global;
 use super::error::{CliError, Kind};
-use super::numbers::counted;
+use super::numbers::{self, counted};
 use super::output::Output;
 use super::talk::{Ended, Talk};
 use crate::session::{Command, Event};
@@ -16,7 +16,7 @@ use crate::wire::{diagnostics, visible};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// End after N pages. Exit code 130 if an interrupt comes first; without it an interrupt is the normal end.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = numbers::within::<u32>(1..=u64::from(u32::MAX)))]
     count: Option<u32>,
     /// How pages are written. JSON if --json is given: one object a page, with the numbers found on it.
     #[arg(long, value_enum)]

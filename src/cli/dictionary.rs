@@ -269,7 +269,14 @@ fn source(named: &str) -> Result<Dump, CliError> {
     })?;
     Dump::parse(named, &text).map_err(|error| {
         let no_dump = matches!(error, DumpError::Syntax { .. });
-        let error = CliError::new(Kind::Usage, error);
+        let error = match &error {
+            DumpError::Syntax { name, fault } if fault.is_syntax() || fault.is_eof() => {
+                let what = if fault.is_eof() { "the file ends before its JSON does" } else { "this is not JSON" };
+                let (line, column) = (fault.line(), fault.column());
+                CliError::message(Kind::Usage, format!("{name}:{line}:{column}: {what}"))
+            }
+            DumpError::Syntax { .. } | DumpError::Schema { .. } => CliError::new(Kind::Usage, error),
+        };
         if no_dump { error.hint("'axcon dictionary dump --format json --out FILE' writes one") } else { error }
     })
 }

@@ -106,8 +106,8 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     if let Some(note) = &unfinished {
         let Note { product, image, .. } = note;
         output.remark(&format!(
-            "axcon: an upload of {image} to the {product} on this port has not ended well; 'axcon load' with that image, \
-             or a newer one, brings the unit back"
+            "axcon: an upload of {image} to the {product} on this port has not ended well; 'axcon load' with an \
+             image made for the {product} brings it back"
         ));
     }
     let found = match facts.state {

@@ -88,7 +88,7 @@ pub struct Global {
     #[arg(long = "port", value_name = "LINK", env = "AXCON_PORT", global = true)]
     pub ports: Vec<String>,
     /// Line rate in baud; the units have 115200.
-    #[arg(long, value_name = "RATE", default_value_t = 115_200, global = true, value_parser = clap::value_parser!(u32).range(50..=12_000_000))]
+    #[arg(long, value_name = "RATE", default_value_t = 115_200, global = true, allow_negative_numbers = true, value_parser = numbers::within::<u32>(50..=12_000_000))]
     pub baud: u32,
     /// Data and errors as JSON; `terminal`, whose data is bytes, has none.
     #[arg(long, global = true)]
@@ -285,7 +285,7 @@ fn dispatch(cli: Cli, output: &mut Output) -> Result<(), CliError> {
         Some(Command::Emulate(args)) => emulate::run(args, global, output),
         Some(Command::Image(args)) => image::run(args, global, output),
         Some(Command::Completions(args)) => manual::completions(&args, output),
-        Some(Command::Man(args)) => manual::man(&args, output),
+        Some(Command::Man(args)) => manual::man(&args, global, output),
     }
 }
 

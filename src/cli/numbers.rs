@@ -1,4 +1,6 @@
-//! Numbers of things, as people read them.
+//! Numbers of things, as people read them, and as they write them on a command line.
+
+use std::ops::RangeInclusive;
 
 /// `1 error`, `2,000 errors`.
 pub fn counted(number: u64, what: &str) -> String {
@@ -25,6 +27,20 @@ pub fn grouped(number: u64) -> String {
     grouped
 }
 
+/// Reads a whole number of the command line that has to lie in this range. A refusal says which numbers are taken.
+pub fn within<T>(range: RangeInclusive<u64>) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static
+where
+    T: TryFrom<u64> + 'static,
+{
+    move |text: &str| {
+        let number = text.parse::<u64>().ok().filter(|number| range.contains(number));
+        number.and_then(|number| T::try_from(number).ok()).ok_or_else(|| match (*range.start(), *range.end()) {
+            (least, u64::MAX) => format!("it takes a whole number, {} or more", grouped(least)),
+            (least, most) => format!("it takes a whole number from {} to {}", grouped(least), grouped(most)),
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -35,6 +51,17 @@ mod tests {
         for (number, text) in table {
             assert_eq!(grouped(number), text);
         }
+    }
+
+    #[test]
+    fn a_number_outside_its_range_is_answered_with_the_range() {
+        let period = within::<u64>(1..=60_000);
+        assert_eq!([period("1"), period("60000")], [Ok(1), Ok(60_000)]);
+        for refused in ["0", "60001", "-1", "abc", "1.5", ""] {
+            assert_eq!(period(refused), Err("it takes a whole number from 1 to 60,000".into()), "{refused}");
+        }
+        assert_eq!(within::<u64>(1..=u64::MAX)("0"), Err("it takes a whole number, 1 or more".into()));
+        assert_eq!(within::<u8>(1..=250)("250"), Ok(250));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::files::Destination;
 use super::output::{Closed, Output};
 use super::stream::found::{leave_as_found, watch};
 use super::talk::{Ended, Talk};
-use super::{Global, link};
+use super::{Global, link, numbers};
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::host::clock;
@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// How long values are read.
-    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    #[arg(long, value_name = "S", default_value_t = 10, allow_negative_numbers = true, value_parser = numbers::within::<u64>(1..=3600))]
     seconds: u64,
     /// Leave the object dictionary out: while it is read, the unit may halt scanning and CAN.
     #[arg(long)]

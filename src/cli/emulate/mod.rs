@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use super::error::{CliError, Kind};
 use super::output::Output;
-use super::{Global, names};
+use super::{Global, names, numbers};
 use crate::device::{LoaderKind, Product};
 
 /// Arguments of `axcon emulate`.
@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     /// Word everything that the manuals leave open in another way for each SEED; further units get the next seeds.
-    #[arg(long, value_name = "SEED", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SEED", allow_negative_numbers = true, value_parser = numbers::within::<u64>(1..=u64::MAX))]
     dialect: Option<u64>,
     /// Which bootloader is in the unit, if not the product's own: g1, g2, g3, or g3-1.3, which hangs on odd data.
     #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
@@ -46,10 +46,10 @@ pub struct Args {
     #[arg(long = "fault", value_name = "SPEC", action = clap::ArgAction::Append)]
     faults: Vec<String>,
     /// So many units of each product.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=MOST_UNITS as i64))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = numbers::within::<u16>(1..=MOST_UNITS as u64))]
     count: u16,
     /// Decides everything that chance decides in a unit.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = numbers::within::<u64>(0..=u64::MAX))]
     seed: u64,
 }
 

@@ -12,7 +12,7 @@ use super::{allowable, checked, read, report_text, targets};
 use crate::cli::Global;
 use crate::cli::error::{CliError, Kind};
 use crate::cli::files::{Destination, shown};
-use crate::cli::numbers::counted;
+use crate::cli::numbers::{self, counted};
 use crate::cli::output::Output;
 use crate::image::{self, AddressUnit, ConvertError, DefectId, LineEnd, Report, Shape};
 
@@ -35,7 +35,7 @@ pub(super) struct Args {
     #[arg(long, value_enum)]
     address_unit: Option<UnitName>,
     /// Data bytes of a record, 250 at most; by default as they are.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=250))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = numbers::within::<u8>(1..=250))]
     record_bytes: Option<u8>,
     /// How lines end.
     #[arg(long, value_enum, default_value = "crlf")]

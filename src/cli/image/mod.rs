@@ -17,7 +17,7 @@ use super::error::{CliError, Kind};
 use super::files::{Destination, shown};
 use super::numbers::counted;
 use super::output::Output;
-use super::{Global, names};
+use super::{Global, names, numbers};
 use crate::device::{LoaderKind, Product};
 use crate::image::make::{self, Recipe};
 use crate::image::{self, DefectId, Report, Severity, Target};
@@ -79,7 +79,7 @@ struct MakeArgs {
     #[arg(long, value_name = "VERSION")]
     version: Version,
     /// Its size in 16-bit words; by default three quarters of the flash, 81,920 at most.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = numbers::within::<u32>(0..=u64::from(u32::MAX)))]
     words: Option<u32>,
     /// Give it this one defect.
     #[arg(long, value_name = "DEFECT", value_parser = flaw)]

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use serde::Serialize;
 
 use super::verdict::phase_name;
+use crate::cli::numbers::grouped;
 use crate::cli::output::Output;
 use crate::host::terminal;
 use crate::session::{Phase, Progress};
@@ -118,7 +119,8 @@ fn text(progress: &Progress, columns: usize) -> String {
     let Progress { records, records_total, bytes, bytes_total, address, .. } = *progress;
     let share = if bytes_total == 0 { 0.0 } else { bytes as f64 / bytes_total as f64 };
     let kilobytes = |bytes: usize| bytes.div_ceil(1000);
-    let mut members = vec![format!("{:>3.0} % {records}/{records_total} rec", share * 100.0)];
+    let (taken, total) = (grouped(records as u64), grouped(records_total as u64));
+    let mut members = vec![format!("{:>3.0} % {taken}/{total} rec", share * 100.0)];
     if records > 1 {
         members.push(format!("{address:#07x}"));
     }
@@ -293,8 +295,8 @@ mod tests {
     fn the_bar_takes_the_room_that_what_is_said_leaves() {
         let now = progress(10, 1_500, 121_371);
         let line = |columns| text(&now, columns);
-        assert_eq!(line(80), "transfer [####     ]  50 % 1500/3074 rec 0x0bfff 122/243 kB 12.1 kB/s 10 s left");
-        assert_eq!(line(60), "transfer  50 % 1500/3074 rec 0x0bfff 122/243 kB 12.1 kB/s 1");
+        assert_eq!(line(80), "transfer [###    ]  50 % 1,500/3,074 rec 0x0bfff 122/243 kB 12.1 kB/s 10 s left");
+        assert_eq!(line(60), "transfer  50 % 1,500/3,074 rec 0x0bfff 122/243 kB 12.1 kB/s");
         assert!(line(200).contains(&format!("[{}{}]", "#".repeat(15), " ".repeat(15))));
         for columns in 0..200 {
             let held = Progress { held: Some(Duration::from_secs(12)), ..now };

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use super::error::{CliError, Kind};
 use super::image as image_cli;
 use super::journal::Desk;
-use super::numbers::counted;
+use super::numbers::{counted, grouped};
 use super::outcome::no_answer_hints;
 use super::output::Output;
 use super::talk::{Ended, Talk};
@@ -17,10 +17,15 @@ use super::{Global, ask, files, link, names, password};
 use crate::device::{self, LoaderKind, Product};
 use crate::host::journal::Note;
 use crate::image::{CheckedImage, DefectId, Report, Software};
+use crate::record::Direction;
 use crate::secret::Secret;
 use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, UnitState};
+use crate::time::Duration;
 use meter::Meter;
 use verdict::{conclude, planned, refuse, would_be_refused};
+
+/// How long a failed upload waits at least for a loader to say that it is there.
+const SILENT: Duration = Duration::from_secs(2);
 
 /// Arguments of `axcon load`.
 ///
@@ -179,7 +184,7 @@ fn upload_over(
     let (result, lost) = send(talk, order, note, &journal, meter, output)?;
     journal.end(&result, output);
     let is_wrong_product = result.misfit == Some(DefectId::WrongProduct);
-    let concluded = conclude(&result, lost, report, talk.port(), output);
+    let concluded = conclude(&result, lost, is_silent(talk), report, talk.port(), output);
     match doubt.filter(|_| is_wrong_product) {
         Some(doubt) => concluded.map_err(|error| error.hint(doubt)),
         None => concluded,
@@ -241,6 +246,13 @@ fn send(
             Err(CliError::message(Kind::Failed, "the upload ended without a report"))
         }
     }
+}
+
+/// Whether nothing has come from the unit for as long as a loader that has power takes to say something.
+fn is_silent(talk: &Talk) -> bool {
+    let mut entries = talk.session().record().entries().rev();
+    let heard = entries.find(|entry| entry.direction == Direction::FromUnit).map(|entry| entry.at);
+    heard.is_none_or(|heard| talk.now().since(heard) >= SILENT)
 }
 
 /// Finds out the product of a unit whose menu does not name it: its object dictionary does.
@@ -399,7 +411,8 @@ fn plan(
         Some((facts, ..)) if facts.state == UnitState::Loader => "",
         Some(_) | None => "enter the loader, ",
     };
-    let records = size.map_or_else(String::new, |size| format!(" in {} records", size.records_total));
+    let records = size.map_or_else(String::new, |size| format!(" in {}", counted(size.records_total as u64, "record")));
+    let characters = grouped(characters);
     say(format!(
         "plan   {enter}send {characters} characters{records} (some {seconds:.0} s), then trust only the new banner"
     ))

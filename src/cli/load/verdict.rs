@@ -4,11 +4,15 @@ use serde::Serialize;
 
 use crate::cli::error::{CliError, Kind};
 use crate::cli::image::{self as image_cli, DefectObject};
-use crate::cli::numbers::counted;
+use crate::cli::numbers::{counted, grouped};
 use crate::cli::outcome::no_answer_hints;
 use crate::cli::output::{Closed, Output};
 use crate::image::{DefectId, Report};
 use crate::session::{Facts, LoadReport, Phase, UnitNow, UnitState, Verdict};
+
+/// What to do about a unit of which nothing has been heard since it had a part of the file, as the console says it.
+const SEE_POWER: &str = "the unit is silent: in its loader, or without power; see that it has power and that the cable is \
+                         in, and send the file again: it has no complete software and comes back to its loader";
 
 #[derive(Serialize)]
 struct LoadObject<'a> {
@@ -137,16 +141,17 @@ pub fn would_be_refused(
     CliError::found(Some(Kind::ImageRefused), written)
 }
 
-/// Says how it went, and what to do next.
+/// Says how it went, and what to do next. `is_silent`: at its end nothing was heard of the unit any more.
 pub fn conclude(
     report: &LoadReport,
     lost: Option<CliError>,
+    is_silent: bool,
     image: &Report,
     port: &str,
     output: &mut Output,
 ) -> Result<(), CliError> {
     let kind = exit_kind(report, lost.is_some());
-    let next = next_step(report);
+    let next = next_step(report, is_silent || lost.is_some());
     let next = next.as_str();
     if output.json {
         let written = output.object(&LoadObject {
@@ -187,8 +192,7 @@ pub fn conclude(
     };
     let mut error = CliError::message(kind, report.what.clone());
     if report.records > 0 && report.verdict != Verdict::WrongApplication {
-        let address = report.address.map_or_else(String::new, |address| format!(", address {address:#06x}"));
-        error = error.hint(format!("sent: {} of {} records{address}", report.records, report.records_total));
+        error = error.hint(sent(report));
     }
     if !report.heard.is_empty() {
         error = error.hint(format!("last heard: \"{}\"", report.heard));
@@ -208,9 +212,17 @@ pub fn conclude(
     Err(error.hint(next))
 }
 
+/// How much of the file has left.
+fn sent(report: &LoadReport) -> String {
+    let (records, total) = (grouped(report.records as u64), counted(report.records_total as u64, "record"));
+    let address = report.address.map_or_else(String::new, |address| format!(", address {address:#06x}"));
+    format!("sent: {records} of {total}{address}")
+}
+
 /// What to do next, and how it is said on a command line.
-fn next_step(report: &LoadReport) -> String {
-    let advice = report.advice();
+fn next_step(report: &LoadReport, is_silent: bool) -> String {
+    let is_in_the_middle = report.verdict == Verdict::Failed && report.unit == UnitNow::Loader && report.records > 0;
+    let advice = if is_silent && is_in_the_middle { SEE_POWER } else { report.advice() };
     match (report.verdict, &report.product) {
         (Verdict::Refused, None) => format!("{advice}: --product NAME, for example --product AXTC4CO"),
         _ => advice.to_owned(),
@@ -289,9 +301,8 @@ mod tests {
     use crate::session::Proof;
     use crate::time::Duration;
 
-    #[test]
-    fn a_user_who_has_to_name_the_product_is_told_how() {
-        let report = LoadReport {
+    fn refused() -> LoadReport {
+        LoadReport {
             verdict: Verdict::Refused,
             proof: Proof::Banner,
             phase: Phase::Check,
@@ -309,9 +320,37 @@ mod tests {
             heard: String::new(),
             misfit: None,
             remark: None,
-        };
-        assert!(next_step(&report).contains("--product NAME"), "{}", next_step(&report));
+        }
+    }
+
+    #[test]
+    fn a_user_who_has_to_name_the_product_is_told_how() {
+        let report = refused();
+        assert!(next_step(&report, false).contains("--product NAME"), "{}", next_step(&report, false));
         let other = LoadReport { product: Some("AXTC4CO".into()), ..report };
-        assert!(!next_step(&other).contains("--product"), "{}", next_step(&other));
+        assert!(!next_step(&other, false).contains("--product"), "{}", next_step(&other, false));
+    }
+
+    #[test]
+    fn records_are_told_with_their_thousands_apart() {
+        let report = LoadReport { records: 1_117, records_total: 1_252, address: Some(0xa0), ..refused() };
+        assert_eq!(sent(&report), "sent: 1,117 of 1,252 records, address 0x00a0");
+    }
+
+    #[test]
+    fn a_unit_that_is_silent_with_a_part_of_the_file_is_not_said_to_wait_in_its_loader() {
+        let next = |verdict, unit, records, is_silent| {
+            next_step(&LoadReport { verdict, unit, records, ..refused() }, is_silent)
+        };
+        assert_eq!(next(Verdict::Failed, UnitNow::Loader, 9, true), SEE_POWER);
+        for (verdict, unit, records, is_silent) in [
+            (Verdict::Failed, UnitNow::Loader, 9, false),
+            (Verdict::Failed, UnitNow::Loader, 0, true),
+            (Verdict::Failed, UnitNow::Unknown, 9, true),
+            (Verdict::Interrupted, UnitNow::Loader, 9, true),
+        ] {
+            let advice = next(verdict, unit, records, is_silent);
+            assert!(!advice.contains("is silent"), "{verdict:?} {unit:?} {records} {is_silent}: {advice}");
+        }
     }
 }

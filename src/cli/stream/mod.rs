@@ -14,7 +14,7 @@ use super::files::Destination;
 use super::numbers::counted;
 use super::output::{Closed, Output};
 use super::talk::{Ended, Talk};
-use super::{Global, link};
+use super::{Global, link, numbers};
 use crate::device::Product;
 use crate::session::{Command, Event, Outcome};
 use crate::time::{BITS_PER_CHARACTER, Duration, Instant};
@@ -33,16 +33,16 @@ pub struct Args {
     #[arg(long, value_enum)]
     source: Option<SourceName>,
     /// Repetition time in ms.
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
+    #[arg(long, value_name = "MS", allow_negative_numbers = true, value_parser = numbers::within::<u64>(1..=60_000))]
     period: Option<u64>,
-    /// How rows are written. Otherwise FILE's ending says so (.csv, .jsonl), or --json.
+    /// How rows are written. Otherwise FILE's ending says so (.csv, .jsonl, .raw), or --json.
     #[arg(long, value_enum)]
     format: Option<Format>,
     /// Write to FILE instead of standard output. It is made with the first row; an existing one needs --yes.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// End after N rows. Exit code 130 if an interrupt comes first, as with --duration; without both it is the normal end.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = numbers::within::<u64>(1..=u64::MAX))]
     count: Option<u64>,
     /// End S seconds after the first row.
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
@@ -51,7 +51,7 @@ pub struct Args {
     #[arg(long)]
     keep: bool,
     /// How long to wait for an adapter that was pulled out before giving up; 0 gives up at once.
-    #[arg(long, value_name = "S", default_value_t = 10)]
+    #[arg(long, value_name = "S", default_value_t = 10, allow_negative_numbers = true, value_parser = numbers::within::<u64>(0..=u64::MAX))]
     reconnect: u64,
     /// Switch the stream off and do nothing else.
     #[arg(long, conflicts_with_all = ["source", "period", "format", "out", "count", "duration", "keep"])]

@@ -27,6 +27,7 @@ impl Format {
         match file.extension()?.to_str()?.to_lowercase().as_str() {
             "csv" => Some(Format::Csv),
             "jsonl" | "ndjson" => Some(Format::Jsonl),
+            "raw" => Some(Format::Raw),
             _ => None,
         }
     }

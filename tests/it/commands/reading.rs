@@ -49,6 +49,13 @@ fn the_stream_is_written_as_csv_and_json_and_left_as_it_was() {
     assert_eq!(bench.run(&["stream", "--off"]).code, Some(0));
     let ran = bench.run(&["stream", "--period", "100", "--count", "1"]);
     assert!(ran.out.contains("Z,fv,"), "the default after the stream was off: {}", ran.out);
+    // A file's ending says how rows are written; one that says nothing gets CSV.
+    for (name, is_csv) in [("rows.raw", false), ("rows.txt", true)] {
+        let ran = bench.run(&["stream", "--period", "100", "--count", "1", "--out", name]);
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        let rows = fs::read(bench.world.path(name)).expect("rows");
+        assert_eq!(rows.starts_with(b"time,source,"), is_csv, "{name}");
+    }
 }
 
 #[test]
@@ -111,6 +118,16 @@ fn a_dictionary_is_dumped_compared_and_its_deviations_are_named() {
     let bad = world.run(&["dictionary", "diff", "other.json", "factory:axtc4co"], b"");
     let said = "axcon: other.json:1:8: this is not a dump: missing field `schema`\n";
     assert!(bad.err.starts_with(said), "what is wrong once, and its place once: {}", bad.err);
+    for (text, said) in
+        [("time,source,CJ\n", ": this is not JSON\n"), ("{\n\"a\": [", ": the file ends before its JSON does\n")]
+    {
+        fs::write(world.path("values.csv"), text).expect("written");
+        let bad = world.run(&["dictionary", "diff", "one.json", "values.csv"], b"");
+        assert_eq!(bad.code, Some(2), "{}", bad.err);
+        let place = format!("axcon: values.csv:{}:", text.lines().count());
+        assert!(bad.err.starts_with(&place) && bad.err.contains(said), "{}", bad.err);
+        assert!(bad.err.contains("dictionary dump --format json"), "{}", bad.err);
+    }
     let unasked = world.run(&["dictionary", "dump", "--port", "u1"], b"");
     assert_eq!(unasked.code, Some(2), "{}", unasked.err);
 }
@@ -371,6 +388,20 @@ fn what_is_no_text_on_standard_input_ends_no_emulator() {
 }
 
 #[test]
+fn man_pages_that_are_there_are_replaced_only_if_somebody_says_yes() {
+    let world = World::new();
+    assert_eq!(world.run(&["man", "--out", "pages"], b"").code, Some(0));
+    let page = world.path("pages/axcon-load.1");
+    fs::write(&page, "somebody's own").expect("written");
+    let kept = world.run(&["man", "--out", "pages"], b"");
+    assert_eq!(kept.code, Some(2), "{}", kept.err);
+    assert!(kept.err.contains(" exists already"), "{}", kept.err);
+    assert_eq!(fs::read_to_string(&page).expect("a page"), "somebody's own");
+    assert_eq!(world.run(&["man", "--out", "pages", "--yes"], b"").code, Some(0));
+    assert!(fs::read_to_string(&page).expect("a page").contains(".TH "));
+}
+
+#[test]
 fn an_option_that_would_be_ignored_is_refused() {
     let world = World::new();
     for (args, complaint) in [
@@ -392,6 +423,29 @@ fn an_option_that_would_be_ignored_is_refused() {
     let mut command = world.command(&["ports"]);
     command.env("AXCON_PORT", "u0");
     assert_eq!(Running::start(command).wait().code, Some(0));
+}
+
+#[test]
+fn a_number_that_is_not_taken_is_answered_with_those_that_are() {
+    let world = World::new();
+    for (args, complaint) in [
+        (&["stream", "--reconnect", "-1"][..], "'-1' for '--reconnect <S>': it takes a whole number, 0 or more"),
+        (&["stream", "--count", "-1"], "'-1' for '--count <N>': it takes a whole number, 1 or more"),
+        (&["stream", "--period", "abc"], "'abc' for '--period <MS>': it takes a whole number from 1 to 60,000"),
+        (&["report", "--out", "r.html", "--seconds", "-1"], "it takes a whole number from 1 to 3,600"),
+        (&["diagnostics", "--count", "0"], "it takes a whole number from 1 to 4,294,967,295"),
+        (
+            &["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "-5"],
+            "'-5' for '--words <N>': it takes a whole number from 0 to 4,294,967,295",
+        ),
+        (&["emulate", "axtc4co", "--seed", "-1"], "'-1' for '--seed <N>': it takes a whole number, 0 or more"),
+        (&["emulate", "axtc4co", "--count", "257"], "it takes a whole number from 1 to 256"),
+        (&["identify", "--baud", "49"], "it takes a whole number from 50 to 12,000,000"),
+    ] {
+        let ran = world.run(args, b"");
+        assert_eq!(ran.code, Some(2), "{args:?}: {}", ran.err);
+        assert!(ran.err.contains(complaint), "{args:?}: {}", ran.err);
+    }
 }
 
 #[test]
