@@ -119,8 +119,7 @@ impl Console {
     }
 
     /// Looks whether a lost link is there again, if it is time to look.
-    pub(super) fn look_for_link(&mut self) {
-        let now = self.clock.now();
+    pub(super) fn look_for_link(&mut self, now: Instant) {
         let Some(cable) = &mut self.cable else { return };
         let Some(connection) = cable.try_again(now, self.clock, &self.sender) else { return };
         let name = connection.port().to_owned();

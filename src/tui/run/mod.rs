@@ -313,7 +313,7 @@ impl Console {
         if self.timer_at().is_some_and(|due| due <= now) {
             self.handle(Input::Timeout);
         }
-        self.look_for_link();
+        self.look_for_link(now);
         self.play();
     }
 

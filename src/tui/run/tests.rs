@@ -9,7 +9,6 @@ use ratatui::crossterm::event::KeyCode;
 use super::answers::Found;
 use super::*;
 use crate::host::LinkId;
-use crate::host::comeback::Comeback;
 use crate::host::link::Options as LinkOptions;
 use crate::host::pty::Pty;
 
@@ -176,11 +175,13 @@ fn a_lost_link_is_looked_for_also_after_c_was_pressed_too_early() {
     std::fs::remove_file(&name).expect("removed");
     console.lose_link(failure());
     type_keys(&mut console, "c");
+    let retry = |console: &Console| console.cable.as_ref().and_then(Cable::retry_at);
+    let next = retry(&console).expect("it is looked for");
+    console.look_for_link(next);
     assert!(console.connection().is_none(), "there is nothing to open yet");
     plug_in();
-    std::thread::sleep(Comeback::RETRY);
-    console.look_for_link();
-    assert!(console.connection().is_some());
+    console.look_for_link(retry(&console).expect("it is looked for again"));
+    assert!(console.connection().is_some() && retry(&console).is_none());
 }
 
 #[test]
