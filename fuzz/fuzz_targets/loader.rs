@@ -98,6 +98,8 @@ fuzz_target!(|input: &[u8]| {
     if patient || loader.pacing() == Pacing::Pages {
         let sent: Vec<u8> = pieces(bytes).into_iter().flat_map(|(_, piece)| piece).collect();
         check_words(host.unit.flash(), &candidates(&sent, loader, product.flash.program_words), loader);
+    } else if !bytes.iter().any(|byte| byte.eq_ignore_ascii_case(&b'S')) {
+        assert!(host.unit.flash().iter().all(|&byte| byte == 0xFF), "a word from nowhere");
     }
     // The supply fails in the middle of whatever is under way.
     host.unit.power_off(host.now);

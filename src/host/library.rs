@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::recorder::ENDING;
 use super::recording_file;
+use super::regular;
 use super::replay::{Recording, RecordingError};
 use crate::record::Header;
 use crate::time::Duration;
@@ -72,15 +73,14 @@ pub fn look(path: PathBuf) -> Option<Listed> {
     let (bytes, content) = match fs::metadata(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
         Err(error) => (0, Err(error.to_string())),
-        // To open anything else, a pipe without a writer for example, may wait for ever.
-        Ok(metadata) if !metadata.is_file() => (0, Err("it is not a plain file".to_owned())),
+        Ok(metadata) if !metadata.is_file() => (0, Err(regular::NOT_REGULAR.to_owned())),
         Ok(metadata) => (metadata.len(), content(&path)),
     };
     Some(Listed { path, bytes, content })
 }
 
 fn content(path: &Path) -> Result<Content, String> {
-    let header = Recording::open(path).map_err(reason)?.header().clone();
+    let header = Recording::open_file(path).map_err(reason)?.header().clone();
     let length = length(path).ok().flatten();
     Ok(Content { header, length, is_being_written: recording_file::is_being_written(path) })
 }
@@ -141,7 +141,7 @@ mod tests {
         );
         let why = seen[0].as_ref().expect_err("no recording");
         assert!(why.starts_with("line 1: "), "{why}");
-        assert_eq!(seen[3], Err(&"it is not a plain file".to_owned()));
+        assert_eq!(seen[3], Err(&"it is not a regular file".to_owned()));
         assert_eq!((found.listed.len(), found.older), (4, 0));
         assert_eq!(list(&folder.path().join("nowhere")).expect("empty"), Library::default());
     }

@@ -15,6 +15,7 @@ pub mod port_link;
 pub mod ports;
 pub mod pump;
 pub mod recorder;
+pub mod regular;
 pub mod replay;
 pub mod save;
 pub mod signal;

@@ -1,10 +1,11 @@
 //! A recording as a link: what was said, piece by piece, from a file that is never held whole in memory.
 
 use std::collections::VecDeque;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use super::regular;
 use crate::record::{Ending, Header, Piece, ReadError, Reader};
 
 /// A recording being read.
@@ -41,21 +42,6 @@ pub enum RecordingError {
     },
 }
 
-/// Opens a regular file. Opening anything else may wait for ever, as for a pipe that nobody writes to.
-///
-/// # Errors
-/// If there is no such file, it is something else, or it may not be read.
-pub fn open_regular(path: &Path) -> io::Result<File> {
-    let metadata = fs::metadata(path)?;
-    if metadata.is_dir() {
-        Err(io::ErrorKind::IsADirectory.into())
-    } else if metadata.is_file() {
-        File::open(path)
-    } else {
-        Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"))
-    }
-}
-
 fn open_any(path: &Path) -> io::Result<File> {
     let file = File::open(path)?;
     if file.metadata()?.is_dir() { Err(io::ErrorKind::IsADirectory.into()) } else { Ok(file) }
@@ -78,7 +64,7 @@ impl Recording {
     /// # Errors
     /// If there is no such file, it is not a regular one, or it is not a recording.
     pub fn open_file(path: &Path) -> Result<Self, RecordingError> {
-        Recording::read_head(path, open_regular)
+        Recording::read_head(path, regular::open)
     }
 
     fn read_head(path: &Path, open: fn(&Path) -> io::Result<File>) -> Result<Self, RecordingError> {

@@ -83,7 +83,11 @@ pub fn save(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), SaveError>
 /// Gives a file its name, unless there is one of that name, which another process may have made a moment ago.
 fn put(beside: &Path, place: &Path) -> io::Result<()> {
     match fs::hard_link(beside, place) {
-        Ok(()) => fs::remove_file(beside),
+        // The file has its name; that it has another one as well is nobody's loss.
+        Ok(()) => {
+            let _ = fs::remove_file(beside);
+            Ok(())
+        }
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(error),
         Err(_) => put_without_links(beside, place),
     }

@@ -11,8 +11,8 @@ use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use rustix::event::PollFlags;
@@ -39,8 +39,8 @@ pub struct Lines {
     reader: Option<JoinHandle<()>>,
     writer: Option<JoinHandle<()>>,
     written: Receiver<()>,
-    /// Disconnected when no break is under way. The first half is copied to the threads that send one.
-    breaks: (Option<SyncSender<Infallible>>, Receiver<Infallible>),
+    /// Disconnected when the last break has ended.
+    last_break: Mutex<Option<Receiver<Infallible>>>,
 }
 
 /// Bytes read at once: Linux hands out no more than 4 KiB of a terminal's bytes at a time.
@@ -78,21 +78,28 @@ pub fn open(
             let _ = done.try_send(());
         })
         .map_err(system)?;
-    let (breaking, ended) = sync_channel(0);
-    let breaks = (Some(breaking), ended);
-    let lines = Lines { port, stopper: Some(stopper), reader: Some(reader), writer: Some(writer), written, breaks };
+    let last_break = Mutex::new(None);
+    let lines = Lines { port, stopper: Some(stopper), reader: Some(reader), writer: Some(writer), written, last_break };
     Ok((lines, outgoing))
 }
 
 impl Lines {
     /// Sends a break, from a thread: the system waits for its end.
     pub fn send_break(&self) -> io::Result<()> {
-        let (port, breaking) = (self.port.clone(), self.breaks.0.clone());
+        let mut last = self.last_break.lock().unwrap_or_else(PoisonError::into_inner);
+        // A driver that does not end one must not collect a thread for each key.
+        if last.as_ref().is_some_and(|ended| ended.try_recv() == Err(TryRecvError::Empty)) {
+            return Err(io::Error::new(io::ErrorKind::ResourceBusy, "the break before it has not ended"));
+        }
+        let (breaking, ended) = sync_channel(0);
+        let port = self.port.clone();
         let send = move || {
             let _ = tcsendbreak(&*port);
             drop((port, breaking));
         };
-        thread::Builder::new().name("break".into()).spawn(send).map(drop)
+        thread::Builder::new().name("break".into()).spawn(send)?;
+        *last = Some(ended);
+        Ok(())
     }
 
     /// Ends the threads: what is queued, and what the driver has, may leave for this long, then everything stops.
@@ -114,8 +121,8 @@ impl Lines {
             let _ = tcflush(&*discarded, QueueSelector::OFlush);
         };
         empty(drain, discard, left());
-        self.breaks.0 = None;
-        let _ = self.breaks.1.recv_timeout(left());
+        let last_break = self.last_break.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        let _ = last_break.map(|ended| ended.recv_timeout(left()));
         // A break or a drain that the driver does not end keeps the port open, and with it our lock.
         let _ = rustix::fs::flock(&self.port, FlockOperation::NonBlockingUnlock);
         // The host of a pseudo-terminal keeps the device open, and with it this lock.

@@ -97,7 +97,7 @@ impl StreamOn {
             }
             (OnStage::Source { .. } | OnStage::Toggled, Message::Prompt(Prompt::Period)) => {
                 desk.send(format!("{}\r", self.period.as_millis()).as_bytes());
-                self.question = Some(visible::line(text.text.trim().as_bytes()));
+                self.question = Some(visible::quoted(&text.text));
                 self.stage = OnStage::Period { again: false };
                 self.deadline = Some(desk.now + TAKEN);
             }

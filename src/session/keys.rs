@@ -90,14 +90,19 @@ impl KeyReader {
         if bytes.len() > LONGEST_TYPED {
             return Typed::File;
         }
-        self.place = Place::Open;
+        self.begin();
         Typed::Keys(bytes.iter().map(|&byte| self.key(byte)).collect())
+    }
+
+    /// Something new is typed or sent, so an `l` at its beginning is a key.
+    pub(super) fn begin(&mut self) {
+        self.place = Place::Open;
     }
 
     /// Reads what has been typed, and gives it in parts: Enter ends one, and so does an L of the menu.
     pub(super) fn strokes<'a>(&mut self, typed: &'a [u8], by: TypedBy) -> Vec<Stroke<'a>> {
         if by == TypedBy::Hand {
-            self.place = Place::Open;
+            self.begin();
         }
         let (mut strokes, mut rest) = (Vec::new(), typed);
         let mut length = 0;
@@ -142,6 +147,7 @@ impl KeyReader {
             _ if byte == ESCAPE => Place::Escape,
             (Place::Escape, _) if matches!(byte, b'[' | b'O' | b';') || byte.is_ascii_digit() => Place::Escape,
             (Place::Escape, _) | (_, Key::Enter) => Place::Open,
+            _ if byte.is_ascii_whitespace() => Place::Open,
             (_, Key::Other) => Place::Word,
             (place, Key::Menu(_) | Key::Leave) => place,
         };
@@ -185,7 +191,7 @@ mod tests {
             pieces.iter().flat_map(|piece| reader.strokes(piece, by)).find_map(|stroke| stroke.opens)
         };
         let load = Some(MenuKey::Load);
-        for piece in ["l", "ml", "hello\rl", "\x1B[Al", "\x1B[15~l", "he\x1BOPl", "t1000\nl"] {
+        for piece in ["l", "ml", "hello\rl", "\x1B[Al", "\x1B[15~l", "he\x1BOPl", "t1000\nl", " l", "he\tl"] {
             assert_eq!(opens(&[piece.as_bytes()], TypedBy::Hand), load, "{piece:?}");
         }
         for piece in ["hello", "all", "S1l", "hello\x1BOP\x03"] {
@@ -197,6 +203,11 @@ mod tests {
         }
         assert_eq!(opens(&[b"he", b"llo"], TypedBy::File), None);
         assert_eq!(opens(&[b"he\r\n", b"l"], TypedBy::File), load);
+        // A file does not go on with what was typed before it.
+        let mut reader = KeyReader::default();
+        reader.strokes(b"he", TypedBy::Hand);
+        reader.begin();
+        assert!(reader.strokes(b"l", TypedBy::File).iter().any(|stroke| stroke.opens == load));
     }
 
     #[test]

@@ -29,7 +29,7 @@ mod upload;
 mod watching;
 
 pub use event::*;
-pub use upload::{LoadReport, Phase, Progress, Proof, UnitNow, Verdict};
+pub use upload::{LoadReport, Phase, Progress, Proof, SEE_POWER, SILENT, UnitNow, Verdict};
 
 use std::collections::VecDeque;
 
@@ -241,6 +241,9 @@ impl Session {
     }
 
     fn begin(&mut self, next: Running) {
+        if next.job == Job::SendFile {
+            self.typing.begin();
+        }
         self.running = Some(Running { first_piece: self.transmitter.next_number(), ..next });
         self.signal(Signal::Begin);
     }
@@ -475,8 +478,8 @@ impl Session {
         match outcome {
             Some(outcome) => {
                 self.transmitter.withdraw_job(running.first_piece, last_words);
-                // A job leaves its own questions; during this one the user may have typed.
-                if running.job != Job::Identify {
+                // A job leaves its own questions. During one the user may have typed, and a file is what he types.
+                if !matches!(running.job, Job::Identify | Job::SendFile) {
                     self.keys.question_over();
                 }
                 self.events.push_back(Event::Finished(outcome));

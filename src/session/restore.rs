@@ -94,7 +94,7 @@ impl RestoreDefaults {
                 match message {
                     Message::Prompt(Prompt::ConfirmDefaults) if self.asks_again(said) => return self.confirm(desk),
                     Message::Text if tells_of_failure(said) => {
-                        self.failure.get_or_insert((quoted(said), text.span));
+                        self.failure.get_or_insert((visible::quoted(said), text.span));
                     }
                     _ => {}
                 }
@@ -123,7 +123,7 @@ impl RestoreDefaults {
 
     /// The unit says no, and may have something to ask after that.
     fn failed(&mut self, said: &str, span: Span, desk: &Desk<'_>) {
-        self.failure.get_or_insert((quoted(said), span));
+        self.failure.get_or_insert((visible::quoted(said), span));
         let soon = desk.now + QUIET;
         self.deadline = self.deadline.map(|deadline| deadline.min(soon));
     }
@@ -209,10 +209,6 @@ const CANCELLED: Outcome = Outcome::Cancelled(Job::RestoreDefaults);
 
 fn refused(reason: String, span: Span) -> Outcome {
     Outcome::Refused { job: Job::RestoreDefaults, reason, heard: Some(span) }
-}
-
-fn quoted(said: &str) -> String {
-    visible::line(said.trim().as_bytes())
 }
 
 /// Keeps a line by its letters: numbers in a menu may have changed since. The echo of what was sent is not kept.

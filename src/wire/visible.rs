@@ -16,6 +16,14 @@ pub enum Controls {
     Layout,
 }
 
+/// Characters of what a unit has said that are quoted.
+const QUOTED: usize = 160;
+
+/// What a unit has said, for a sentence: on one line, every control character shown, and no longer than can be read.
+pub fn quoted(said: &str) -> String {
+    line(said.trim().as_bytes()).chars().take(QUOTED).collect()
+}
+
 /// A complete text on one line, every control character shown.
 pub fn line(bytes: &[u8]) -> String {
     let mut visible = Visible::new(Controls::Shown);

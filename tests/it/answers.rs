@@ -225,13 +225,14 @@ fn a_slow_stream_counts_as_on_once_its_time_is_taken_and_a_refused_time_is_told_
     let (outcome, time) = alone.ask(slow());
     let Outcome::Refused { reason, .. } = outcome else { panic!("{outcome:?}") };
     assert_eq!(reason, "the unit did not take 60000 ms, asked for with \"Every how many ms (100-50000)?\"");
-    assert!(time < 4_000 && alone.log().ends_with(":~"), "the question is left: {}", alone.log());
+    assert_eq!((time, alone.log().as_str()), (3_230, "0:t 65:f 130:60000~ 730:~"), "the question is left");
     assert_eq!(alone.session.facts().stream, None);
     // The same late.
     let mut alone = Alone::with(&[&dialogue[..], &[("60000~", 1_500, period)]].concat());
     let (outcome, time) = alone.ask(slow());
-    assert!(matches!(outcome, Outcome::Refused { .. }) && time < 5_000, "{outcome:?} {time}");
-    assert_eq!((alone.log().ends_with(":~"), alone.session.facts().stream), (true, None), "{}", alone.log());
+    assert!(matches!(outcome, Outcome::Refused { .. }), "{outcome:?}");
+    assert_eq!((time, alone.log().as_str()), (4_190, "0:t 65:f 130:60000~ 1690:~"));
+    assert_eq!(alone.session.facts().stream, None);
     // No row comes: it was not on after all.
     let mut alone = Alone::with(&dialogue);
     let (outcome, _) = alone.ask(slow());

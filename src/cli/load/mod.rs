@@ -19,13 +19,9 @@ use crate::host::journal::Note;
 use crate::image::{CheckedImage, DefectId, Report, Software};
 use crate::record::Direction;
 use crate::secret::Secret;
-use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, UnitState};
-use crate::time::Duration;
+use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, SILENT, UnitState};
 use meter::Meter;
 use verdict::{conclude, planned, refuse, would_be_refused};
-
-/// How long a failed upload waits at least for a loader to say that it is there.
-const SILENT: Duration = Duration::from_secs(2);
 
 /// Arguments of `axcon load`.
 ///
@@ -248,7 +244,7 @@ fn send(
     }
 }
 
-/// Whether nothing has come from the unit for as long as a loader that has power takes to say something.
+/// Whether nothing has come from the unit for longer than a loader that takes a file is silent.
 fn is_silent(talk: &Talk) -> bool {
     let mut entries = talk.session().record().entries().rev();
     let heard = entries.find(|entry| entry.direction == Direction::FromUnit).map(|entry| entry.at);

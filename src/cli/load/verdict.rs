@@ -8,11 +8,7 @@ use crate::cli::numbers::{counted, grouped};
 use crate::cli::outcome::no_answer_hints;
 use crate::cli::output::{Closed, Output};
 use crate::image::{DefectId, Report};
-use crate::session::{Facts, LoadReport, Phase, UnitNow, UnitState, Verdict};
-
-/// What to do about a unit of which nothing has been heard since it had a part of the file, as the console says it.
-const SEE_POWER: &str = "the unit is silent: in its loader, or without power; see that it has power and that the cable is \
-                         in, and send the file again: it has no complete software and comes back to its loader";
+use crate::session::{Facts, LoadReport, Phase, SEE_POWER, UnitNow, UnitState, Verdict};
 
 #[derive(Serialize)]
 struct LoadObject<'a> {
@@ -151,7 +147,13 @@ pub fn conclude(
     output: &mut Output,
 ) -> Result<(), CliError> {
     let kind = exit_kind(report, lost.is_some());
-    let next = next_step(report, is_silent || lost.is_some());
+    // Of a unit behind a link that is gone nobody can say that it is silent.
+    let doubt = match (lost.is_some(), is_silent) {
+        (true, _) => Some("the unit is in its loader, or without power"),
+        (false, true) => Some("the unit is silent: in its loader, or without power"),
+        (false, false) => None,
+    };
+    let next = next_step(report, doubt);
     let next = next.as_str();
     if output.json {
         let written = output.object(&LoadObject {
@@ -219,10 +221,12 @@ fn sent(report: &LoadReport) -> String {
     format!("sent: {records} of {total}{address}")
 }
 
-/// What to do next, and how it is said on a command line.
-fn next_step(report: &LoadReport, is_silent: bool) -> String {
-    let is_in_the_middle = report.verdict == Verdict::Failed && report.unit == UnitNow::Loader && report.records > 0;
-    let advice = if is_silent && is_in_the_middle { SEE_POWER } else { report.advice() };
+/// What to do next, and how it is said on a command line. `doubt`: what is known of a unit of which nothing is heard.
+fn next_step(report: &LoadReport, doubt: Option<&str>) -> String {
+    if let Some(doubt) = doubt.filter(|_| report.left_in_the_middle()) {
+        return format!("{doubt}; {SEE_POWER}");
+    }
+    let advice = report.advice();
     match (report.verdict, &report.product) {
         (Verdict::Refused, None) => format!("{advice}: --product NAME, for example --product AXTC4CO"),
         _ => advice.to_owned(),
@@ -326,9 +330,9 @@ mod tests {
     #[test]
     fn a_user_who_has_to_name_the_product_is_told_how() {
         let report = refused();
-        assert!(next_step(&report, false).contains("--product NAME"), "{}", next_step(&report, false));
+        assert!(next_step(&report, None).contains("--product NAME"), "{}", next_step(&report, None));
         let other = LoadReport { product: Some("AXTC4CO".into()), ..report };
-        assert!(!next_step(&other, false).contains("--product"), "{}", next_step(&other, false));
+        assert!(!next_step(&other, None).contains("--product"), "{}", next_step(&other, None));
     }
 
     #[test]
@@ -339,10 +343,10 @@ mod tests {
 
     #[test]
     fn a_unit_that_is_silent_with_a_part_of_the_file_is_not_said_to_wait_in_its_loader() {
-        let next = |verdict, unit, records, is_silent| {
-            next_step(&LoadReport { verdict, unit, records, ..refused() }, is_silent)
+        let next = |verdict, unit, records, is_silent: bool| {
+            next_step(&LoadReport { verdict, unit, records, ..refused() }, is_silent.then_some("it is silent"))
         };
-        assert_eq!(next(Verdict::Failed, UnitNow::Loader, 9, true), SEE_POWER);
+        assert_eq!(next(Verdict::Failed, UnitNow::Loader, 9, true), format!("it is silent; {SEE_POWER}"));
         for (verdict, unit, records, is_silent) in [
             (Verdict::Failed, UnitNow::Loader, 9, false),
             (Verdict::Failed, UnitNow::Loader, 0, true),

@@ -233,7 +233,7 @@ impl Stream {
             Ended::Lost { error, .. } => return Err(error),
         }
         match proof {
-            Some((at, row, raw)) => self.sink.row(at, &row, &raw, output),
+            Some((at, row, raw)) => self.sink.row(at, &row, &raw, output).map(drop),
             None => Ok(()),
         }
     }
@@ -261,7 +261,10 @@ impl Stream {
         let (sink, is_known) = (&mut self.sink, &mut self.is_known);
         let undisturbed = self.talk.listen(until, |session, event| {
             let Event::Row { at, span, row } = event else { return Ok(ControlFlow::Continue(())) };
-            sink.row(*at, row, &session.record().bytes(*span), output)?;
+            // Rows of another source are those of a stream that has to be switched.
+            if !sink.row(*at, row, &session.record().bytes(*span), output)? {
+                return Ok(ControlFlow::Continue(()));
+            }
             *is_known = true;
             Ok(ControlFlow::Break(()))
         })?;
@@ -291,7 +294,9 @@ impl Stream {
             let mut is_limited = false;
             let undisturbed = self.talk.listen(until, |session, event| {
                 let Event::Row { at, span, row } = event else { return Ok(ControlFlow::Continue(())) };
-                sink.row(*at, row, &session.record().bytes(*span), output)?;
+                if !sink.row(*at, row, &session.record().bytes(*span), output)? {
+                    return Ok(ControlFlow::Continue(()));
+                }
                 last = *at;
                 // Either it is enough, or the time has got an end.
                 is_limited = limits.begin(sink.rows, *at) || limits.has_all(sink.rows);

@@ -62,17 +62,17 @@ struct ValueObject<'a> {
 }
 
 impl Sink {
-    /// Writes a row, unless it is of another source than is wanted.
+    /// Writes a row, unless it is of another source than is wanted: then it is not, and `false`.
     ///
     /// # Errors
     /// If it is another unit's, or cannot be written.
-    pub fn row(&mut self, at: Instant, row: &Row, raw: &[u8], output: &mut Output) -> Result<(), CliError> {
+    pub fn row(&mut self, at: Instant, row: &Row, raw: &[u8], output: &mut Output) -> Result<bool, CliError> {
         let now = row.readings.len();
         if let Some(before) = self.channels.filter(|&before| before != now) {
             return Err(another_unit(format!("the unit's rows have {now} values now and had {before}")));
         }
         if self.source.is_some_and(|source| source != row.source) {
-            return Ok(());
+            return Ok(false);
         }
         let channels = channels_of(row);
         let time = self.calendar.text(at);
@@ -95,7 +95,7 @@ impl Sink {
         text.push(b'\n');
         self.channels = Some(now);
         self.rows += 1;
-        self.out.append(&text, output)
+        self.out.append(&text, output).map(|()| true)
     }
 }
 

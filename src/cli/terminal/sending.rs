@@ -56,7 +56,7 @@ impl Sending {
     /// A file from its beginning.
     ///
     /// # Errors
-    /// If it cannot be opened, or is not a plain file: while waiting for a pipe, neither the unit nor the user would be heard.
+    /// If it cannot be opened, or is not a regular file: while waiting for a pipe, neither the unit nor the user would be heard.
     pub fn open(path: &Path, new_line: NewLine) -> Result<Self, CliError> {
         match std::fs::metadata(path) {
             Ok(found) if found.is_dir() => return Err(failed(path, ErrorKind::IsADirectory.into())),

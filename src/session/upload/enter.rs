@@ -3,12 +3,11 @@
 use super::super::event::{Facts, Outcome, UnitState};
 use super::super::identify::Identify;
 use super::super::job::{Desk, Signal, Work};
-use super::telling::quoted;
 use super::{Answer, Attempt, FILLER, Stage, Transfer, Unheard, UnitNow, Upload, Verdict, shows_application};
 use crate::device::{Product, longest_erase};
 use crate::image::Software;
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderText, Message, Prompt, Text};
+use crate::wire::{LoaderText, Message, Prompt, Text, visible};
 
 /// How long the unit may take to ask for the password.
 const PASSWORD_PROMPT: Duration = Duration::from_millis(2500);
@@ -177,7 +176,7 @@ impl Upload {
     /// The unit has not asked for the password in its time, or in unknown words.
     pub(super) fn not_asked(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         if let Some(question) = desk.pending {
-            self.heard = quoted(question);
+            self.heard = visible::quoted(&question.text);
         }
         desk.leave_dialogue();
         let (verdict, what) = match (desk.pending, self.heard.is_empty()) {

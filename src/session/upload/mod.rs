@@ -16,7 +16,7 @@ mod transfer;
 mod under_way;
 mod verify;
 
-pub use report::{LoadReport, Phase, Progress, Proof, UnitNow, Verdict};
+pub use report::{LoadReport, Phase, Progress, Proof, SEE_POWER, SILENT, UnitNow, Verdict};
 pub(super) use telling::size;
 
 use super::event::{LoadOrder, Outcome, UnitState};

@@ -108,7 +108,21 @@ pub struct LoadReport {
     pub remark: Option<String>,
 }
 
+/// How long a loader that is being sent a file says nothing at most: it stops its sender for each page, several times a
+/// second, and has two seconds for starting over.
+pub const SILENT: Duration = Duration::from_millis(2500);
+
+/// What to do about a unit that has fallen silent with a part of the file.
+pub const SEE_POWER: &str = "see that it has power and that the cable is in, and send the file again: it has no complete \
+                             software and comes back to its loader";
+
 impl LoadReport {
+    /// Whether the unit has a part of the file and was last known in its loader. Once it is [`SILENT`], it may as well be
+    /// without power.
+    pub fn left_in_the_middle(&self) -> bool {
+        self.verdict == Verdict::Failed && self.unit == UnitNow::Loader && self.records > 0
+    }
+
     /// What the user should do now, by what is true of the unit; to follow other words.
     pub fn advice(&self) -> &'static str {
         match (self.verdict, self.unit) {

@@ -10,8 +10,6 @@ use transfer::Transfer;
 
 /// How often a hold is reported while it lasts.
 const HOLD_TOLD: Duration = Duration::from_secs(1);
-/// Characters of a quotation.
-const QUOTED: usize = 160;
 
 /// Records and characters that an order sends to the loader it is expected to meet: the one the user has named, else that
 /// of the product, which is the image's unless another one is named.
@@ -116,12 +114,7 @@ impl Upload {
 
     pub(super) fn quote(&mut self, text: &Text, message: &Message) {
         if !matches!(message, Message::Row(_)) {
-            self.heard = quoted(text);
+            self.heard = visible::quoted(&text.text);
         }
     }
-}
-
-/// What a unit has said, for a report.
-pub(super) fn quoted(text: &Text) -> String {
-    visible::line(text.text.trim().as_bytes()).chars().take(QUOTED).collect()
 }

@@ -3,12 +3,11 @@
 use super::super::event::Outcome;
 use super::super::flaw::Flaw;
 use super::super::job::Desk;
-use super::telling::quoted;
 use super::transfer::Stall;
 use super::verify::{LONGEST_RETURN, NEW_BANNER};
 use super::{Again, Stage, Unheard, UnitNow, Upload, Verdict, records, shows_application};
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text, complains};
+use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text, complains, visible};
 
 /// How long the loader may take after an error to say that it waits again.
 const RESTART: Duration = Duration::from_secs(2);
@@ -59,7 +58,7 @@ impl Upload {
                 (self.attempt.strange > MOST_STRANGE.max(pages)).then_some((what, UnitNow::Unknown))
             }
             Message::Text | Message::Refusal => {
-                Some((format!("the loader complains: \"{}\"", quoted(text)), UnitNow::Unknown))
+                Some((format!("the loader complains: \"{}\"", visible::quoted(&text.text)), UnitNow::Unknown))
             }
             Message::Loader(LoaderText::Error(error)) => {
                 Some((format!("the loader reports error {error}"), UnitNow::Loader))
@@ -126,7 +125,7 @@ impl Upload {
             return None;
         }
         if let Some(complaint) = desk.pending.filter(|text| self.is_complaint(text)) {
-            self.heard = quoted(complaint);
+            self.heard = visible::quoted(&complaint.text);
             desk.transmitter.clear();
             let what = format!("the loader complains: \"{}\"", self.heard);
             self.fail(desk, complaint.span.end, what, UnitNow::Unknown, None);

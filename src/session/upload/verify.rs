@@ -136,7 +136,7 @@ impl Upload {
                         );
                         self.end(desk, Verdict::Done, UnitNow::Application, what)
                     }
-                    (Some(sent), _) if sent.product.eq_ignore_ascii_case(&product) && sent.version == version => {
+                    (Some(sent), _) if sent.is_for(&product) && sent.version == version => {
                         self.end(desk, Verdict::Done, UnitNow::Application, runs)
                     }
                     (Some(sent), _) => {

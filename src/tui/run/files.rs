@@ -10,7 +10,7 @@ use super::super::{
     RecordingList,
 };
 use crate::host::link::LinkSpec;
-use crate::host::replay::open_regular;
+use crate::host::regular;
 use crate::host::save::{SaveError, save};
 use crate::host::{self, library, ports, recorder};
 
@@ -72,7 +72,7 @@ pub(super) fn folder(directory: &Path) -> Input {
 
 fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    open_regular(path)?.take(FIRST_BYTES as u64).read_to_end(&mut bytes)?;
+    regular::open(path)?.take(FIRST_BYTES as u64).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -143,7 +143,7 @@ pub(super) fn bytes(path: &Path, most: u64) -> Result<Vec<u8>, String> {
 
 /// A file, open, if it can be read without waiting for anybody.
 pub(super) fn open(path: &Path) -> Result<File, String> {
-    open_regular(path).map_err(|error| said(&error))
+    regular::open(path).map_err(|error| said(&error))
 }
 
 /// What the system says, without the number that it adds.

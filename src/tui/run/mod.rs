@@ -103,7 +103,7 @@ pub fn run(world: World) -> io::Result<End> {
     let clock = Clock::start();
     let (sender, inputs) = host::channel();
     // Before the screen is taken: a signal in between would leave the terminal raw.
-    let _signals = Signals::of_screen(sender.clone())?;
+    let signals = Signals::of_screen(sender.clone())?;
     let mut screen = Screen::enter()?;
     let keys = terminal::listen(sender.clone())?;
     let size = screen.terminal.size()?;
@@ -123,6 +123,8 @@ pub fn run(world: World) -> io::Result<End> {
     let writer = console.into_writer();
     // A disk that hangs must not hold the user's terminal.
     drop(screen);
+    // Nobody takes signals any more: they do what they do by default.
+    drop(signals);
     let unwritten = writer.finish(WRITING_PATIENCE);
     if !unwritten.is_empty() {
         incomplete(&unwritten);

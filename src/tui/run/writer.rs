@@ -102,10 +102,15 @@ impl Writer {
         }
     }
 
-    /// Has something done after what is written before it. Where too much waits it is not done.
+    /// Has something done after what is written before it; at once where too much waits, since it has to be done.
     pub(super) fn run(&self, work: impl FnOnce() + Send + 'static) -> Done {
         let (done, is_done) = sync_channel(0);
-        let _ = self.tasks.try_send(Task::Run(Box::new(work), done));
+        if let Err(TrySendError::Full(task) | TrySendError::Disconnected(task)) =
+            self.tasks.try_send(Task::Run(Box::new(work), done))
+            && let Task::Run(work, _) = task
+        {
+            work();
+        }
         Done(is_done)
     }
 

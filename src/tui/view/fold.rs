@@ -7,7 +7,7 @@ use crate::dump::Dump;
 use crate::monitor::Mark;
 use crate::record::LINK_LOST;
 use crate::session::{
-    Awaited, DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitNow, UnitState, Verdict, WalkEnd,
+    Awaited, DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitState, Verdict, WalkEnd,
 };
 use crate::time::Instant;
 use crate::tui::visible::sentence;
@@ -188,11 +188,7 @@ impl View {
                 self.load.held_since = None;
                 self.load.product_unknown = report.verdict == Verdict::Refused && report.product.is_none();
                 // The evidence ends where the unit has ended to talk.
-                self.load.is_silent = report.verdict == Verdict::Failed
-                    && report.unit == UnitNow::Loader
-                    && report.records > 0
-                    && self.can_send()
-                    && self.is_silent_since(now);
+                self.load.is_silent = report.left_in_the_middle() && self.can_send() && self.is_silent_since(now);
                 self.load.is_of_before = false;
                 self.load.report = Some((**report).clone());
             }

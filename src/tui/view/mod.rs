@@ -15,17 +15,13 @@ use super::widgets::format;
 use crate::device::Product;
 use crate::dump::Dump;
 use crate::monitor::Monitor;
-use crate::session::{DictionaryReading, Facts, Job, LoadReport, Phase, Progress, UnitState};
+use crate::session::{DictionaryReading, Facts, Job, LoadReport, Phase, Progress, SILENT, UnitState};
 use crate::time::{Duration, Instant};
 use crate::version::Version;
 use crate::wire::MenuKey;
 
 /// How long no other news takes the place of a refusal.
 const REFUSAL_STAYS: Duration = Duration::from_secs(4);
-
-/// How long a loader that is being sent a file says nothing at most: it stops its sender for each page, several times a
-/// second, and has two seconds for starting over.
-const SILENT: Duration = Duration::from_millis(2500);
 
 /// Everything a screen may read.
 #[derive(Debug, Default)]

@@ -3,16 +3,13 @@
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use crate::session::{LoadReport, UnitNow, Verdict};
+use crate::session::{LoadReport, SEE_POWER, UnitNow, Verdict};
 use crate::tui::screens::Scene;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
 /// Rows beside the text: heading, verdict, what Enter does, and blanks between them.
 const FRAME_ROWS: usize = 6;
-/// What to do about a unit that has fallen silent in the middle.
-const SEE_POWER: &str = "see that it has power and that the cable is in, and send the file again: it has no complete \
-                         software and comes back to its loader";
 /// The label of the unit's last words.
 const HEARD: &str = "Heard";
 
