@@ -129,18 +129,19 @@ fn regrouped(image: &Image, unit: AddressUnit, record_bytes: Option<u8>) -> Resu
 
 /// Gives every run that ends in the middle of a word the other half: as an earlier run left it, else as erased flash reads.
 fn complete_words(runs: &mut [(u64, Vec<u8>)]) {
-    let ends_within_a_word = |start: u64, data: &[u8]| (start + data.len() as u64) % 2 == 1;
-    if !runs.iter().any(|(start, data)| ends_within_a_word(*start, data)) {
-        return;
-    }
-    let mut high_bytes: BTreeMap<u64, u8> = BTreeMap::new();
+    let missing_half = |start: u64, data: &[u8]| Some(start + data.len() as u64).filter(|end| end % 2 == 1);
+    let mut halves: BTreeMap<u64, u8> =
+        runs.iter().filter_map(|(start, data)| missing_half(*start, data)).map(|address| (address, ERASED)).collect();
     for (start, data) in runs {
-        if ends_within_a_word(*start, data) {
-            data.push(high_bytes.get(&(*start + data.len() as u64)).copied().unwrap_or(0xFF));
+        data.extend(missing_half(*start, data).and_then(|address| halves.get(&address)));
+        for (address, half) in halves.range_mut(*start..*start + data.len() as u64) {
+            *half = data[(address - *start) as usize];
         }
-        high_bytes.extend((*start..).zip(data.iter().copied()).filter(|(address, _)| address % 2 == 1));
     }
 }
+
+/// What a byte of erased flash reads as.
+const ERASED: u8 = 0xFF;
 
 /// A file in the making.
 struct File {

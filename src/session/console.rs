@@ -6,7 +6,7 @@
 
 use super::event::{Awaited, Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
-use super::leaving::Leaving;
+use super::leaving::{ENTER, Leaving};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
@@ -28,8 +28,6 @@ const TAKEN: Duration = Duration::from_millis(600);
 pub(super) const FIRST_VALUES: Duration = Duration::from_secs(6);
 /// How long after a question has been left the unit may ask another one, or begin to stream all the same.
 const LEFT: Duration = Duration::from_millis(2500);
-/// What leaves a question of the stream's.
-const ENTER: &[u8] = b"\r";
 
 const ON_CANCELLED: Outcome = Outcome::Cancelled(Job::StreamOn);
 const OFF_CANCELLED: Outcome = Outcome::Cancelled(Job::StreamOff);
@@ -45,6 +43,8 @@ pub(super) struct StreamOn {
     found_on: bool,
     is_cancelled: bool,
     stage: OnStage,
+    /// A question was not understood, or is not wanted any more.
+    leaving: Option<Leaving>,
     deadline: Option<Instant>,
     heard: Option<Span>,
     /// The question for the repetition time: many a unit names in it what it takes.
@@ -61,8 +61,6 @@ enum OnStage {
     Period { again: bool },
     /// Nobody has refused it: the stream is on, and its first row proves that.
     Row,
-    /// A question was not understood, or is not wanted any more.
-    Leaving(Leaving),
 }
 
 impl StreamOn {
@@ -74,6 +72,7 @@ impl StreamOn {
             found_on: false,
             is_cancelled: false,
             stage: OnStage::Toggled,
+            leaving: None,
             deadline: None,
             heard: None,
             question: None,
@@ -107,13 +106,6 @@ impl StreamOn {
                 self.leave(desk, refused);
             }
             (OnStage::Toggled, Message::Prompt(_)) => return self.give_up(Awaited::SourceQuestion, desk),
-            // It has taken the Enter for its own values. One that streamed before does so again, as it was found.
-            (OnStage::Leaving(leaving), Message::Row(_)) if !self.was_on => {
-                desk.send(b"t");
-                desk.facts.stream = None;
-                return Some(leaving.then());
-            }
-            (OnStage::Leaving(leaving), _) => leaving.heard(message),
             (OnStage::Toggled, Message::Row(_)) => {}
             (OnStage::Toggled, _) => {
                 let soon = desk.now + NO_QUESTION;
@@ -125,7 +117,7 @@ impl StreamOn {
             // It may ask once more now.
             (OnStage::Period { .. } | OnStage::Row, Message::Refusal) => {
                 let refused = self.refused(desk);
-                self.stage = OnStage::Leaving(Leaving::if_asked(ENTER, LEFT, desk.now + NO_QUESTION, refused));
+                self.leaving = Some(Leaving::if_asked(ENTER, LEFT, desk.now + NO_QUESTION, refused));
             }
             _ => {}
         }
@@ -159,7 +151,6 @@ impl StreamOn {
                 self.deadline = Some(desk.now + FIRST_VALUES + self.period * 2);
                 None
             }
-            OnStage::Leaving(leaving) => leaving.time_is_up(desk),
             OnStage::Toggled => self.give_up(Awaited::SourceQuestion, desk),
             OnStage::Source { .. } => self.give_up(Awaited::PeriodQuestion, desk),
             OnStage::Row => {
@@ -199,7 +190,7 @@ impl StreamOn {
     }
 
     fn leave(&mut self, desk: &mut Desk<'_>, then: Outcome) {
-        self.stage = OnStage::Leaving(Leaving::begin(ENTER, LEFT, desk, self.ended(then)));
+        self.leaving = Some(Leaving::begin(ENTER, LEFT, desk, self.ended(then)));
     }
 
     fn ended(&self, outcome: Outcome) -> Outcome {
@@ -208,16 +199,12 @@ impl StreamOn {
 
     fn cancel(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.is_cancelled = true;
-        match &mut self.stage {
+        match &self.stage {
             // What the unit makes of what has been sent shows within a moment.
             OnStage::Toggled | OnStage::Period { .. } => None,
             OnStage::Row if desk.pending.is_none() => Some(ON_CANCELLED),
             OnStage::Source { .. } | OnStage::Row => {
                 self.leave(desk, ON_CANCELLED);
-                None
-            }
-            OnStage::Leaving(leaving) => {
-                leaving.end_as(ON_CANCELLED);
                 None
             }
         }
@@ -226,6 +213,15 @@ impl StreamOn {
 
 impl Work for StreamOn {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if let Some(leaving) = &mut self.leaving {
+            // It has taken the Enter for its own values. One that streamed before does so again, as it was found.
+            if matches!(signal, Signal::Heard(_, Message::Row(_))) && !self.was_on {
+                desk.send(b"t");
+                desk.facts.stream = None;
+                return Some(leaving.then());
+            }
+            return leaving.handle(signal, ON_CANCELLED, desk);
+        }
         match signal {
             Signal::Begin => {
                 self.found_on = desk.facts.stream.is_some();
@@ -233,7 +229,7 @@ impl Work for StreamOn {
                 None
             }
             Signal::Heard(text, message) => self.heard(text, message, desk),
-            Signal::Tick if self.deadline().is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
+            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Cancel => self.cancel(desk),
             Signal::LinkLost => Some(ON_CANCELLED),
@@ -241,17 +237,15 @@ impl Work for StreamOn {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        match &self.stage {
-            OnStage::Leaving(leaving) => Some(leaving.due()),
-            _ => self.deadline,
-        }
+        self.leaving.as_ref().map(Leaving::due).or(self.deadline)
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {
         match self.stage {
+            _ if self.leaving.is_some() => false,
             OnStage::Toggled => matches!(prompt, Prompt::Source(_) | Prompt::Period),
             OnStage::Source { .. } => prompt == Prompt::Period,
-            OnStage::Period { .. } | OnStage::Row | OnStage::Leaving(_) => false,
+            OnStage::Period { .. } | OnStage::Row => false,
         }
     }
 }
@@ -260,6 +254,8 @@ impl Work for StreamOn {
 #[derive(Debug, Default)]
 pub(super) struct StreamOff {
     stage: OffStage,
+    /// T has opened a question.
+    leaving: Option<Leaving>,
     toggled_at: Instant,
     toggles: u32,
     /// Something has come since the first T: a unit is there.
@@ -275,14 +271,12 @@ enum OffStage {
     Toggled,
     /// Nothing has come. The menu has been asked for, to see whether a unit is there.
     AskedMenu,
-    /// T has opened a question.
-    Leaving(Leaving),
 }
 
 impl StreamOff {
     fn toggle(&mut self, desk: &mut Desk<'_>) {
         desk.send(b"t");
-        self.stage = OffStage::Toggled;
+        (self.stage, self.leaving) = (OffStage::Toggled, None);
         self.toggled_at = desk.now;
         self.toggles += 1;
         self.deadline = Some(desk.now + ANSWER);
@@ -290,25 +284,20 @@ impl StreamOff {
 
     fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.heard = true;
-        match (&mut self.stage, message) {
-            (OffStage::Toggled | OffStage::AskedMenu, Message::Prompt(_)) => {
+        match (&self.stage, message) {
+            (_, Message::Prompt(_)) => {
                 desk.facts.stream = None;
                 self.leave(desk, Outcome::Done(Job::StreamOff));
             }
             (OffStage::Toggled, Message::Row(_)) if desk.now < self.toggled_at + ROWS_ON_THEIR_WAY => {}
-            // The key was lost, or the Enter that left the question has switched the stream on.
-            (OffStage::Leaving(_), Message::Row(_)) if self.toggles < MOST_TOGGLES => self.toggle(desk),
-            (OffStage::Leaving(leaving), Message::Row(_)) if !self.is_cancelled => {
-                leaving.end_as(still_on(Some(text.span)));
-            }
-            (OffStage::Toggled | OffStage::AskedMenu, Message::Row(_)) => {
+            // The key was lost.
+            (_, Message::Row(_)) => {
                 if self.is_cancelled || self.toggles == MOST_TOGGLES {
                     return Some(self.ended(still_on(Some(text.span))));
                 }
                 self.toggle(desk);
             }
-            (OffStage::Leaving(leaving), _) => leaving.heard(message),
-            (OffStage::Toggled | OffStage::AskedMenu, _) => {
+            _ => {
                 let soon = desk.now + NO_QUESTION;
                 self.deadline = self.deadline.map(|deadline| deadline.min(soon));
             }
@@ -317,8 +306,7 @@ impl StreamOff {
     }
 
     fn tick(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        match (&mut self.stage, desk.pending) {
-            (OffStage::Leaving(leaving), _) => leaving.time_is_up(desk),
+        match (&self.stage, desk.pending) {
             (_, Some(text)) => {
                 let span = text.span;
                 self.leave(desk, still_on(Some(span)));
@@ -343,7 +331,25 @@ impl StreamOff {
     }
 
     fn leave(&mut self, desk: &mut Desk<'_>, then: Outcome) {
-        self.stage = OffStage::Leaving(Leaving::begin(ENTER, LEFT, desk, self.ended(then)));
+        self.leaving = Some(Leaving::begin(ENTER, LEFT, desk, self.ended(then)));
+    }
+
+    /// Takes a signal while a question is left.
+    fn leave_on(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        self.is_cancelled |= matches!(signal, Signal::Cancel);
+        let leaving = self.leaving.as_mut()?;
+        match signal {
+            // The Enter that left the question has switched the stream on.
+            Signal::Heard(_, Message::Row(_)) if self.toggles < MOST_TOGGLES => {
+                self.toggle(desk);
+                None
+            }
+            Signal::Heard(text, Message::Row(_)) if !self.is_cancelled => {
+                leaving.end_as(still_on(Some(text.span)));
+                None
+            }
+            _ => leaving.handle(signal, OFF_CANCELLED, desk),
+        }
     }
 
     fn ended(&self, outcome: Outcome) -> Outcome {
@@ -357,20 +363,20 @@ fn still_on(heard: Option<Span>) -> Outcome {
 
 impl Work for StreamOff {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if self.leaving.is_some() {
+            return self.leave_on(signal, desk);
+        }
         match signal {
             Signal::Begin => {
                 self.toggle(desk);
                 None
             }
             Signal::Heard(text, message) => self.heard(text, message, desk),
-            Signal::Tick if self.deadline().is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
+            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             // What T has done shows within a moment.
             Signal::Cancel => {
                 self.is_cancelled = true;
-                if let OffStage::Leaving(leaving) = &mut self.stage {
-                    leaving.end_as(OFF_CANCELLED);
-                }
                 None
             }
             Signal::LinkLost => Some(OFF_CANCELLED),
@@ -378,14 +384,11 @@ impl Work for StreamOff {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        match &self.stage {
-            OffStage::Leaving(leaving) => Some(leaving.due()),
-            _ => self.deadline,
-        }
+        self.leaving.as_ref().map(Leaving::due).or(self.deadline)
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {
-        matches!(prompt, Prompt::Source(_) | Prompt::Period)
+        self.leaving.is_none() && matches!(prompt, Prompt::Source(_) | Prompt::Period)
     }
 }
 

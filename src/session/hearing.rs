@@ -10,7 +10,7 @@ use super::watching::Saw;
 use crate::endpoint::Secrecy;
 use crate::record::{Direction, REDACTED};
 use crate::time::{Duration, Instant};
-use crate::wire::{Confidence, Item, LoaderText, MenuKey, Message, NmtState, Prompt, Text};
+use crate::wire::{Confidence, Item, LoaderText, MenuKey, Message, NmtState, Prompt, Text, is_question};
 
 /// Silence after a text without a line end that makes it a prompt: several character times, and more than an adapter's
 /// latency of 16 ms.
@@ -56,6 +56,17 @@ impl PromptWatch {
     /// When the last line counts as a question.
     pub(super) fn line_due(&self) -> Option<Instant> {
         self.line.as_ref().map(|(due, ..)| *due)
+    }
+
+    /// Something has come since the last line: words are another text, but signs alone are where the answer to it goes.
+    fn goes_on(&mut self, now: Instant, pending: Option<&Text>) {
+        let Some(text) = pending else { return };
+        if text.text.contains(char::is_alphanumeric) {
+            self.line = None;
+        }
+        if let Some((due, ..)) = &mut self.line {
+            *due = now + LINE_QUIET;
+        }
     }
 
     /// Nothing is waited for any more.
@@ -106,9 +117,7 @@ impl Session {
             }
         }
         let pending = self.framer.pending();
-        if pending.is_some() {
-            self.prompt.line = None;
-        }
+        self.prompt.goes_on(self.now, pending.as_ref());
         let asks_password = pending.as_ref().is_some_and(|text| {
             text.text.len() <= LONGEST_PROMPT
                 && !self.prompt.has_seen(text)
@@ -161,7 +170,7 @@ impl Session {
     /// The question that a complete line may be: one that the running job waits for.
     fn asked_in_a_line(&self, line: &str) -> Option<Prompt> {
         let running = self.running.as_ref()?;
-        if !line.trim_end().ends_with(['?', ':', '>']) {
+        if !is_question(line) {
             return None;
         }
         let is_password = self.vocabulary.asks_password(line, self.is_behind_load());

@@ -4,10 +4,12 @@
 //! and whatever is asked meanwhile is left as well.
 
 use super::event::Outcome;
-use super::job::Desk;
+use super::job::{Desk, Signal};
 use crate::time::{Duration, Instant};
 use crate::wire::Message;
 
+/// What leaves most questions: no answer.
+pub(super) const ENTER: &[u8] = b"\r";
 /// Questions that are left, one after the other, before a unit that goes on asking is given up.
 const MOST: u32 = 3;
 
@@ -44,9 +46,18 @@ impl Leaving {
         self.due = desk.now + self.wait;
     }
 
-    /// The unit has printed something. A row of the stream, or a page, may end the line of a question that is still open.
-    pub(super) fn heard(&mut self, message: &Message) {
-        self.is_asked |= matches!(message, Message::Prompt(_));
+    /// Takes a signal; gives the outcome when no question is open any more. `cancelled` is what the job ends as when the
+    /// user has had enough, or the link is gone.
+    pub(super) fn handle(&mut self, signal: Signal<'_>, cancelled: Outcome, desk: &mut Desk<'_>) -> Option<Outcome> {
+        match signal {
+            // A row of the stream, or a page, may end the line of a question that is still open.
+            Signal::Heard(_, message) => self.is_asked |= matches!(message, Message::Prompt(_)),
+            Signal::Tick if self.due <= desk.now => return self.time_is_up(desk),
+            Signal::Cancel => self.then = cancelled,
+            Signal::LinkLost => return Some(cancelled),
+            Signal::Begin | Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => {}
+        }
+        None
     }
 
     /// The job ends otherwise than it was going to.
@@ -59,13 +70,13 @@ impl Leaving {
         self.then.clone()
     }
 
-    /// When [`Leaving::time_is_up`] is wanted.
+    /// When it wants to be looked after.
     pub(super) fn due(&self) -> Instant {
         self.due
     }
 
     /// The unit has had its time. Leaves the next question if there is one; otherwise the job is over.
-    pub(super) fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+    fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         if (self.is_asked || desk.pending.is_some()) && self.left < MOST {
             self.leave(desk);
             return None;

@@ -13,7 +13,7 @@ use super::job::{Desk, Signal, Work};
 use super::leaving::Leaving;
 use crate::record::Span;
 use crate::time::{Duration, Instant};
-use crate::wire::{Message, Prompt, Text, complains, visible};
+use crate::wire::{Message, Prompt, Text, is_question, visible};
 
 /// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
 const RESET: Duration = Duration::from_secs(10);
@@ -32,6 +32,8 @@ const NO: &[u8] = b"No\r";
 #[derive(Debug, Default)]
 pub(super) struct RestoreDefaults {
     stage: Stage,
+    /// A question is not answered with Yes.
+    leaving: Option<Leaving>,
     deadline: Option<Instant>,
     /// When the text that is being heard has to have ended.
     ends: Instant,
@@ -59,8 +61,6 @@ enum Stage {
     Banner,
     /// M has been sent, to know what is not a banner.
     Menu,
-    /// A question is not answered with Yes.
-    Leaving(Leaving),
 }
 
 impl RestoreDefaults {
@@ -81,12 +81,13 @@ impl RestoreDefaults {
 
     fn heard(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) {
         self.heard = Some(text.span);
-        match (&mut self.stage, message) {
-            (Stage::Leaving(leaving), _) => leaving.heard(message),
+        match (&self.stage, message) {
             (Stage::Asked, Message::Prompt(Prompt::ConfirmDefaults)) => self.confirm(desk),
             (Stage::Asked, Message::Refusal) => self.failed(&text.text, text.span, desk),
             (Stage::Asked, _) | (_, Message::Row(_)) => {}
-            (Stage::Confirmed, Message::Refusal) => self.failed(&text.text, text.span, desk),
+            (Stage::Confirmed, Message::Refusal) if !is_about_the_start(&text.text) => {
+                self.failed(&text.text, text.span, desk);
+            }
             (Stage::Confirmed, _) => {
                 // The question may come before it, unless a row of the stream has parted them.
                 let question = self.from.saturating_sub(text.span.start) as usize;
@@ -117,8 +118,7 @@ impl RestoreDefaults {
     /// Whether this asks for another Yes that the user would give. The echo of the first one, or a sentence with a yes in
     /// it, is not a question, and the letters of a Yes are keys of the menu.
     fn asks_again(&self, said: &str) -> bool {
-        let is_question = said.trim_end().ends_with([':', '?', '>', ')', ']']);
-        is_question && self.confirmed < MOST_YES && self.failure.is_none() && !self.is_cancelled
+        is_question(said) && self.confirmed < MOST_YES && self.failure.is_none() && !self.is_cancelled
     }
 
     /// The unit says no, and may have something to ask after that.
@@ -131,7 +131,7 @@ impl RestoreDefaults {
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let is_silent = self.heard.is_none() && desk.pending.is_none();
         let failure = self.failure.take();
-        match &mut self.stage {
+        match &self.stage {
             Stage::Asked if is_silent => {
                 desk.send(NO);
                 Some(self.no_answer(Awaited::DefaultsQuestion, desk))
@@ -167,7 +167,6 @@ impl RestoreDefaults {
             },
             Stage::Menu if self.since.is_subset(&self.menu) => Some(Outcome::DefaultsTaken),
             Stage::Menu => Some(Outcome::Done(Job::RestoreDefaults)),
-            Stage::Leaving(leaving) => leaving.time_is_up(desk),
         }
     }
 
@@ -186,11 +185,11 @@ impl RestoreDefaults {
     }
 
     fn leave(&mut self, desk: &mut Desk<'_>, then: Outcome) {
-        self.stage = Stage::Leaving(Leaving::begin(NO, ANSWER, desk, then));
+        self.leaving = Some(Leaving::begin(NO, ANSWER, desk, then));
     }
 
     fn cancel(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        match &mut self.stage {
+        match &self.stage {
             Stage::Asked => self.leave(desk, CANCELLED),
             // Whether the unit asks once more shows within a moment.
             Stage::Confirmed => {
@@ -199,7 +198,6 @@ impl RestoreDefaults {
                 self.deadline = self.deadline.map(|deadline| deadline.min(soon));
             }
             Stage::Banner | Stage::Menu => return Some(CANCELLED),
-            Stage::Leaving(leaving) => leaving.end_as(CANCELLED),
         }
         None
     }
@@ -219,8 +217,14 @@ fn note(lines: &mut BTreeSet<String>, line: &str) {
     }
 }
 
+/// Whether a line tells why a unit that starts has its defaults: "Parameters invalid, defaults loaded".
+fn is_about_the_start(line: &str) -> bool {
+    line.to_lowercase().contains("default") && !tells_of_failure(line)
+}
+
 /// Whether a line after the Yes tells that nothing has come of it: "Not done", "Restoring failed", "EEPROM write error".
-/// That errors have been cleared is not a failure.
+/// That errors have been cleared is not a failure, and neither is what a unit says as it starts: "Watchdog timeout 1 s",
+/// "Parameters invalid, defaults loaded".
 fn tells_of_failure(line: &str) -> bool {
     let lower = line.to_lowercase();
     let words: Vec<&str> =
@@ -230,11 +234,16 @@ fn tells_of_failure(line: &str) -> bool {
     // "Do not switch off" is not a failure.
     let is_not_done = |pair: &[&str]| pair[0] == "not" && done.contains(&pair[1]);
     let fails = |word: &&str| matches!(*word, "cannot" | "unable") || word.starts_with("fail");
-    words.windows(2).any(is_not_done) || words.iter().any(fails) || (!clears && complains(line))
+    let has_none = words.iter().any(|word| matches!(*word, "no" | "0"));
+    let has_error = words.iter().any(|word| word.starts_with("error"));
+    words.windows(2).any(is_not_done) || words.iter().any(fails) || (has_error && !has_none && !clears)
 }
 
 impl Work for RestoreDefaults {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if let Some(leaving) = &mut self.leaving {
+            return leaving.handle(signal, CANCELLED, desk);
+        }
         match signal {
             Signal::Begin => {
                 desk.send(b"d");
@@ -245,7 +254,7 @@ impl Work for RestoreDefaults {
                 self.heard(text, message, desk);
                 None
             }
-            Signal::Tick if self.deadline().is_some_and(|deadline| deadline <= desk.now) => self.time_is_up(desk),
+            Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.time_is_up(desk),
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Cancel => self.cancel(desk),
             Signal::LinkLost => Some(CANCELLED),
@@ -253,14 +262,11 @@ impl Work for RestoreDefaults {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        match &self.stage {
-            Stage::Leaving(leaving) => Some(leaving.due()),
-            _ => self.deadline,
-        }
+        self.leaving.as_ref().map(Leaving::due).or(self.deadline)
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {
-        matches!(self.stage, Stage::Asked) && prompt == Prompt::ConfirmDefaults
+        matches!(self.stage, Stage::Asked) && self.leaving.is_none() && prompt == Prompt::ConfirmDefaults
     }
 }
 
@@ -273,7 +279,16 @@ mod tests {
         for line in ["Not done", "Restoring failed", "EEPROM write error", "FAILURE 3", "Cannot write"] {
             assert!(tells_of_failure(line), "{line}");
         }
-        for line in ["Done.", "Defaults restored", "Error list cleared", "Errors: 0", "Resetting, do not switch off"] {
+        for line in [
+            "Done.",
+            "Defaults restored",
+            "Error list cleared",
+            "Errors: 0",
+            "No errors",
+            "Resetting, do not switch off",
+            "Watchdog timeout 1 s",
+            "Parameters invalid, defaults loaded",
+        ] {
             assert!(!tells_of_failure(line), "{line}");
         }
     }

@@ -59,6 +59,13 @@ pub(super) fn recognise(text: &str, words: &Words) -> Option<Prompt> {
     None
 }
 
+/// Whether a text is worded as a question, and not as a sentence about its subject: it ends with a sign that something is
+/// to come, or tells the user to give it ("Enter the password", "Type Yes to confirm.").
+pub fn is_question(text: &str) -> bool {
+    text.trim_end().ends_with(['?', ':', '>', ')', ']', '='])
+        || Words::of(text).iter().any(|word| matches!(word, "enter" | "type" | "input"))
+}
+
 /// Whether a question after an L asks for the password in other words: `Code:`, `PW>`. It has to look like a question, and
 /// to be about nothing else: a key to be pressed, an error's code.
 pub(super) fn asks_password_behind_load(text: &str) -> bool {
@@ -177,6 +184,23 @@ mod tests {
         ];
         for (text, expected) in table {
             assert_eq!(recognise(text, &Words::of(text)), expected, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_question_is_known_by_its_last_sign_or_by_what_it_tells_the_user_to_do() {
+        for text in [
+            "Password:",
+            "Restore? (Yes/No) ",
+            "Interval [ms]",
+            "Enter the password",
+            "Please input the password.",
+            "Type Yes to restore the defaults.",
+        ] {
+            assert!(is_question(text), "{text:?}");
+        }
+        for text in ["", "Password accepted", "About the password.", "Yes, restoring", "Re-entered"] {
+            assert!(!is_question(text), "{text:?}");
         }
     }
 

@@ -419,6 +419,9 @@ fn the_question_for_yes_is_answered_twice_at_most_and_only_a_banner_is_the_end()
         let Outcome::Refused { reason, .. } = restored(failed) else { panic!("{failed}") };
         assert!(reason.contains(failed.split("\r").next().expect("a line")), "{reason}");
     }
+    // What a unit says as it starts may sound like one.
+    let starts = "Watchdog timeout 1 s\r\nParameters invalid, defaults loaded\r\nAXTC4CO V1.1.0\r\n";
+    assert_eq!(restored(starts), Outcome::Done(Job::RestoreDefaults));
     // It never comes back.
     let mut alone = Alone::with(&[("d", 3, question), ("Yes~", 50, question), ("Yes~", 50, question)]);
     let (outcome, time) = alone.ask(Command::RestoreDefaults);
@@ -455,8 +458,16 @@ fn what_a_job_could_not_send_in_its_time_is_not_sent_later() {
 
 #[test]
 fn a_question_on_a_line_of_its_own_is_answered_when_nothing_follows() {
-    let (report, alone) = upload_behind(&[("l", 5, "Enter password:\r\n")]);
-    assert!(report.password_sent && password_at(&alone) == Some(255), "{}", alone.log());
+    // Where the answer goes may be marked on the next line.
+    for (asks, at) in [
+        ("Enter password:\r\n", 255),
+        ("Enter password:\r\n> ", 255),
+        ("Enter the password\r\n", 255 + 500),
+        ("Please enter the password.\r\n>", 255),
+    ] {
+        let (report, alone) = upload_behind(&[("l", 5, asks)]);
+        assert!(report.password_sent && password_at(&alone) == Some(at), "{asks:?}: {}", alone.log());
+    }
     let lines = [
         ("t", 5, "Field value (F) or process value (P)?\r\n"),
         ("f", 5, "Repetition rate in ms (1..60000):\r\n"),
@@ -472,8 +483,16 @@ fn a_question_on_a_line_of_its_own_is_answered_when_nothing_follows() {
     let mut alone = Alone::with(&[("d", 5, "Restore the defaults? Enter Yes:\r\n"), ("Yes~", 50, MENU)]);
     alone.ask(Command::RestoreDefaults);
     assert!(alone.log().starts_with("0:d 255:Yes~"), "{}", alone.log());
+    let mut alone = Alone::with(&[("d", 5, "Type Yes to restore the defaults\r\n"), ("Yes~", 50, MENU)]);
+    alone.ask(Command::RestoreDefaults);
+    assert!(alone.log().starts_with("0:d 255:Yes~"), "{}", alone.log());
     // Something follows.
-    let (report, alone) = upload_behind(&[("l", 5, "About the password:\r\n"), ("", 200, "Ask your dealer\r\n")]);
+    for follows in ["Ask your dealer\r\n", "Ask"] {
+        let (report, alone) = upload_behind(&[("l", 5, "About the password:\r\n"), ("", 200, follows)]);
+        assert!(!report.password_sent, "{}", alone.log());
+    }
+    // A statement is not a question.
+    let (report, alone) = upload_behind(&[("l", 5, "Password needed\r\n")]);
     assert!(!report.password_sent, "{}", alone.log());
 }
 

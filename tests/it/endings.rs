@@ -8,7 +8,7 @@ use axcon::session::{Awaited, Command, Event, Job, Outcome, Session, WalkEnd};
 use axcon::time::{Duration, Instant};
 use axcon::wire::stream::Source;
 
-use crate::support::bench::BAUD;
+use crate::support::bench::{BAUD, order, small_image};
 use crate::support::visit::HandMade;
 
 /// What happens to a job from outside.
@@ -88,6 +88,7 @@ const MENU: &str = "AXTC4CO V1.1.0\r\nV - View Object Dictionary\r\nD - Default 
 const SOURCE: &str = "F - field value, P - process value: ";
 const PERIOD: &str = "Repetition rate in ms (1-60000) [1000]: ";
 const CONFIRM: &str = "Enter Yes to restore the default object dictionary: ";
+const WAITS: &str = "\r\nWaiting for application S-Record.\r\n";
 const PAGE: &str = "Supply 24.1 V\r\nTC1 100.0 C\r\n";
 const ENTRY: &str = "6126h:01 TC1 = 16.000\r\n";
 
@@ -152,7 +153,7 @@ impl HandMade for Repeater {
 #[test]
 fn whatever_a_unit_repeats_for_ever_every_stage_of_every_job_ends_in_time() {
     type Script = &'static [(u8, &'static str)];
-    let stages: [(Command, u64, &[Script]); 7] = [
+    let stages: [(Command, u64, &[Script]); 8] = [
         (Command::Identify, 5, &[&[]]),
         (
             on(),
@@ -188,6 +189,17 @@ fn whatever_a_unit_repeats_for_ever_every_stage_of_every_job_ends_in_time() {
             60,
             &[&[], &[(b'v', ENTRY)], &[(b'v', ENTRY), (b'\r', ENTRY)], &[(b'v', "no\r\n"), (b'x', "no\r\n")]],
         ),
+        (
+            Command::Load(Box::new(order(small_image("AXTC4CO", "1.2.0")))),
+            90,
+            &[
+                &[],
+                &[(b'm', MENU)],
+                &[(b'm', MENU), (b'l', "Password: ")],
+                &[(b'm', MENU), (b'l', "Password: "), (b'\r', WAITS)],
+                &[(b'm', MENU), (b'l', "Password: "), (b'\r', WAITS), (b'7', ".")],
+            ],
+        ),
     ];
     let texts = [
         ROW,
@@ -216,7 +228,8 @@ fn whatever_a_unit_repeats_for_ever_every_stage_of_every_job_ends_in_time() {
                 let took = told.took;
                 assert!(
                     took <= Duration::from_secs(*most),
-                    "{command:?} behind {script:?}: {text:?} each {every} ms: {took:?}"
+                    "{:?} behind {script:?}: {text:?} each {every} ms: {took:?}",
+                    told.outcome
                 );
             }
         }

@@ -10,6 +10,7 @@ pub(super) use assembler::{Assembler, Page, PageEnd};
 
 use super::event::{Awaited, Event, Job, Outcome};
 use super::job::{Desk, Signal, Work};
+use super::leaving::{ENTER, Leaving};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::{Message, Prompt};
@@ -29,6 +30,8 @@ pub(super) const STOPPED: Duration = Duration::from_millis(1500);
 pub(super) const UNDER_WAY: Duration = Duration::from_millis(700);
 /// How long the rest of the menu may take.
 const MENU: Duration = Duration::from_millis(300);
+/// How long after a question has been left the unit may ask another one.
+const LEFT: Duration = Duration::from_millis(600);
 /// How often the key is pressed to stop them.
 const MOST_STOPS: u32 = 3;
 
@@ -39,6 +42,8 @@ pub(super) struct Diagnostics {
     wanted: Option<u32>,
     taken: u32,
     stage: Stage,
+    /// The unit asks something instead.
+    leaving: Option<Leaving>,
     page: Assembler,
     deadline: Option<Instant>,
     heard: Option<Span>,
@@ -74,6 +79,7 @@ impl Diagnostics {
             wanted,
             taken: 0,
             stage: Stage::Watching,
+            leaving: None,
             page: Assembler::default(),
             deadline: None,
             heard: None,
@@ -164,10 +170,11 @@ impl Diagnostics {
             }
             Stage::NotUnderstood => return Some(self.no_answer(Awaited::Page)),
             Stage::Asked => {
-                if desk.pending.is_some() {
-                    desk.leave_dialogue();
+                let no_answer = self.no_answer(if self.taken > 0 { Awaited::NextPage } else { Awaited::Page });
+                if desk.pending.is_none() {
+                    return Some(no_answer);
                 }
-                return Some(self.no_answer(if self.taken > 0 { Awaited::NextPage } else { Awaited::Page }));
+                self.leave(desk, no_answer);
             }
             // They may only be late.
             Stage::Reading => {
@@ -190,6 +197,11 @@ impl Diagnostics {
         None
     }
 
+    /// Leaves what the unit asks.
+    fn leave(&mut self, desk: &mut Desk<'_>, then: Outcome) {
+        self.leaving = Some(Leaving::begin(ENTER, LEFT, desk, then));
+    }
+
     fn no_answer(&self, awaited: Awaited) -> Outcome {
         Outcome::NoAnswer { job: Job::Diagnostics, awaited, heard: self.heard }
     }
@@ -205,6 +217,9 @@ pub(super) fn has_words(line: &str) -> bool {
 
 impl Work for Diagnostics {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if let Some(leaving) = &mut self.leaving {
+            return leaving.handle(signal, CANCELLED, desk);
+        }
         self.answered |= matches!(signal, Signal::Heard(..));
         if matches!((&self.stage, &signal), (Stage::AskingForMenu { .. }, Signal::Heard(..))) {
             // Rows may go on for ever after the menu.
@@ -225,8 +240,9 @@ impl Work for Diagnostics {
             Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults))
                 if matches!(self.stage, Stage::Watching | Stage::Asked) =>
             {
-                desk.leave_dialogue();
-                Some(self.no_answer(Awaited::Page))
+                let no_answer = self.no_answer(Awaited::Page);
+                self.leave(desk, no_answer);
+                None
             }
             Signal::Heard(_, Message::Row(_) | Message::Prompt(_)) => None,
             // The end of a row that the unit has had no room for.
@@ -256,6 +272,6 @@ impl Work for Diagnostics {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.page.due().or(self.deadline)
+        self.leaving.as_ref().map(Leaving::due).or(self.page.due()).or(self.deadline)
     }
 }

@@ -3,6 +3,7 @@
 use super::super::event::{Facts, Outcome, UnitState};
 use super::super::identify::Identify;
 use super::super::job::{Desk, Signal, Work};
+use super::super::leaving::{ENTER, Leaving};
 use super::{Answer, Attempt, FILLER, Stage, Transfer, Unheard, UnitNow, Upload, Verdict, shows_application};
 use crate::device::{Product, longest_erase};
 use crate::image::Software;
@@ -18,6 +19,8 @@ const REST_OF_THE_QUESTION: Duration = Duration::from_millis(500);
 const QUESTION_AFTER_A_NOTE: Duration = Duration::from_millis(500);
 /// How long a reset into the loader may take, or the refusal of a password.
 const LOADER_PROMPT: Duration = Duration::from_secs(8);
+/// How long after a question has been left the unit may ask another one.
+const LEFT: Duration = Duration::from_millis(600);
 /// Silence after the loader's prompt before the first record: whatever else it prints should be out.
 const SETTLE: Duration = Duration::from_millis(80);
 /// How long it may go on printing after its prompt before it is taken for something else.
@@ -120,10 +123,11 @@ impl Upload {
             }
             Message::Prompt(Prompt::Password) if !password_sent => {
                 if text.text.trim_end().ends_with(|end: char| !end.is_alphanumeric()) {
-                    return self.send_password(desk);
+                    self.send_password(desk);
+                } else {
+                    self.stage = Stage::AskedForLoader(Answer::Question);
+                    self.deadline = Some(desk.now + REST_OF_THE_QUESTION);
                 }
-                self.stage = Stage::AskedForLoader(Answer::Question);
-                self.deadline = Some(desk.now + REST_OF_THE_QUESTION);
             }
             Message::Prompt(Prompt::AnyKey) | Message::Loader(LoaderText::AnyKey) => self.send_key(desk),
             Message::Loader(LoaderText::Header) if password_sent && self.asks_for_key() => {
@@ -131,16 +135,14 @@ impl Upload {
             }
             Message::Refusal | Message::MenuKey(_) | Message::Prompt(Prompt::Password) if password_sent => {
                 let what = "the unit did not accept the password";
-                // It may ask once more.
-                if !matches!(message, Message::MenuKey(_)) {
-                    desk.leave_dialogue();
+                if matches!(message, Message::MenuKey(_)) {
+                    return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
                 }
-                return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+                // It may ask once more.
+                self.turn_back(desk, Verdict::UnitRefused, what);
             }
             Message::Prompt(_) if !password_sent => {
-                desk.leave_dialogue();
-                let what = "the unit asks for something other than the password";
-                return self.end(desk, Verdict::NoAnswer, UnitNow::Application, what);
+                self.turn_back(desk, Verdict::NoAnswer, "the unit asks for something other than the password");
             }
             Message::Refusal => {
                 let soon = desk.now + QUESTION_AFTER_A_NOTE;
@@ -153,32 +155,33 @@ impl Upload {
     }
 
     /// The unit asks for the password.
-    pub(super) fn send_password(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+    pub(super) fn send_password(&mut self, desk: &mut Desk<'_>) {
         let Some(password) = &self.order.password else {
-            desk.leave_dialogue();
-            let what = "the unit asks for its password, and none was given";
-            return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
+            return self.turn_back(desk, Verdict::UnitRefused, "the unit asks for its password, and none was given");
         };
         desk.send_secret(password.reveal());
         self.password_sent = true;
         self.stage = Stage::PasswordSent;
         self.deadline = Some(desk.now + LOADER_PROMPT);
         self.unheard = self.asks_for_key().then_some((desk.now + UNASKED_KEY, Unheard::Key));
-        None
+    }
+
+    /// The upload ends so, with the application as it was, once the unit asks nothing any more.
+    pub(super) fn turn_back(&mut self, desk: &mut Desk<'_>, verdict: Verdict, what: &str) {
+        let outcome = self.outcome(desk, verdict, UnitNow::Application, what);
+        self.leaving = Some(Leaving::begin(ENTER, LEFT, desk, outcome));
     }
 
     /// The unit has said something that sounds like a refusal, and no question has followed.
-    pub(super) fn refused(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
-        desk.leave_dialogue();
-        self.end(desk, Verdict::UnitRefused, UnitNow::Application, "the unit refuses to load new software")
+    pub(super) fn refused(&mut self, desk: &mut Desk<'_>) {
+        self.turn_back(desk, Verdict::UnitRefused, "the unit refuses to load new software");
     }
 
     /// The unit has not asked for the password in its time, or in unknown words.
-    pub(super) fn not_asked(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
+    pub(super) fn not_asked(&mut self, desk: &mut Desk<'_>) {
         if let Some(question) = desk.pending {
             self.heard = visible::quoted(&question.text);
         }
-        desk.leave_dialogue();
         let (verdict, what) = match (desk.pending, self.heard.is_empty()) {
             (Some(_), _) => {
                 (Verdict::NoAnswer, "the unit asks something that is not understood, and not for its password")
@@ -186,7 +189,7 @@ impl Upload {
             (None, false) => (Verdict::NoAnswer, "the unit does not ask for its password in words that are understood"),
             (None, true) => (Verdict::UnitRefused, "the unit does not ask for the password"),
         };
-        self.end(desk, verdict, UnitNow::Application, what)
+        self.turn_back(desk, verdict, what);
     }
 
     /// The loader asks for a file.

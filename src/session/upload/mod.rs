@@ -22,6 +22,7 @@ pub(super) use telling::size;
 use super::event::{LoadOrder, Outcome, UnitState};
 use super::identify::Identify;
 use super::job::{Desk, Signal, Work};
+use super::leaving::Leaving;
 use crate::image::DefectId;
 use crate::time::Instant;
 use crate::version::Version;
@@ -41,6 +42,8 @@ pub(super) struct Upload {
     version_before: Option<Version>,
     transfer: Option<Transfer>,
     stage: Stage,
+    /// The unit is not asked for its loader any more, but may still ask something.
+    leaving: Option<Leaving>,
     deadline: Option<Instant>,
     /// What is to be sent if nothing is heard until then.
     unheard: Option<(Instant, Unheard)>,
@@ -152,6 +155,7 @@ impl Upload {
             version_before: None,
             transfer: None,
             stage: Stage::Check(Identify::default()),
+            leaving: None,
             deadline: None,
             unheard: None,
             password_sent: false,
@@ -179,9 +183,8 @@ impl Upload {
                 self.end(desk, Verdict::Interrupted, unit, "cancelled before anything was changed")
             }
             Stage::AskedForLoader(_) => {
-                desk.leave_dialogue();
-                let what = "cancelled before anything was changed";
-                self.end(desk, Verdict::Interrupted, UnitNow::Application, what)
+                self.turn_back(desk, Verdict::Interrupted, "cancelled before anything was changed");
+                None
             }
             // The reset cannot be called back; what the unit is afterwards is worth a few seconds.
             Stage::PasswordSent | Stage::AskWho(_) => {
@@ -250,9 +253,14 @@ impl Upload {
                 self.deadline = identify.deadline();
                 outcome.and_then(|_| self.checked(desk))
             }
-            Stage::AskedForLoader(Answer::Question) if due => self.send_password(desk),
-            Stage::AskedForLoader(Answer::Refusal) if due => self.refused(desk),
-            Stage::AskedForLoader(Answer::None) if due => self.not_asked(desk),
+            &mut Stage::AskedForLoader(answer) if due => {
+                match answer {
+                    Answer::Question => self.send_password(desk),
+                    Answer::Refusal => self.refused(desk),
+                    Answer::None => self.not_asked(desk),
+                }
+                None
+            }
             Stage::PasswordSent if due => self.ask_who(desk),
             Stage::AskWho(identify) => {
                 let outcome = identify.handle(Signal::Tick, desk);
@@ -289,6 +297,10 @@ fn shows_application(message: &Message) -> bool {
 
 impl Work for Upload {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
+        if let Some(leaving) = &mut self.leaving {
+            // Why nothing is uploaded has been decided.
+            return leaving.handle(signal, leaving.then(), desk);
+        }
         match signal {
             Signal::Begin => {
                 self.asked_from = desk.received;
@@ -346,11 +358,14 @@ impl Work for Upload {
     }
 
     fn deadline(&self) -> Option<Instant> {
+        if let Some(leaving) = &self.leaving {
+            return Some(leaving.due());
+        }
         [self.deadline, self.unheard.map(|(due, _)| due), self.hold_due].into_iter().flatten().min()
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {
-        matches!(self.stage, Stage::AskedForLoader(_)) && prompt == Prompt::Password
+        matches!(self.stage, Stage::AskedForLoader(_)) && self.leaving.is_none() && prompt == Prompt::Password
     }
 }
 

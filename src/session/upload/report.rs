@@ -112,7 +112,7 @@ pub struct LoadReport {
 /// second, and has two seconds for starting over.
 pub const SILENT: Duration = Duration::from_millis(2500);
 
-/// What to do about a unit that has fallen silent with a part of the file.
+/// What to do about a unit that has a part of the file and of which nothing is heard any more ([`LoadReport::doubt`]).
 pub const SEE_POWER: &str = "see that it has power and that the cable is in, and send the file again: it has no complete \
                              software and comes back to its loader";
 
@@ -121,6 +121,19 @@ impl LoadReport {
     /// without power.
     pub fn left_in_the_middle(&self) -> bool {
         self.verdict == Verdict::Failed && self.unit == UnitNow::Loader && self.records > 0
+    }
+
+    /// What can be said of a unit that was left in the middle and of which nothing is heard any more, since its link is
+    /// lost or it is silent; to follow "the unit is". [`SEE_POWER`] is what to do then, in place of
+    /// [`LoadReport::advice`]. `None` if what the report says of the unit still holds.
+    pub fn doubt(&self, is_lost: bool, is_silent: bool) -> Option<&'static str> {
+        match (is_lost, is_silent) {
+            _ if !self.left_in_the_middle() => None,
+            // Behind a lost link nobody can say that it is silent.
+            (true, _) => Some("in its loader, or without power"),
+            (false, true) => Some("silent: in its loader, or without power"),
+            (false, false) => None,
+        }
     }
 
     /// What the user should do now, by what is true of the unit; to follow other words.
@@ -281,6 +294,23 @@ mod tests {
             [(1, Phase::Transfer, true), (3073, Phase::Finish, false), (3074, Phase::Transfer, false)]
         {
             assert!(waits(records, phase, found).contains("no complete software"), "{records} {phase:?}");
+        }
+    }
+
+    #[test]
+    fn of_a_unit_that_is_not_heard_with_part_of_the_file_nobody_says_that_it_waits() {
+        let half = report(Verdict::Failed, UnitNow::Loader, 9);
+        assert_eq!(half.doubt(false, false), None);
+        assert_eq!(half.doubt(false, true), Some("silent: in its loader, or without power"));
+        for is_silent in [false, true] {
+            assert_eq!(half.doubt(true, is_silent), Some("in its loader, or without power"));
+        }
+        for (verdict, unit, records) in [
+            (Verdict::Failed, UnitNow::Loader, 0),
+            (Verdict::Failed, UnitNow::Unknown, 9),
+            (Verdict::Interrupted, UnitNow::Loader, 9),
+        ] {
+            assert_eq!(report(verdict, unit, records).doubt(true, true), None, "{verdict:?} {unit:?} {records}");
         }
     }
 

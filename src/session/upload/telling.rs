@@ -79,17 +79,23 @@ impl Upload {
         }
     }
 
+    /// The upload is over.
     pub(super) fn end(
-        &mut self,
+        &self,
         desk: &Desk<'_>,
         verdict: Verdict,
         unit: UnitNow,
         what: impl Into<String>,
     ) -> Option<Outcome> {
+        Some(self.outcome(desk, verdict, unit, what))
+    }
+
+    /// What is to be said of it if it ends so at this moment.
+    pub(super) fn outcome(&self, desk: &Desk<'_>, verdict: Verdict, unit: UnitNow, what: impl Into<String>) -> Outcome {
         let transfer = self.transfer.as_ref();
         let records = transfer.map_or(0, |transfer| transfer.reached().sent);
         let records_total = transfer.map_or(0, |transfer| transfer.total().0);
-        Some(Outcome::Loaded(Box::new(LoadReport {
+        Outcome::Loaded(Box::new(LoadReport {
             verdict,
             proof: if self.order.image.identity().is_some() { Proof::Banner } else { Proof::Missing },
             phase: if verdict == Verdict::Done { Phase::Verify } else { self.phase() },
@@ -109,7 +115,7 @@ impl Upload {
             misfit: self.misfit,
             // Before a loader has taken everything, what it seems to be may have been a unit without power.
             remark: transfer.and_then(Transfer::remark).filter(|_| verdict == Verdict::Done),
-        })))
+        }))
     }
 
     pub(super) fn quote(&mut self, text: &Text, message: &Message) {

@@ -56,6 +56,29 @@ fn a_question_behind_l_that_is_not_understood_is_quoted_and_gets_no_password() {
 }
 
 #[test]
+fn an_upload_that_turns_back_leaves_every_question_the_unit_asks() {
+    const OTHER: (&str, u64, &str) = ("l", 5, "Load new software? Enter Yes: ");
+    const PASSWORD: (&str, u64, &str) = ("l", 5, "Password: ");
+    type Script = &'static [(&'static str, u64, &'static str)];
+    let table: [(Script, Verdict, &str); 4] = [
+        (&[OTHER], Verdict::NoAnswer, "l ~"),
+        (&[OTHER, ("~", 300, "\r\nSure? ")], Verdict::NoAnswer, "l ~ ~"),
+        (&[PASSWORD, ("AXIO-2010", 40, "\r\nWrong password\r\n")], Verdict::UnitRefused, "l AXIO-2010 ~ ~"),
+        (
+            &[PASSWORD, ("AXIO-2010", 40, "\r\nPassword: "), ("~", 0, ""), ("~", 5, "\r\nOnce more: ")],
+            Verdict::UnitRefused,
+            "l AXIO-2010 ~ ~ ~",
+        ),
+    ];
+    for (script, verdict, sent) in table {
+        let (report, alone) = upload_behind(script);
+        assert_eq!((report.verdict, report.unit), (verdict, UnitNow::Application), "{report:?}");
+        let from_l = alone.sent.iter().map(|(_, text)| text.as_str()).skip_while(|text| *text != "l");
+        assert_eq!(from_l.collect::<Vec<_>>().join(" "), sent);
+    }
+}
+
+#[test]
 fn what_a_unit_says_where_it_does_not_echo_is_recorded_and_quoted_as_it_says_it() {
     let record = |alone: &Alone| {
         let bytes: Vec<u8> = alone.session.record().entries().flat_map(|entry| entry.bytes.clone()).collect();
