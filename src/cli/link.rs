@@ -14,7 +14,7 @@ use crate::host::network::NetworkError;
 use crate::host::ports::{self, Port};
 use crate::host::pump::PumpError;
 use crate::host::recorder::{self, Plan, Recorder};
-use crate::host::replay::RecordingError;
+use crate::host::replay::{Recording, RecordingError};
 use crate::telnet::Refusal;
 
 /// The link that the user named, or the only USB serial port there is.
@@ -88,6 +88,16 @@ pub fn open(
     let dialled = waiting::begin(sender.clone(), move || Connection::dial(&server, options, clock))?;
     let dialled = waiting::end(inputs, &dialled)?.map_err(link_error)?;
     Connection::over(spec, dialled, options, clock, sender).map_err(link_error)
+}
+
+/// Opens a recording. Signals come on `inputs` meanwhile: a pipe is waited for, and what comes first through it.
+///
+/// # Errors
+/// If it cannot be read, or the user interrupts.
+pub fn open_recording(path: &Path, sender: SyncSender<Input>, inputs: &Receiver<Input>) -> Result<Recording, CliError> {
+    let path = path.to_owned();
+    let opened = waiting::begin(sender, move || Recording::open(&path))?;
+    waiting::end(inputs, &opened)?.map_err(recording_error)
 }
 
 /// What the journal of uploads calls the port: the adapter's serial number where it has one, since its name may be

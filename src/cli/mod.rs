@@ -90,7 +90,7 @@ pub struct Global {
     /// Line rate in baud; the units have 115200.
     #[arg(long, value_name = "RATE", default_value_t = 115_200, global = true, allow_negative_numbers = true, value_parser = numbers::within::<u32>(50..=12_000_000))]
     pub baud: u32,
-    /// Data and errors as JSON; `terminal`, whose data is bytes, has none.
+    /// Data and errors as JSON. Not for `terminal`, `eds`, `completions` and `man`, whose output has a form of its own.
     #[arg(long, global = true)]
     pub json: bool,
     /// Answer yes to every question, and replace files that are there.
@@ -161,6 +161,16 @@ impl Command {
             | Command::Emulate(_)
             | Command::Completions(_)
             | Command::Man(_) => false,
+        }
+    }
+
+    /// What the command writes, where that has a form of its own and so none in JSON.
+    fn form_of_its_own(&self) -> Option<&'static str> {
+        match self {
+            Command::Eds(_) => Some("an electronic data sheet"),
+            Command::Completions(_) => Some("a script for a shell"),
+            Command::Man(_) => Some("man pages"),
+            _ => None,
         }
     }
 }
@@ -240,10 +250,14 @@ fn all_ports(global: &Global, args: &[OsString]) -> Result<(), CliError> {
         .hint("name all links after the command"))
 }
 
-/// Makes sure that no option for the link to a unit is given to a command that uses none; a default in the environment
-/// is given to all.
+/// Makes sure that no option is given that the command would ignore: `--json` where there is no JSON, or an option for
+/// the link to a unit where there is none. A default in the environment is given to all.
 fn all_of_use(cli: &Cli, matches: &ArgMatches) -> Result<(), CliError> {
     let Some((name, given)) = matches.subcommand() else { return Ok(()) };
+    if let Some(form) = cli.command.as_ref().and_then(Command::form_of_its_own).filter(|_| cli.global.json) {
+        let message = format!("'axcon {name}' writes {form} and no JSON, so --json does not apply");
+        return Err(CliError::message(error::Kind::Usage, message));
+    }
     if cli.command.as_ref().is_none_or(Command::looks_at_a_unit) {
         return Ok(());
     }

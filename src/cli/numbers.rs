@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use crate::time::Duration;
+
 /// `1 error`, `2,000 errors`.
 pub fn counted(number: u64, what: &str) -> String {
     format!("{} {what}{}", grouped(number), if number == 1 { "" } else { "s" })
@@ -41,6 +43,19 @@ where
     }
 }
 
+/// The longest time that is taken, a year: who wants more wants no end.
+const LONGEST: Duration = Duration::from_secs(366 * 24 * 3600);
+
+/// Reads a time of the command line, in seconds.
+///
+/// # Errors
+/// If it is none, or too long or too short, with the times that are taken.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    let time = text.parse::<f64>().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    time.filter(|time| !time.is_zero() && *time <= LONGEST)
+        .ok_or_else(|| format!("it takes seconds, more than 0 and no more than {}", grouped(LONGEST.as_secs())))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,6 +77,15 @@ mod tests {
         }
         assert_eq!(within::<u64>(1..=u64::MAX)("0"), Err("it takes a whole number, 1 or more".into()));
         assert_eq!(within::<u8>(1..=250)("250"), Ok(250));
+    }
+
+    #[test]
+    fn a_time_has_a_fraction_and_an_end() {
+        assert_eq!([seconds("0.5"), seconds("31622400")], [Ok(Duration::from_millis(500)), Ok(LONGEST)]);
+        for refused in ["0", "-0.0", "-1", "1e-12", "31622401", "1e300", "inf", "nan", "abc", ""] {
+            let said = "it takes seconds, more than 0 and no more than 31,622,400";
+            assert_eq!(seconds(refused), Err(said.into()), "{refused}");
+        }
     }
 
     #[test]

@@ -60,7 +60,8 @@ impl Output {
     /// that `--json` means, or the usual one.
     ///
     /// # Errors
-    /// If another one was named than `--json` means.
+    /// If another one was named than `--json` means. A file whose name promises one gets that: `--json` is then about
+    /// errors alone.
     pub fn format<F: ValueEnum + PartialEq>(
         &self,
         named: Option<F>,
@@ -177,12 +178,14 @@ mod tests {
             Csv,
             Json,
         }
-        let chosen = |json, named| {
+        let chosen = |json, named, promised| {
             let output = Output { json, out: Box::new(io::sink()), err: Remarks::to(io::sink()) };
-            output.format(named, None, Format::Json, Format::Csv).map_err(|error| error.to_string())
+            output.format(named, promised, Format::Json, Format::Csv).map_err(|error| error.to_string())
         };
-        assert_eq!([chosen(false, None), chosen(true, None)], [Ok(Format::Csv), Ok(Format::Json)]);
-        assert_eq!(chosen(false, Some(Format::Json)), Ok(Format::Json));
-        assert_eq!(chosen(true, Some(Format::Csv)), Err("--json and --format csv contradict each other".into()));
+        let (csv, json) = (Some(Format::Csv), Some(Format::Json));
+        assert_eq!([chosen(false, None, None), chosen(true, None, None)], [Ok(Format::Csv), Ok(Format::Json)]);
+        assert_eq!([chosen(false, json, csv), chosen(false, None, json)], [Ok(Format::Json), Ok(Format::Json)]);
+        assert_eq!([chosen(true, json, csv), chosen(true, None, csv)], [Ok(Format::Json), Ok(Format::Csv)]);
+        assert_eq!(chosen(true, csv, json), Err("--json and --format csv contradict each other".into()));
     }
 }

@@ -25,8 +25,8 @@ use crate::wire::stream::Source;
 /// Arguments of `axcon report`.
 ///
 /// Of a unit: values are read for some seconds, then a page of diagnostics and the object dictionary; the stream is left
-/// as it was found. Of a recording: what was asked then. If the unit dies meanwhile, the page says what is missing, and
-/// the exit code is 4, or 3 if the port has gone.
+/// as it was found. Of a recording: what was asked then; the page says what is not in it. If the unit dies meanwhile, the
+/// page says what is missing, and the exit code is 4, or 3 if the port has gone.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The page, HTML.
@@ -52,6 +52,8 @@ enum Step {
 }
 
 impl Step {
+    const ALL: [Step; 3] = [Step::Values, Step::Diagnostics, Step::Dictionary];
+
     fn what(self) -> &'static str {
         match self {
             Step::Values => "the stream",
@@ -95,6 +97,7 @@ pub fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliE
     let mut died = None;
     if is_recording {
         findings.ask(&mut talk, Command::Overhear, "the recording")?;
+        findings.note_unrecorded(args.no_dictionary);
     } else {
         died = findings.of_unit(&mut talk, args, output)?;
     }
@@ -152,11 +155,23 @@ impl Findings {
         }
     }
 
+    /// Notes what a recording does not show: nobody asked then, or nobody answered.
+    fn note_unrecorded(&mut self, no_dictionary: bool) {
+        let is_there = |step: &Step| match step {
+            Step::Values => self.monitor.stream.newest.is_some(),
+            Step::Diagnostics => self.monitor.diagnostics.at.is_some(),
+            Step::Dictionary => no_dictionary || self.reading.is_some(),
+        };
+        let absent = Step::ALL.into_iter().filter(|step| !is_there(step));
+        let sentences: Vec<String> = absent.map(|step| format!("Not in the recording: {}.", step.what())).collect();
+        self.missing.extend(sentences);
+    }
+
     /// Finds out all there is of a unit. Gives why it was left in the middle, if the unit or the link to it is gone: what is
     /// known by then is still worth a page.
     fn of_unit(&mut self, talk: &mut Talk, args: &Args, output: &mut Output) -> Result<Option<CliError>, CliError> {
         let mut died = None;
-        for step in [Step::Values, Step::Diagnostics, Step::Dictionary] {
+        for step in Step::ALL {
             if step == Step::Dictionary && args.no_dictionary {
                 continue;
             }

@@ -14,7 +14,6 @@ use crate::host::clock::Clock;
 use crate::host::comeback::{Cable, Comeback};
 use crate::host::link::LinkSpec;
 use crate::host::pump::{Pump, PumpError};
-use crate::host::replay::Recording;
 use crate::host::signal::Signals;
 use crate::host::{self, Input};
 use crate::record::{Ending, LINK_BACK, LINK_LOST};
@@ -86,9 +85,8 @@ impl Talk {
         let (sender, inputs) = host::channel();
         let (line, session, signals) = if let LinkSpec::Replay(path) = &spec {
             link::not_recorded_again(global)?;
-            // Before signals are heard: nobody hears them while a pipe waits for its writer.
-            let recording = Recording::open(path).map_err(link::recording_error)?;
             let signals = waiting::hear_signals(sender.clone())?;
+            let recording = link::open_recording(path, sender.clone(), &inputs)?;
             let line = Line::Recorded(Box::new(Playback::new(recording, inputs)));
             (line, Session::of_recording(global.baud), signals)
         } else {
@@ -186,11 +184,11 @@ impl Talk {
     ///
     /// # Errors
     /// If the link is lost or `news` fails.
-    pub fn listen(
+    pub fn listen<E: From<CliError>>(
         &mut self,
         until: Instant,
-        mut news: impl FnMut(&Session, &Event) -> Result<ControlFlow<()>, CliError>,
-    ) -> Result<bool, CliError> {
+        mut news: impl FnMut(&Session, &Event) -> Result<ControlFlow<()>, E>,
+    ) -> Result<bool, E> {
         let step = self.step(until, |session| {
             while let Some(event) = session.poll_event() {
                 match news(session, &event) {
@@ -214,7 +212,7 @@ impl Talk {
                 Ok(true)
             }
             Err(PumpError::Interrupted) => Ok(false),
-            Err(error) => Err(link::pump_error(error)),
+            Err(error) => Err(link::pump_error(error).into()),
         }
     }
 

@@ -147,13 +147,7 @@ pub fn conclude(
     output: &mut Output,
 ) -> Result<(), CliError> {
     let kind = exit_kind(report, lost.is_some());
-    // Of a unit behind a link that is gone nobody can say that it is silent.
-    let doubt = match (lost.is_some(), is_silent) {
-        (true, _) => Some("the unit is in its loader, or without power"),
-        (false, true) => Some("the unit is silent: in its loader, or without power"),
-        (false, false) => None,
-    };
-    let next = next_step(report, doubt);
+    let next = next_step(report, report.doubt(lost.is_some(), is_silent));
     let next = next.as_str();
     if output.json {
         let written = output.object(&LoadObject {
@@ -221,10 +215,10 @@ fn sent(report: &LoadReport) -> String {
     format!("sent: {records} of {total}{address}")
 }
 
-/// What to do next, and how it is said on a command line. `doubt`: what is known of a unit of which nothing is heard.
+/// What to do next, and how it is said on a command line. `doubt` is what [`LoadReport::doubt`] says.
 fn next_step(report: &LoadReport, doubt: Option<&str>) -> String {
-    if let Some(doubt) = doubt.filter(|_| report.left_in_the_middle()) {
-        return format!("{doubt}; {SEE_POWER}");
+    if let Some(doubt) = doubt {
+        return format!("the unit is {doubt}; {SEE_POWER}");
     }
     let advice = report.advice();
     match (report.verdict, &report.product) {
@@ -342,19 +336,10 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_that_is_silent_with_a_part_of_the_file_is_not_said_to_wait_in_its_loader() {
-        let next = |verdict, unit, records, is_silent: bool| {
-            next_step(&LoadReport { verdict, unit, records, ..refused() }, is_silent.then_some("it is silent"))
-        };
-        assert_eq!(next(Verdict::Failed, UnitNow::Loader, 9, true), format!("it is silent; {SEE_POWER}"));
-        for (verdict, unit, records, is_silent) in [
-            (Verdict::Failed, UnitNow::Loader, 9, false),
-            (Verdict::Failed, UnitNow::Loader, 0, true),
-            (Verdict::Failed, UnitNow::Unknown, 9, true),
-            (Verdict::Interrupted, UnitNow::Loader, 9, true),
-        ] {
-            let advice = next(verdict, unit, records, is_silent);
-            assert!(!advice.contains("is silent"), "{verdict:?} {unit:?} {records} {is_silent}: {advice}");
-        }
+    fn a_unit_of_which_nothing_is_heard_is_told_of_before_what_to_do_about_it() {
+        let half = LoadReport { verdict: Verdict::Failed, unit: UnitNow::Loader, records: 9, ..refused() };
+        let silent = next_step(&half, half.doubt(false, true));
+        assert_eq!(silent, format!("the unit is silent: in its loader, or without power; {SEE_POWER}"));
+        assert_eq!(next_step(&half, half.doubt(false, false)), half.advice());
     }
 }

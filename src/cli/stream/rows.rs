@@ -5,10 +5,11 @@ use std::path::Path;
 use clap::ValueEnum;
 use serde::Serialize;
 
+use super::end::End;
 use crate::cli::calendar::Calendar;
 use crate::cli::error::{CliError, Kind};
 use crate::cli::files::Destination;
-use crate::cli::output::Output;
+use crate::cli::output::{Closed, Output};
 use crate::device::Product;
 use crate::time::Instant;
 use crate::wire::stream::{Reading, Row, Source};
@@ -65,8 +66,8 @@ impl Sink {
     /// Writes a row, unless it is of another source than is wanted: then it is not, and `false`.
     ///
     /// # Errors
-    /// If it is another unit's, or cannot be written.
-    pub fn row(&mut self, at: Instant, row: &Row, raw: &[u8], output: &mut Output) -> Result<bool, CliError> {
+    /// If it is another unit's, cannot be written, or nobody reads it.
+    pub fn row(&mut self, at: Instant, row: &Row, raw: &[u8], output: &mut Output) -> Result<bool, End> {
         let now = row.readings.len();
         if let Some(before) = self.channels.filter(|&before| before != now) {
             return Err(another_unit(format!("the unit's rows have {now} values now and had {before}")));
@@ -95,19 +96,19 @@ impl Sink {
         text.push(b'\n');
         self.channels = Some(now);
         self.rows += 1;
-        self.out.append(&text, output).map(|()| true)
+        match self.out.append(&text, output) {
+            Ok(()) => Ok(true),
+            Err(error) if error.error.is::<Closed>() => Err(End::ReaderGone),
+            Err(error) => Err(End::Failed(error)),
+        }
     }
 }
 
-/// Another unit answers than the one that was asked.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct AnotherUnit(String);
-
-/// The error of a command that another unit answers.
-pub fn another_unit(what: String) -> CliError {
-    CliError::new(Kind::Failed, AnotherUnit(what))
-        .hint("another unit answers: its values are not written after those of the first one, and it is left as it is")
+/// The end of a stream that another unit goes on with than the one that was asked.
+pub fn another_unit(what: String) -> End {
+    const LEFT: &str =
+        "another unit answers: its values are not written after those of the first one, and it is left as it is";
+    End::UnitGone(CliError::message(Kind::Failed, what).hint(LEFT))
 }
 
 /// Names of a row's fields, from the layout that has as many.

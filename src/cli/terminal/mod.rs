@@ -19,12 +19,11 @@ use super::error::{CliError, Kind};
 use super::link;
 use super::output::Output;
 use super::{Global, files, waiting};
-use crate::host;
 use crate::host::clock::Clock;
 use crate::host::comeback::{Cable, Comeback};
 use crate::host::link::LinkSpec;
-use crate::host::replay::Recording;
 use crate::host::terminal::RawMode;
+use crate::host::{self, Input};
 use crate::record::{Direction, Ending, Piece};
 use crate::session::Session;
 use crate::time::Instant;
@@ -137,11 +136,16 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 
 /// Shows a recording as it was, as fast as it can be read.
 fn replay(path: &Path, look: Look, args: &Args, output: &mut Output) -> Result<(), CliError> {
-    let mut recording = Recording::open(path).map_err(link::recording_error)?;
+    let (sender, inputs) = host::channel();
+    let _signals = waiting::hear_signals(sender.clone())?;
+    let mut recording = link::open_recording(path, sender, &inputs)?;
     let mut log = args.log.clone().map(open_log).transpose()?;
     let time_of = time_of(Calendar::Recording(recording.header().unix_millis));
     let mut shown = Shown::new(look, args.timestamps, args.newline_in, false);
     while let Some(piece) = recording.next().map_err(link::recording_error)? {
+        if let Ok(Input::Signal(_)) = inputs.try_recv() {
+            return Err(CliError::reported(Kind::Interrupted));
+        }
         let mut out = Vec::new();
         match piece {
             Piece::Header(_) => {}

@@ -181,6 +181,57 @@ fn a_report_tells_all_of_a_unit_and_its_recording_tells_the_same() {
 }
 
 #[test]
+fn what_a_recording_does_not_show_is_missing_in_its_report() {
+    let world = World::new();
+    let recording = concat!(
+        r#"{"version":2,"width":80,"height":24}"#,
+        "\n",
+        r#"[0.1,"o","(c) Motorola Inc. S-Record loader. Version 1.3\r\nWaiting for application S-Record.\r\n"]"#,
+        "\n",
+    );
+    fs::write(world.path("loader.cast"), recording).expect("written");
+    let report = ["report", "--out", "unit.html", "--yes", "--port", "replay:loader.cast", "--json"];
+    let missing = |more: &[&str]| {
+        let ran = world.run(&[&report[..], more].concat(), b"");
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        let said = json(&ran.out);
+        assert_eq!(said["product"], Value::Null, "{said}");
+        said["missing"].clone()
+    };
+    let (stream, pages) = ("Not in the recording: the stream.", "Not in the recording: diagnostics.");
+    let all = serde_json::json!([stream, pages, "Not in the recording: the object dictionary."]);
+    assert_eq!(missing(&[]), all);
+    let page = fs::read_to_string(world.path("unit.html")).expect("a page");
+    assert!(page.contains("in its loader") && page.contains(stream), "{page}");
+    assert_eq!(missing(&["--no-dictionary"]), serde_json::json!([stream, pages]), "what nobody wants is not missing");
+}
+
+#[test]
+fn a_signal_ends_the_wait_for_a_recording_that_comes_through_a_pipe() {
+    for command in ["terminal", "stream"] {
+        let world = World::new();
+        let made = std::process::Command::new("mkfifo").arg(world.path("pipe")).status();
+        assert!(made.expect("a program of every Unix").success());
+        let running = world.start(&[command, "--port", "replay:pipe"]);
+        // This waits until it is read from: signals are heard by then.
+        let writer = fs::File::options().write(true).open(world.path("pipe")).expect("a reader");
+        running.signal(rustix::process::Signal::TERM);
+        assert_eq!(running.wait().code, Some(130), "{command}");
+        drop(writer);
+    }
+}
+
+#[test]
+fn a_signal_ends_a_terminal_whose_recording_does_not_go_on() {
+    let world = World::new();
+    let mut running = world.start(&["terminal", "--port", "replay:/dev/stdin"]);
+    running.input(b"{\"version\":2,\"width\":80,\"height\":24}\n[0.1,\"o\",\"hello\\r\\n\"]\n");
+    running.wait_out("hello");
+    running.signal(rustix::process::Signal::TERM);
+    assert_eq!(running.wait().code, Some(130));
+}
+
+#[test]
 fn an_interrupt_in_the_middle_of_a_dump_leaves_the_view() {
     let world = World::new();
     let mut unit = world.start(&["emulate", "axtc4co", "--link", "u1"]);
@@ -414,6 +465,9 @@ fn an_option_that_would_be_ignored_is_refused() {
         (&["stream", "--format", "csv", "--json", "--port", "u0"], "--json and --format csv contradict each other"),
         (&["diagnostics", "--json", "--format", "text", "--port", "u0"], "--json and --format text contradict"),
         (&["dictionary", "dump", "--json", "--format", "dcf", "--port", "u0"], "--json and --format dcf contradict"),
+        (&["eds", "axtc4co", "--json"], "'axcon eds' writes an electronic data sheet and no JSON, so --json does not"),
+        (&["--json", "completions", "bash"], "'axcon completions' writes a script for a shell and no JSON, so --json"),
+        (&["man", "--json"], "'axcon man' writes man pages and no JSON, so --json does not apply"),
     ] {
         let ran = world.run(args, b"");
         assert_eq!(ran.code, Some(2), "{args:?}: {}", ran.err);
@@ -432,6 +486,8 @@ fn a_number_that_is_not_taken_is_answered_with_those_that_are() {
         (&["stream", "--reconnect", "-1"][..], "'-1' for '--reconnect <S>': it takes a whole number, 0 or more"),
         (&["stream", "--count", "-1"], "'-1' for '--count <N>': it takes a whole number, 1 or more"),
         (&["stream", "--period", "abc"], "'abc' for '--period <MS>': it takes a whole number from 1 to 60,000"),
+        (&["stream", "--duration", "abc"], "'abc' for '--duration <S>': it takes seconds, more than 0 and"),
+        (&["stream", "--duration", "-1"], "it takes seconds, more than 0 and no more than 31,622,400"),
         (&["report", "--out", "r.html", "--seconds", "-1"], "it takes a whole number from 1 to 3,600"),
         (&["diagnostics", "--count", "0"], "it takes a whole number from 1 to 4,294,967,295"),
         (
