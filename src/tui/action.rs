@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::input::Playback;
-use super::popup::{Question, Wanted};
+use super::popup::{PickedFor, Question};
 use super::screens::ScreenId;
 use crate::image::DefectId;
 use crate::secret::Secret;
@@ -66,7 +66,7 @@ pub enum Action {
     /// Compare the object dictionary with a saved dump.
     Compare(PathBuf),
     /// Ask for a file that is there.
-    Choose(Wanted),
+    PickFile(PickedFor),
     /// Read a file that the unit shall get as it is.
     ReadToSend(PathBuf),
     /// Send it.

@@ -75,7 +75,7 @@ pub enum Cmd {
     /// The next one further up.
     FindNext,
     /// Only some of it.
-    Only,
+    Filter,
     /// Compare with a file.
     Compare,
     /// Send long records.
@@ -104,6 +104,23 @@ pub enum Cmd {
     Power,
     /// The next key is for the console.
     Prefix,
+}
+
+impl Cmd {
+    /// Where a cursor at `place` goes in a list whose last place is `last` and of which `page` rows are in sight. `None` if
+    /// the command is another one.
+    pub fn moved(self, place: usize, last: usize, page: usize) -> Option<usize> {
+        let moved = match self {
+            Cmd::Up => place.saturating_sub(1),
+            Cmd::Down => place.saturating_add(1),
+            Cmd::PageUp => place.saturating_sub(page),
+            Cmd::PageDown => place.saturating_add(page),
+            Cmd::First => 0,
+            Cmd::Last => last,
+            _ => return None,
+        };
+        Some(moved.min(last))
+    }
 }
 
 /// The keys of the unit's main menu.
@@ -305,6 +322,14 @@ mod tests {
         assert_eq!(find(KeyCode::Char('d'), KeyModifiers::ALT), None);
         assert_eq!(find(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(Cmd::Quit));
         assert_eq!(find(KeyCode::Char('c'), KeyModifiers::NONE), Some(Cmd::Reconnect));
+    }
+
+    #[test]
+    fn a_cursor_stays_in_its_list() {
+        let moved = |cmd: Cmd| cmd.moved(3, 5, 4);
+        let moves = [Cmd::Up, Cmd::Down, Cmd::PageUp, Cmd::PageDown, Cmd::First, Cmd::Last];
+        assert_eq!(moves.map(moved), [2, 4, 0, 5, 0, 5].map(Some));
+        assert_eq!((moved(Cmd::Left), Cmd::Up.moved(9, 5, 4)), (None, Some(5)), "where the list has become shorter");
     }
 
     #[test]

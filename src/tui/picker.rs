@@ -122,27 +122,24 @@ impl Picker {
     /// What a command does; `page` is the number of rows in sight.
     pub fn on(&mut self, cmd: Cmd, page: usize) -> Option<Picked> {
         let last = self.entries().len().saturating_sub(1);
+        if let Some(place) = cmd.moved(self.cursor, last, page) {
+            self.cursor = place;
+            return None;
+        }
         match cmd {
-            Cmd::Up => self.cursor = self.cursor.saturating_sub(1),
-            Cmd::Down => self.cursor = (self.cursor + 1).min(last),
-            Cmd::PageUp => self.cursor = self.cursor.saturating_sub(page),
-            Cmd::PageDown => self.cursor = (self.cursor + page).min(last),
-            Cmd::First => self.cursor = 0,
-            Cmd::Last => self.cursor = last,
-            Cmd::Refresh => return Some(Picked::Folder(self.list(self.directory.clone()))),
-            Cmd::Back => return self.parent(),
+            Cmd::Refresh => Some(Picked::Folder(self.list(self.directory.clone()))),
+            Cmd::Back => self.parent(),
             Cmd::Accept => {
                 let entry = self.entries().get(self.cursor)?;
                 let path = self.directory.join(&entry.name);
-                return match entry.kind {
+                match entry.kind {
                     FileKind::Folder if entry.name == ".." => self.parent(),
                     FileKind::Folder => Some(Picked::Folder(self.list(path))),
                     FileKind::File => Some(Picked::File(path)),
-                };
+                }
             }
-            _ => {}
+            _ => None,
         }
-        None
     }
 
     /// What is in the folder, in `room` rows; `otherwise` says how else a file can be named.
@@ -153,9 +150,9 @@ impl Picker {
             }
             Listing::Failed(why) => {
                 let text = format!("The folder cannot be read: {}", visible::text(why));
-                let broken = format::wrap(&text, columns.saturating_sub(4)).into_iter();
-                let told = broken.map(|line| Line::styled(format!("  {line}"), theme.bad()));
-                return told.chain([Line::raw(format!("  {otherwise}"))]).collect();
+                let mut told = lines::paragraph(&text, columns, theme.bad());
+                told.push(Line::raw(format!("  {otherwise}")));
+                return told;
             }
             Listing::Read { entries, .. } => entries,
         };

@@ -58,7 +58,7 @@ impl Returning {
     }
 
     /// Keeps a row or a page of the unit there now.
-    pub fn wait(&mut self, event: Event) {
+    pub fn keep(&mut self, event: Event) {
         if self.waiting.len() == MOST_WAITING {
             self.waiting.pop_front();
         }
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn what_waits_is_bounded() {
         let mut returning = Returning::new(Facts::default());
-        (0..MOST_WAITING + 5).for_each(|count| returning.wait(Event::EntriesRead(count)));
+        (0..MOST_WAITING + 5).for_each(|count| returning.keep(Event::EntriesRead(count)));
         let waited = returning.release();
         assert_eq!((waited.len(), waited.front()), (MOST_WAITING, Some(&Event::EntriesRead(5))));
     }

@@ -12,7 +12,7 @@ mod menu;
 mod network;
 mod prompt;
 pub mod stream;
-mod units;
+pub mod units;
 pub mod visible;
 mod words;
 
@@ -21,7 +21,7 @@ pub use boot::{LoaderError, LoaderText, complains};
 pub use framer::{Framer, Item, LONGEST_LINE, Text};
 pub use menu::{Confidence, MenuKey, SoftwareName};
 pub use network::{Network, NmtState};
-pub use prompt::{Prompt, SourceKeys};
+pub use prompt::{Prompt, SourceKeys, is_question};
 
 use stream::{Layout, Row, Source};
 

@@ -2,13 +2,15 @@
 
 /// A unit in one spelling, and what it measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Unit {
-    pub(super) quantity: &'static str,
-    pub(super) name: &'static str,
+pub struct Unit {
+    /// What it measures, in a word: `voltage`.
+    pub quantity: &'static str,
+    /// How it is written here, in ASCII: `mV`, `ohm`.
+    pub name: &'static str,
 }
 
-/// The unit a word is, in any case and with any sign for "micro".
-pub(super) fn unit(word: &str) -> Option<Unit> {
+/// The unit a word is, in any case and with any sign for "micro". `None` for any other word.
+pub fn unit(word: &str) -> Option<Unit> {
     let (quantity, name) = match word.to_lowercase().replace(['µ', 'μ'], "u").as_str() {
         "v" => ("voltage", "V"),
         "mv" => ("voltage", "mV"),

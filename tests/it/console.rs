@@ -515,7 +515,7 @@ fn task_recover_an_upload_whose_cable_was_pulled() {
     desk.keys("y");
     let begun = desk.drawn();
     assert!(begun.contains("── Loading"), "neither label nor password need be asked for: {begun}");
-    desk.wait_for("after 1.2.0");
+    desk.wait_for("1.2.0 afterwards");
     assert_snapshot!("task_recover_verdict", desk.drawn());
 }
 
@@ -528,7 +528,7 @@ fn task_recover_an_upload_whose_console_was_killed() {
     desk.keys("lp/images/AXTC4CO_V1.2.0.elf.S").press(KeyCode::Enter);
     assert_snapshot!("task_recover_after_a_kill", desk.drawn());
     desk.press(KeyCode::Enter).keys("y");
-    desk.wait_for("after 1.2.0");
+    desk.wait_for("1.2.0 afterwards");
     assert_eq!(desk.noted, None);
 }
 

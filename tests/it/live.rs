@@ -64,7 +64,7 @@ fn an_upload_by_keys_ends_with_the_new_banner() {
     screen.wait("Password for loading software");
     screen.keys("AXIO-2010\r");
     let verdict = screen.wait("── Verdict");
-    assert!(verdict.contains("Done") && verdict.contains("after 1.2.0"), "{verdict}");
+    assert!(verdict.contains("Done") && verdict.contains("1.2.0 afterwards"), "{verdict}");
     for recording in world.files("state/axcon/recordings") {
         assert!(!fs::read_to_string(recording).expect("a recording").contains("AXIO"));
     }

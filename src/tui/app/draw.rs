@@ -77,7 +77,7 @@ impl App {
             (ScreenId::Stream, Cmd::Export) => has_rows || view.export.is_some(),
             (ScreenId::Overview | ScreenId::Stream, _) => has_rows,
             (ScreenId::Dictionary, Cmd::Compare) => view.current_dictionary().is_some(),
-            (ScreenId::Dictionary, Cmd::Export | Cmd::Only) => view.unit.dictionary.is_some(),
+            (ScreenId::Dictionary, Cmd::Export | Cmd::Filter) => view.unit.dictionary.is_some(),
             (ScreenId::Dictionary, Cmd::Back) => self.dictionary.is_narrowed() || view.job == Some(Job::ReadDictionary),
             (ScreenId::Dictionary, _) => view.unit.dictionary.is_some() || view.product().is_some(),
             (ScreenId::Diagnostics, _) => view.unit.monitor.diagnostics.at.is_some(),

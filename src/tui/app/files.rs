@@ -9,7 +9,7 @@ use crate::time::{Duration, Instant};
 use crate::tui::image_facts::ImageFacts;
 use crate::tui::input::{Effect, FIRST_BYTES, Failure, FileEntry};
 use crate::tui::picker::{begins_like_an_image, is_image_name};
-use crate::tui::popup::{Popup, Purpose, Question, Sent};
+use crate::tui::popup::{NamedFor, Popup, Question, Sent};
 use crate::tui::screens::dictionary::other_product;
 use crate::tui::view::{Export, Sending, Tone, marked};
 use crate::tui::visible;
@@ -21,7 +21,7 @@ impl App {
     pub(super) fn files_listed(&mut self, directory: PathBuf, entries: Result<Vec<FileEntry>, String>) {
         self.dirty = true;
         match &mut self.popup {
-            Some(Popup::Asking(Question::Choose { picker, .. })) if picker.awaits(&directory) => {
+            Some(Popup::Asking(Question::PickFile { picker, .. })) if picker.awaits(&directory) => {
                 picker.listed(directory, entries);
                 self.folder = picker.directory().to_path_buf();
             }
@@ -51,7 +51,9 @@ impl App {
         }
         let text = format!("{}: {}", visible::sentence(why), visible::text(&path.to_string_lossy()));
         match &mut self.popup {
-            Some(Popup::Asking(question @ Question::File { purpose: Purpose::Image, .. })) => question.refused(text),
+            Some(Popup::Asking(question @ Question::FileName { purpose: NamedFor::Image, .. })) => {
+                question.refused(text)
+            }
             Some(_) => self.view.tell(Tone::Bad, text),
             None => {
                 let failure = Failure { text, hints: Vec::new() };
@@ -62,7 +64,7 @@ impl App {
 
     /// The box in which an image's path was typed has done its work.
     fn close_path_box(&mut self) {
-        if matches!(self.popup, Some(Popup::Asking(Question::File { purpose: Purpose::Image, .. }))) {
+        if matches!(self.popup, Some(Popup::Asking(Question::FileName { purpose: NamedFor::Image, .. }))) {
             self.popup = None;
         }
     }
@@ -70,14 +72,14 @@ impl App {
     /// The box in which a file's name was typed says why it is not written; without it the last line does.
     fn not_written(&mut self, why: String) {
         match &mut self.popup {
-            Some(Popup::Asking(question @ Question::File { .. })) => question.refused(why),
+            Some(Popup::Asking(question @ Question::FileName { .. })) => question.refused(why),
             _ => self.view.tell(Tone::Bad, why),
         }
     }
 
     /// A file is being written: the box in which its name was typed waits for that.
     fn is_written(&mut self, path: &Path) {
-        if let Some(Popup::Asking(Question::File { form, .. })) = &mut self.popup {
+        if let Some(Popup::Asking(Question::FileName { form, .. })) = &mut self.popup {
             form.sent = Some(Sent::File(path.to_path_buf()));
         }
     }

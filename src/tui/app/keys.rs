@@ -53,7 +53,7 @@ impl App {
             MouseEventKind::ScrollDown => Some(KeyCode::Down),
             _ => None,
         };
-        let moves = matches!(&self.popup, None | Some(Popup::Asking(Question::Choose { .. })));
+        let moves = matches!(&self.popup, None | Some(Popup::Asking(Question::PickFile { .. })));
         if let Some(code) = step.filter(|_| moves) {
             self.dirty = true;
             return self.key(KeyEvent::new(code, KeyModifiers::NONE), effects);
@@ -97,7 +97,7 @@ impl App {
         match target {
             Target::Key(press) => self.key(press.event(), effects),
             Target::Entry(number) => {
-                let Some(Popup::Asking(Question::Choose { picker, form, .. })) = &mut self.popup else { return };
+                let Some(Popup::Asking(Question::PickFile { picker, form, .. })) = &mut self.popup else { return };
                 form.typed.clear();
                 if picker.choose(number) {
                     self.key(Press::Plain(KeyCode::Enter).event(), effects);
@@ -307,7 +307,7 @@ impl App {
             | Cmd::Export
             | Cmd::Find
             | Cmd::FindNext
-            | Cmd::Only
+            | Cmd::Filter
             | Cmd::Compare
             | Cmd::Pack
             | Cmd::Allow

@@ -328,7 +328,7 @@ impl App {
     /// Whether the unit of before was left with part of a file: it has nothing to run.
     fn was_left_half_loaded(&self, before: &Returning) -> bool {
         let load = &self.view.load;
-        let in_report = load.report.as_ref().filter(|_| !load.is_of_before).is_some_and(|report| {
+        let in_report = load.report.as_ref().filter(|_| !load.is_of_earlier_unit).is_some_and(|report| {
             report.unit == UnitNow::Loader && report.records > 0 && report.records < report.records_total
         });
         in_report || before.was_in_loader() && self.view.link.noted.is_some()

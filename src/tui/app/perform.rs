@@ -10,7 +10,7 @@ use crate::tui::action::Action;
 use crate::tui::input::{Effect, Noted};
 use crate::tui::link_name;
 use crate::tui::picker::expanded;
-use crate::tui::popup::{Popup, Question, Wanted};
+use crate::tui::popup::{PickedFor, Popup, Question};
 use crate::tui::screens::ScreenId;
 use crate::tui::view::Tone;
 use crate::tui::widgets::format;
@@ -89,9 +89,9 @@ impl App {
             Action::EndExport => self.end_export(None),
             Action::ExportDictionary(path) => self.export_dictionary(self.expanded(path), effects),
             Action::Compare(path) => effects.push(Effect::ReadFile(self.expanded(path))),
-            Action::Choose(Wanted::ToSend) if !self.may_send_file() => {}
-            Action::Choose(wanted) => {
-                self.ask(Question::choose(wanted, &self.folder));
+            Action::PickFile(PickedFor::ToSend) if !self.may_send_file() => {}
+            Action::PickFile(purpose) => {
+                self.ask(Question::pick_file(purpose, &self.folder));
                 effects.push(Effect::ListFiles(self.folder.clone()));
             }
             Action::ReadToSend(path) => effects.push(Effect::ReadBytes(self.expanded(path))),

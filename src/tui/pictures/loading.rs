@@ -276,6 +276,40 @@ fn a_unit_that_has_fallen_silent_is_not_said_to_wait() {
 }
 
 #[test]
+fn a_unit_whose_link_is_lost_in_the_middle_is_not_said_to_wait() {
+    let mut stage = Stage::connected(SMALL).with_image(good_image());
+    stage.bytes(b".").lost().finished(Outcome::Loaded(Box::new(report(Verdict::Failed, UnitNow::Loader))));
+    let doubts = |picture: &str| {
+        picture.contains("Unit now    in its loader, or without power") && picture.contains("See that it has power")
+    };
+    assert!(doubts(&stage.picture()) && !stage.shows("Keep the unit powered"), "{}", stage.picture());
+    // Nobody has answered yet on the link that is back.
+    stage.input(Input::LinkBack("/dev/ttyUSB0".into()));
+    assert!(doubts(&stage.picture()), "{}", stage.picture());
+}
+
+#[test]
+fn the_versions_of_an_upload_are_told_as_far_as_they_are_known() {
+    let known = |patch: Option<u16>| patch.map(|patch| Version::new(1, 1, patch));
+    for (before, after, words) in [
+        (Some(0), Some(1), "1.1.0 before, 1.1.1 afterwards"),
+        (Some(0), None, "1.1.0 before, unknown afterwards"),
+        (None, Some(1), "unknown before, 1.1.1 afterwards"),
+        (None, None, "unknown\n"),
+    ] {
+        let versions = (known(before), known(after));
+        let report = LoadReport {
+            version_before: versions.0,
+            version_after: versions.1,
+            ..report(Verdict::Failed, UnitNow::Loader)
+        };
+        let mut stage = Stage::connected(SMALL).with_image(good_image());
+        stage.finished(Outcome::Loaded(Box::new(report)));
+        assert!(stage.shows(&format!("Version     {words}")), "{}", stage.picture());
+    }
+}
+
+#[test]
 fn a_note_about_another_unit_stays_in_sight_beside_one_that_runs() {
     let mut stage = Stage::with_ports(SMALL);
     stage.press(KeyCode::Enter);

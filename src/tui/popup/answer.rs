@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::{Form, LONGEST_PERIOD_MS, Popup, Purpose, Question, SHORTEST_PERIOD_MS, Sent, Wanted};
+use super::{Form, LONGEST_PERIOD_MS, NamedFor, PickedFor, Popup, Question, SHORTEST_PERIOD_MS, Sent};
 use crate::device::Product;
 use crate::session::Command;
 use crate::time::Duration;
@@ -62,12 +62,12 @@ impl Popup {
     }
 }
 
-impl Wanted {
+impl PickedFor {
     /// What is to be done with the file.
     fn action(self, path: PathBuf) -> Action {
         match self {
-            Wanted::Dump => Action::Compare(path),
-            Wanted::ToSend => Action::ReadToSend(path),
+            PickedFor::Dump => Action::Compare(path),
+            PickedFor::ToSend => Action::ReadToSend(path),
         }
     }
 }
@@ -113,7 +113,7 @@ impl Question {
             self,
             Question::CancelLoad
                 | Question::Allow { .. }
-                | Question::Begun { .. }
+                | Question::SameUnit { .. }
                 | Question::Paste { .. }
                 | Question::SendFile { .. }
                 | Question::Disconnect { .. }
@@ -122,12 +122,12 @@ impl Question {
     }
 
     fn is_untyped_choice(&self) -> bool {
-        matches!(self, Question::Choose { form, .. } if form.typed.text().is_empty())
+        matches!(self, Question::PickFile { form, .. } if form.typed.text().is_empty())
     }
 
     /// Moves in the list of files, where there is one.
     fn move_in_list(&mut self, cmd: Cmd) -> Answer {
-        let Question::Choose { picker, .. } = self else { return Answer::Stay };
+        let Question::PickFile { picker, .. } = self else { return Answer::Stay };
         let picked = picker.on(cmd, PAGE);
         self.picked(picked)
     }
@@ -147,7 +147,7 @@ impl Question {
     fn picked(&self, picked: Option<Picked>) -> Answer {
         match (picked, self) {
             (Some(Picked::Folder(directory)), _) => Answer::Meanwhile(Action::ListFiles(directory)),
-            (Some(Picked::File(path)), Question::Choose { wanted, .. }) => Answer::Act(wanted.action(path)),
+            (Some(Picked::File(path)), Question::PickFile { purpose, .. }) => Answer::Act(purpose.action(path)),
             _ => Answer::Stay,
         }
     }
@@ -171,71 +171,38 @@ impl Question {
     /// Enter, or Y.
     fn accept(&mut self) -> Answer {
         match self {
-            Question::Link(form) | Question::File { form, .. } | Question::Order(form) if form.text().is_empty() => {
+            Question::Link(form) | Question::FileName { form, .. } | Question::Order(form)
+                if form.text().is_empty() =>
+            {
                 Answer::Stay
             }
             Question::Link(form) => Answer::Act(Action::Open(form.text().to_owned())),
-            Question::File { purpose, form, directory } => {
+            Question::FileName { purpose, form, directory } => {
                 let path = placed(directory, form.typed.text());
                 form.complaint = None;
                 match purpose {
                     // A mistyped name can be corrected here: the box goes when the file has been read.
-                    Purpose::Image => Answer::Meanwhile(Action::CheckImage(path)),
-                    Purpose::ExportStream => Answer::Meanwhile(Action::ExportStream(path)),
-                    Purpose::ExportDictionary => Answer::Meanwhile(Action::ExportDictionary(path)),
+                    NamedFor::Image => Answer::Meanwhile(Action::CheckImage(path)),
+                    NamedFor::ExportStream => Answer::Meanwhile(Action::ExportStream(path)),
+                    NamedFor::ExportDictionary => Answer::Meanwhile(Action::ExportDictionary(path)),
                 }
             }
-            Question::Choose { picker, form, .. } if form.text().is_empty() => {
+            Question::PickFile { picker, form, .. } if form.text().is_empty() => {
                 let picked = picker.on(Cmd::Accept, PAGE);
                 self.picked(picked)
             }
-            Question::Choose { wanted, picker, form } => {
-                Answer::Act(wanted.action(placed(picker.directory(), form.typed.text())))
+            Question::PickFile { purpose, picker, form } => {
+                Answer::Act(purpose.action(placed(picker.directory(), form.typed.text())))
             }
             Question::Find(_) => Answer::Close,
-            Question::Temperature { input, form } => match form.text().parse::<f64>() {
-                Ok(value) if value.is_finite() => {
-                    let line = format!("set {input} temperature {value}");
-                    form.sent = Some(Sent::Order(line.clone()));
-                    Answer::Meanwhile(Action::Order(line))
-                }
-                _ => {
-                    form.complaint = Some("A number of degrees, e.g. 451.5.".into());
-                    Answer::Stay
-                }
-            },
-            Question::Order(form) => match form.text() {
-                // The emulator's own help is made for a page, not for a line of answers.
-                text if text.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("help")) => {
-                    // What is typed next is the order that was looked for.
-                    form.typed.clear();
-                    form.complaint = Some("They are above; docs/emulator.md has all, with every fault.".into());
-                    Answer::Stay
-                }
-                text => {
-                    let line = text.to_owned();
-                    form.sent = Some(Sent::Order(line.clone()));
-                    Answer::Meanwhile(Action::Order(line))
-                }
-            },
-            Question::Stream { source, millis, .. } => match millis.text().parse() {
-                Ok(number @ SHORTEST_PERIOD_MS..=LONGEST_PERIOD_MS) => {
-                    let period = Duration::from_millis(number);
-                    Answer::Act(Action::Command(Command::StreamOn { source: *source, period }))
-                }
-                _ => {
-                    millis.complaint = Some("A whole number of milliseconds from 1 to 60000.".into());
-                    Answer::Stay
-                }
-            },
+            Question::Temperature { input, form } => set_temperature(*input, form),
+            Question::Order(form) => order(form),
+            Question::Stream { source, millis, .. } => switch_stream_on(*source, millis),
             Question::View => Answer::Act(Action::Command(Command::ReadDictionary)),
             Question::Defaults(form) if form.typed.text() == YES => {
                 Answer::Act(Action::Command(Command::RestoreDefaults))
             }
-            Question::Defaults(form) => {
-                form.complaint = Some("Only the word Yes, written like this, starts it.".into());
-                Answer::Stay
-            }
+            Question::Defaults(form) => form.wrong("Only the word Yes, written like this, starts it."),
             Question::Allow { errors, cursor, complaint } => match errors.get(*cursor) {
                 Some(error) if error.can_be_allowed() => Answer::Act(Action::Allow(*error)),
                 _ => {
@@ -243,28 +210,13 @@ impl Question {
                     Answer::Stay
                 }
             },
-            Question::Begun { noted, in_loader } => {
+            Question::SameUnit { noted, in_loader } => {
                 Answer::Act(Question::then_password(*in_loader, Some(noted.product.clone())))
             }
-            Question::Label { form, image, in_loader } => {
-                let label = form.text();
-                // Noted and compared as the product is written, however it is typed.
-                let known = Product::named(label).map(|product| product.name.as_str());
-                let of_image = image.as_deref().filter(|image| image.eq_ignore_ascii_case(label));
-                let complaint: Cow<str> = match known.or(of_image) {
-                    _ if label.is_empty() => "The part number is missing.".into(),
-                    None => {
-                        let names: Vec<&str> = Product::all().iter().map(|product| product.name.as_str()).collect();
-                        format!("There is no such product. Those there are: {}.", names.join(", ")).into()
-                    }
-                    Some(_) if image.is_some() && of_image.is_none() => {
-                        "The file is for another product: it must not be sent to this unit.".into()
-                    }
-                    Some(name) => return Answer::Act(Question::then_password(*in_loader, Some(name.to_owned()))),
-                };
-                form.complaint = Some(complaint);
-                Answer::Stay
-            }
+            Question::Label { form, image, in_loader } => match product_of_label(form.text(), image.as_deref()) {
+                Ok(product) => Answer::Act(Question::then_password(*in_loader, Some(product))),
+                Err(why) => form.wrong(why),
+            },
             Question::Password { field, complaint, .. } if field.is_empty() => {
                 *complaint = Some("The password is missing: without it the unit does not go into its loader.");
                 Answer::Stay
@@ -296,7 +248,7 @@ impl Question {
             // Only the key that is named: what is typed here may be a password, for which nothing has asked.
             Question::Allow { .. } if character == ' ' => return self.accept(),
             Question::Allow { .. } => {}
-            Question::Begun { .. } if character.eq_ignore_ascii_case(&'n') => return Answer::Act(Action::OtherUnit),
+            Question::SameUnit { .. } if character.eq_ignore_ascii_case(&'n') => return Answer::Act(Action::OtherUnit),
             Question::View if character.eq_ignore_ascii_case(&'t') => return Answer::Act(Action::ViewDictionary),
             Question::SendFile { is_image: true, .. } if character.eq_ignore_ascii_case(&'l') => {
                 return Answer::Act(Action::Go(ScreenId::Load));
@@ -341,5 +293,65 @@ impl Question {
     /// Whether something is typed here.
     fn has_field(&mut self) -> bool {
         matches!(self, Question::Password { .. }) || self.form().is_some()
+    }
+}
+
+impl Form {
+    /// It stays, to be corrected.
+    fn wrong(&mut self, why: impl Into<Cow<'static, str>>) -> Answer {
+        self.refuse(why);
+        Answer::Stay
+    }
+
+    /// This order goes to the emulated unit, whose answer the form awaits.
+    fn send_order(&mut self, line: String) -> Answer {
+        self.sent = Some(Sent::Order(line.clone()));
+        Answer::Meanwhile(Action::Order(line))
+    }
+}
+
+fn set_temperature(input: usize, form: &mut Form) -> Answer {
+    match form.text().parse::<f64>() {
+        Ok(value) if value.is_finite() => form.send_order(format!("set {input} temperature {value}")),
+        _ => form.wrong("A number of degrees, e.g. 451.5."),
+    }
+}
+
+fn order(form: &mut Form) -> Answer {
+    let line = form.text().to_owned();
+    // The emulator's own help is made for a page, not for a line of answers.
+    if line.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("help")) {
+        // What is typed next is the order that was looked for.
+        form.typed.clear();
+        return form.wrong("They are above; docs/emulator.md has all, with every fault.");
+    }
+    form.send_order(line)
+}
+
+fn switch_stream_on(source: Source, millis: &mut Form) -> Answer {
+    match millis.text().parse() {
+        Ok(number @ SHORTEST_PERIOD_MS..=LONGEST_PERIOD_MS) => {
+            let period = Duration::from_millis(number);
+            Answer::Act(Action::Command(Command::StreamOn { source, period }))
+        }
+        _ => millis.wrong("A whole number of milliseconds from 1 to 60000."),
+    }
+}
+
+/// The product that a label names, as the product is written, however it is typed; `image` is what the file is for. Or why
+/// the file must not be sent.
+fn product_of_label(label: &str, image: Option<&str>) -> Result<String, Cow<'static, str>> {
+    let known = Product::named(label).map(|product| product.name.as_str());
+    let of_image = image.filter(|image| image.eq_ignore_ascii_case(label));
+    match known.or(of_image) {
+        _ if label.is_empty() => Err("The part number is missing.".into()),
+        None => {
+            let names: Vec<&str> = Product::all().iter().map(|product| product.name.as_str()).collect();
+            Err(format!("There is no such product. Those there are: {}.", names.join(", ")).into())
+        }
+        Some(_) if image.is_some() && of_image.is_none() => {
+            Err("The file is for another product: it must not be sent to this unit.".into())
+        }
+        Some(name) => Ok(name.to_owned()),
     }
 }

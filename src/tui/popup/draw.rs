@@ -5,17 +5,15 @@ use ratatui::layout::{Position, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Clear};
 
-use super::content::{ENTER, LIST_ROW, ask, letter, paragraphs};
+use super::content::{Content, LIST_ROW, content, letter};
 use super::{Popup, Question};
 use crate::tui::keymap::Press;
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
-use crate::tui::visible;
-use crate::tui::widgets::{format, lines};
+use crate::tui::widgets::lines;
 
 /// Columns of a popup, borders included.
 const COLUMNS: u16 = 66;
-
 /// Columns of a popup with a list of files.
 const LIST_COLUMNS: u16 = 78;
 /// Rows of a list of files at most.
@@ -26,7 +24,7 @@ const AROUND_LIST: u16 = 12;
 const AROUND_CONTENT: u16 = 3;
 
 /// A popup with its place, and what can be clicked on it.
-struct Laid {
+struct Placed {
     window: Rect,
     inside: Rect,
     title: Span<'static>,
@@ -45,11 +43,11 @@ pub enum Target {
 
 /// Draws a popup in the middle of an area.
 pub fn draw(popup: &Popup, view: &View, theme: Theme, area: Rect, frame: &mut Frame) {
-    let laid = lay_out(popup, view, theme, area);
-    let block = Block::bordered().border_type(BorderType::Rounded).border_style(theme.quiet()).title(laid.title);
-    frame.render_widget(Clear, laid.window);
-    frame.render_widget(block, laid.window);
-    lines::draw(frame, laid.inside, laid.rows);
+    let Placed { window, inside, title, rows, .. } = lay_out(popup, view, theme, area);
+    let block = Block::bordered().border_type(BorderType::Rounded).border_style(theme.quiet()).title(title);
+    frame.render_widget(Clear, window);
+    frame.render_widget(block, window);
+    lines::draw(frame, inside, rows);
 }
 
 /// What a click at this place of the screen means to the popup.
@@ -58,39 +56,12 @@ pub fn target_at(popup: &Popup, view: &View, theme: Theme, area: Rect, place: Po
     targets.into_iter().find_map(|(rect, target)| rect.contains(place).then_some(target))
 }
 
-fn lay_out(popup: &Popup, view: &View, theme: Theme, area: Rect) -> Laid {
-    let is_list = matches!(popup, Popup::Asking(Question::Choose { .. }));
+fn lay_out(popup: &Popup, view: &View, theme: Theme, area: Rect) -> Placed {
+    let is_list = matches!(popup, Popup::Asking(Question::PickFile { .. }));
     let columns = if is_list { LIST_COLUMNS } else { COLUMNS }.min(area.width);
     let inner = usize::from(columns).saturating_sub(4);
     let room = usize::from(area.height.saturating_sub(AROUND_LIST)).clamp(1, MOST_LIST_ROWS);
-    let mut choices: Vec<(usize, Target)> = Vec::new();
-    let (title, mut rows, hints) = match popup {
-        Popup::Asking(question) => {
-            if let Question::Stream { .. } = question {
-                choices.extend([(0, Target::Key(letter('f'))), (1, Target::Key(letter('p')))]);
-            }
-            if let Question::Choose { picker, .. } = question {
-                let entry = |row| Some((LIST_ROW + row, Target::Entry(picker.entry_at(row, room)?)));
-                choices.extend((0..room).filter_map(entry));
-            }
-            ask(question, view, theme, (inner, room))
-        }
-        Popup::Waiting { what, hint } => ("One moment".to_owned(), paragraphs(&[what], inner), vec![*hint]),
-        Popup::Failed { title, failure } => {
-            let mut rows = paragraphs(&[visible::sentence(&failure.text)], inner);
-            for hint in &failure.hints {
-                rows.push(Line::default());
-                let broken = format::wrap(&visible::text(hint), inner.saturating_sub(2));
-                rows.extend(
-                    broken
-                        .into_iter()
-                        .enumerate()
-                        .map(|(number, line)| Line::raw(format!("{} {line}", if number == 0 { "·" } else { " " }))),
-                );
-            }
-            ((*title).to_owned(), rows, vec![(ENTER, "close")])
-        }
-    };
+    let Content { title, mut rows, hints } = content(popup, view, theme, (inner, room));
     // What does not fit is left out, but not the keys below it.
     let most = usize::from(area.height.saturating_sub(AROUND_CONTENT)).saturating_sub(2);
     if rows.len() > most {
@@ -98,15 +69,7 @@ fn lay_out(popup: &Popup, view: &View, theme: Theme, area: Rect) -> Laid {
         rows.push(Line::raw("…"));
     }
     let hints_row = rows.len() + 1;
-    let mut line = Line::default();
-    let mut keys: Vec<(u16, u16, Target)> = Vec::new();
-    for (press, meaning) in hints {
-        let begin = line.width() as u16;
-        line.push_span(Span::styled(press.name(), theme.key()));
-        line.push_span(Span::raw(format!(" {meaning}")));
-        keys.push((begin, line.width() as u16 - begin, Target::Key(press)));
-        line.push_span(Span::raw("   "));
-    }
+    let (line, keys) = keys_line(theme, hints);
     rows.extend([Line::default(), line]);
     let height = (rows.len() as u16 + 4).min(area.height);
     let y = match popup {
@@ -129,8 +92,34 @@ fn lay_out(popup: &Popup, view: &View, theme: Theme, area: Rect) -> Laid {
         let rect = Rect { x: inside.x + x, y: inside.y + row as u16, width, height: 1 };
         rect.intersection(inside)
     };
-    let mut targets: Vec<(Rect, Target)> =
-        choices.into_iter().map(|(row, target)| (place(row, 0, inside.width), target)).collect();
+    let choices = choices(popup, room).into_iter();
+    let mut targets: Vec<(Rect, Target)> = choices.map(|(row, target)| (place(row, 0, inside.width), target)).collect();
     targets.extend(keys.into_iter().map(|(x, width, target)| (place(hints_row, x, width), target)));
-    Laid { window, inside, title: Span::styled(format!(" {title} "), style), rows, targets }
+    Placed { window, inside, title: Span::styled(format!(" {title} "), style), rows, targets }
+}
+
+/// The rows of the content that can be clicked on; a list of files has `room` rows.
+fn choices(popup: &Popup, room: usize) -> Vec<(usize, Target)> {
+    match popup {
+        Popup::Asking(Question::Stream { .. }) => vec![(0, Target::Key(letter('f'))), (1, Target::Key(letter('p')))],
+        Popup::Asking(Question::PickFile { picker, .. }) => {
+            let entry = |row| Some((LIST_ROW + row, Target::Entry(picker.entry_at(row, room)?)));
+            (0..room).filter_map(entry).collect()
+        }
+        Popup::Asking(_) | Popup::Waiting { .. } | Popup::Failed { .. } => Vec::new(),
+    }
+}
+
+/// The line of the keys that answer, and where each of them is in it: its first column, and how many it has.
+fn keys_line(theme: Theme, hints: Vec<(Press, &'static str)>) -> (Line<'static>, Vec<(u16, u16, Target)>) {
+    let mut line = Line::default();
+    let mut keys = Vec::new();
+    for (press, meaning) in hints {
+        let begin = line.width() as u16;
+        line.push_span(Span::styled(press.name(), theme.key()));
+        line.push_span(Span::raw(format!(" {meaning}")));
+        keys.push((begin, line.width() as u16 - begin, Target::Key(press)));
+        line.push_span(Span::raw("   "));
+    }
+    (line, keys)
 }

@@ -1,13 +1,22 @@
 //! What is in front of a screen: a question, a wait, or a failure.
 //!
 //! All text is typed here, so that a letter on a screen is always a command and a letter in a popup never is.
+//!
+//! | file | what of a question it has |
+//! |---|---|
+//! | this one | which questions there are, with what is typed and chosen so far; how each is put |
+//! | `content.rs` | what it says, and which keys it names |
+//! | `warnings.rs` | what it says of the consequences, where that depends on the unit |
+//! | `draw.rs` | where it stands on the screen, and what a click on it means |
+//! | `answer.rs` | what keys and pasted text do to it, and what follows from its answer |
+//! | `form.rs` | the line that many of them have typed |
 
 mod answer;
 mod content;
 mod draw;
+mod form;
 mod warnings;
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::action::Action;
@@ -16,7 +25,7 @@ use super::input::{Failure, Noted};
 use super::keymap::Press;
 use super::picker::{Offers, Picker};
 use super::view::View;
-use super::widgets::field::{PasswordField, TextField};
+use super::widgets::field::PasswordField;
 use super::widgets::format;
 use crate::image::DefectId;
 use crate::session::UnitState;
@@ -25,6 +34,7 @@ use crate::wire::stream::Source;
 
 pub use answer::Answer;
 pub use draw::{Target, draw, target_at};
+pub use form::{Form, Sent};
 pub use warnings::in_the_middle;
 
 /// What is in front of the screen.
@@ -54,18 +64,18 @@ pub enum Question {
     /// A link by name.
     Link(Form),
     /// A file by name, in a folder.
-    File {
+    FileName {
         /// What it is for.
-        purpose: Purpose,
+        purpose: NamedFor,
         /// Its name, relative to the folder. The box goes when the file has been written.
         form: Form,
         /// The folder; empty for the one the program was started in.
         directory: PathBuf,
     },
     /// A file that is there: chosen from its folder, or its path typed.
-    Choose {
+    PickFile {
         /// What it is for.
-        wanted: Wanted,
+        purpose: PickedFor,
         /// The folder.
         picker: Picker,
         /// A path; where one has been typed, Enter takes that.
@@ -114,7 +124,7 @@ pub enum Question {
         complaint: Option<&'static str>,
     },
     /// Is the unit the one that the note of an upload is about? Any that waits in its loader on the same cable looks like it.
-    Begun {
+    SameUnit {
         /// The note.
         noted: Noted,
         /// It waits in its loader already, which asks for no password.
@@ -156,29 +166,9 @@ pub enum Question {
     Quit,
 }
 
-/// A line that is typed.
-#[derive(Debug, Default)]
-pub struct Form {
-    /// What has been typed.
-    pub typed: TextField,
-    /// What is wrong with it.
-    pub complaint: Option<Cow<'static, str>>,
-    /// What was made of it and is on its way, until there is an answer.
-    pub sent: Option<Sent>,
-}
-
-/// What was made of a line that was typed.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Sent {
-    /// An order to the emulated unit.
-    Order(String),
-    /// A file that is being written under this name.
-    File(PathBuf),
-}
-
-/// What a file is for.
+/// What a file whose name is typed is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub enum NamedFor {
     /// An image to load.
     Image,
     /// Rows of the stream go there.
@@ -187,9 +177,9 @@ pub enum Purpose {
     ExportDictionary,
 }
 
-/// What a file that is there is wanted for.
+/// What a file is for that is picked among those that are there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
+pub enum PickedFor {
     /// To compare the object dictionary with.
     Dump,
     /// To be sent to the unit as it is.
@@ -232,31 +222,31 @@ impl Question {
 
     /// Asks for an image.
     pub fn image(directory: &Path) -> Question {
-        Question::File { purpose: Purpose::Image, form: Form::default(), directory: directory.to_path_buf() }
+        Question::FileName { purpose: NamedFor::Image, form: Form::default(), directory: directory.to_path_buf() }
     }
 
     /// Asks for another file, and suggests a name for a new one.
-    pub fn file(purpose: Purpose, view: &View) -> Question {
+    pub fn file_name(purpose: NamedFor, view: &View) -> Question {
         let form = match purpose {
-            Purpose::Image => Form::default(),
-            Purpose::ExportStream => Form::with(suggested(view, "stream", view.unit.monitor.stream.newest, "csv")),
-            Purpose::ExportDictionary => {
+            NamedFor::Image => Form::default(),
+            NamedFor::ExportStream => Form::with(suggested(view, "stream", view.unit.monitor.stream.newest, "csv")),
+            NamedFor::ExportDictionary => {
                 let at = view.unit.dictionary.as_ref().map(|read| read.at);
                 Form::with(suggested(view, "dictionary", at, "json"))
             }
         };
-        Question::File { purpose, form, directory: PathBuf::new() }
+        Question::FileName { purpose, form, directory: PathBuf::new() }
     }
 
     /// Asks for a file that is there, beginning in a folder that has to be read.
-    pub fn choose(wanted: Wanted, directory: &Path) -> Question {
-        let offers = match wanted {
-            Wanted::Dump => Offers::Dumps,
-            Wanted::ToSend => Offers::Anything,
+    pub fn pick_file(purpose: PickedFor, directory: &Path) -> Question {
+        let offers = match purpose {
+            PickedFor::Dump => Offers::Dumps,
+            PickedFor::ToSend => Offers::Anything,
         };
         let mut picker = Picker::new(offers, directory.to_path_buf());
         picker.list(directory.to_path_buf());
-        Question::Choose { wanted, picker, form: Form::default() }
+        Question::PickFile { purpose, picker, form: Form::default() }
     }
 
     /// Asks for words to look for, those of the last time given.
@@ -295,7 +285,7 @@ impl Question {
     pub fn start_load(view: &View, facts: &ImageFacts) -> Action {
         let in_loader = view.facts.state == UnitState::Loader;
         if let Some(noted) = view.noted() {
-            return Action::Ask(Question::Begun { noted: noted.clone(), in_loader });
+            return Action::Ask(Question::SameUnit { noted: noted.clone(), in_loader });
         }
         match view.needs_label() {
             true => Action::Ask(Question::label(view, facts)),
@@ -321,8 +311,8 @@ impl Question {
     pub fn form(&mut self) -> Option<&mut Form> {
         match self {
             Question::Link(form)
-            | Question::File { form, .. }
-            | Question::Choose { form, .. }
+            | Question::FileName { form, .. }
+            | Question::PickFile { form, .. }
             | Question::Find(form)
             | Question::Temperature { form, .. }
             | Question::Order(form)
@@ -332,7 +322,7 @@ impl Question {
             Question::SendFile { .. }
             | Question::View
             | Question::Allow { .. }
-            | Question::Begun { .. }
+            | Question::SameUnit { .. }
             | Question::Password { .. }
             | Question::CancelLoad
             | Question::Paste { .. }
@@ -344,7 +334,7 @@ impl Question {
     /// What was typed is refused: it can be corrected where it was typed.
     pub fn refused(&mut self, why: String) {
         if let Some(form) = self.form() {
-            (form.sent, form.complaint) = (None, Some(why.into()));
+            form.refuse(why);
         }
     }
 
@@ -355,14 +345,14 @@ impl Question {
             | Question::Stream { .. }
             | Question::View
             | Question::Defaults(_)
-            | Question::Begun { .. }
+            | Question::SameUnit { .. }
             | Question::Label { .. }
             | Question::Password { .. }
             | Question::CancelLoad
             | Question::Paste { .. } => true,
             Question::Link(_)
-            | Question::File { .. }
-            | Question::Choose { .. }
+            | Question::FileName { .. }
+            | Question::PickFile { .. }
             | Question::Find(_)
             | Question::Temperature { .. }
             | Question::Order(_)
@@ -370,24 +360,6 @@ impl Question {
             | Question::Disconnect { .. }
             | Question::Quit => false,
         }
-    }
-}
-
-impl Form {
-    /// A line with this text in it.
-    fn with(text: impl Into<String>) -> Self {
-        Form { typed: TextField::new(text), ..Form::default() }
-    }
-
-    /// What has been typed, without the blanks around it.
-    fn text(&self) -> &str {
-        self.typed.text().trim()
-    }
-
-    /// Changes what has been typed. What was wrong with it was wrong with what it was.
-    fn edit(&mut self, change: impl FnOnce(&mut TextField)) {
-        self.complaint = None;
-        change(&mut self.typed);
     }
 }
 

@@ -1,31 +1,59 @@
-//! What threads find out for the loop, and how it hears of it.
+//! What threads find out for the loop, and how it is told of it.
 
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use super::Console;
 use super::connecting::Dial;
+use super::{Check, Console, files};
+use crate::device::LoaderKind;
 use crate::host;
 use crate::host::unit;
-use crate::tui::Input;
+use crate::image::DefectId;
+use crate::tui::{Input, LARGEST_SENT};
 
 /// Answers that wait for the loop at most. A thread with another one waits until there is room.
 const MOST_WAITING: usize = 64;
 /// Orders that wait for the emulated unit at most.
 const MOST_ORDERS: usize = 64;
 
+/// What the app asks of files, folders and ports. What takes its time to answer does so in a thread.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Inquiry {
+    /// The serial ports.
+    Ports,
+    /// What is in a folder.
+    Folder(PathBuf),
+    /// The recordings.
+    Recordings,
+    /// A text file.
+    Text(PathBuf),
+    /// A file as it is.
+    Bytes(PathBuf),
+    /// An image file, read and checked for a loader, if not each product's own, with these errors allowed.
+    Image { path: PathBuf, loader: Option<LoaderKind>, allow: Vec<DefectId> },
+}
+
+/// An inquiry that a thread is at.
+pub(super) struct OpenInquiry {
+    inquiry: Inquiry,
+    /// The same was asked meanwhile: what the thread finds may be older than that.
+    again: bool,
+}
+
 /// What a thread has found out.
 pub(super) enum Found {
-    /// Something the app has asked for.
-    Answer(Input),
+    /// Something that nobody has asked for: other ports, a file that is written.
+    News(Input),
+    /// The answer to an inquiry.
+    Answer(Inquiry, Input),
     /// What came of dialling a network link.
     Dialled(Box<Dial>),
 }
 
 impl From<Input> for Found {
     fn from(input: Input) -> Self {
-        Found::Answer(input)
+        Found::News(input)
     }
 }
 
@@ -82,9 +110,13 @@ impl Console {
         has_come
     }
 
-    fn take_found(&mut self, found: Found) {
+    pub(super) fn take_found(&mut self, found: Found) {
         match found {
-            Found::Answer(input) => self.handle(input),
+            Found::News(input) => self.handle(input),
+            Found::Answer(inquiry, input) => {
+                self.close_inquiry(&inquiry);
+                self.handle(input);
+            }
             Found::Dialled(dial) => self.take_dialled(*dial),
         }
     }
@@ -119,20 +151,59 @@ impl Console {
         self.handle(Input::Ordered { line, answer: Err(refusal.to_owned()) });
     }
 
-    /// Finds something out in a thread; where the system has none to give, here: late is better than never.
-    pub(super) fn ask<T: Into<Found>>(&mut self, find_out: impl FnOnce() -> T + Send + 'static) {
-        let work = Arc::new(Mutex::new(Some(find_out)));
-        let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let (shared, reporter) = (Arc::clone(&work), self.reporter.clone());
-        let started = thread::Builder::new().name("answer".to_owned()).spawn(move || {
-            if let Some(find_out) = take(&shared) {
-                reporter.report(find_out());
-            }
+    /// Asks in a thread. While a thread is at the same inquiry no other one is started for it, so that a key that is held
+    /// down does not start one after the other on a disk that hangs: it is made once more when that one has answered.
+    pub(super) fn ask(&mut self, inquiry: Inquiry) {
+        match self.inquiries.iter_mut().find(|open| open.inquiry == inquiry) {
+            Some(open) => open.again = true,
+            None => self.begin_inquiry(inquiry),
+        }
+    }
+
+    fn begin_inquiry(&mut self, inquiry: Inquiry) {
+        self.inquiries.push(OpenInquiry { inquiry: inquiry.clone(), again: false });
+        let (written, check) = (self.recorder.path().map(Path::to_owned), self.world.check);
+        self.in_thread(move || {
+            let input = inquiry.answer(written, check);
+            Found::Answer(inquiry, input)
         });
-        if started.is_err()
-            && let Some(find_out) = take(&work)
-        {
-            self.take_found(find_out().into());
+    }
+
+    /// A thread has answered.
+    fn close_inquiry(&mut self, inquiry: &Inquiry) {
+        let Some(place) = self.inquiries.iter().position(|open| open.inquiry == *inquiry) else { return };
+        let OpenInquiry { inquiry, again } = self.inquiries.swap_remove(place);
+        if again {
+            self.begin_inquiry(inquiry);
+        }
+    }
+
+    /// Finds something out in a thread; where the system has none to give, here: late is better than never.
+    pub(super) fn in_thread(&mut self, find_out: impl FnOnce() -> Found + Clone + Send + 'static) {
+        let (reporter, find_out_there) = (self.reporter.clone(), find_out.clone());
+        let started = thread::Builder::new().name("answer".to_owned()).spawn(move || reporter.report(find_out_there()));
+        if started.is_err() {
+            self.take_found(find_out());
+        }
+    }
+}
+
+impl Inquiry {
+    /// Finds it out, which may take long. `written` is the recording that is being written, `check` checks images.
+    fn answer(&self, written: Option<PathBuf>, check: Check) -> Input {
+        match self {
+            Inquiry::Ports => Input::PortsListed(files::ports()),
+            Inquiry::Folder(directory) => files::folder(directory),
+            Inquiry::Recordings => Input::RecordingsListed(files::recordings(files::state_folder(), written)),
+            Inquiry::Text(path) => Input::FileRead { path: path.clone(), text: files::text(path) },
+            Inquiry::Bytes(path) => Input::BytesRead { path: path.clone(), bytes: files::bytes(path, LARGEST_SENT) },
+            Inquiry::Image { path, .. } if path.is_dir() => files::folder(path),
+            Inquiry::Image { path, loader, allow } => {
+                match files::open(path).and_then(|_| check(path.clone(), *loader, allow)) {
+                    Ok(facts) => Input::ImageChecked(Box::new(facts)),
+                    Err(why) => Input::ImageUnreadable { path: path.clone(), why },
+                }
+            }
         }
     }
 }

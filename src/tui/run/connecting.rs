@@ -49,10 +49,11 @@ impl Console {
         self.handle(Input::LinkOpened(info));
     }
 
-    /// Begins to dial a network link, in a thread: a host that is switched off answers nothing for seconds.
+    /// Begins to dial a network link, in a thread: a host that is switched off answers nothing for seconds. Dialling ends by
+    /// itself, so those that nobody waits for any more do not pile up.
     pub(super) fn dial(&mut self, name: String, spec: LinkSpec) {
         let (number, clock, options) = (self.dial, self.clock, link::Options { baud: self.world.baud });
-        self.ask(move || {
+        self.in_thread(move || {
             let result = Connection::dial(&spec, options, clock);
             Found::Dialled(Box::new(Dial { number, name, spec, result }))
         });

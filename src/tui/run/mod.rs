@@ -22,11 +22,11 @@ use std::sync::mpsc::{Receiver, SyncSender};
 use ratatui::crossterm::event::Event as TerminalEvent;
 use ratatui::layout::Size;
 
-use answers::{Answers, PendingOrder, Reporter};
+use answers::{Answers, Inquiry, OpenInquiry, PendingOrder, Reporter};
 use player::Player;
 use writer::{Piece, Writer};
 
-use super::{App, Effect, Failure, ImageFacts, Input, LARGEST_SENT, Noted, Options, Palette};
+use super::{App, Effect, Failure, ImageFacts, Input, Noted, Options, Palette};
 use crate::device::LoaderKind;
 use crate::endpoint::Arrived;
 use crate::host;
@@ -193,6 +193,8 @@ struct Console {
     /// The way for threads to say what they have found out.
     reporter: Reporter,
     answers: Answers,
+    /// What threads are finding out; none of it twice.
+    inquiries: Vec<OpenInquiry>,
     /// Orders to the emulated unit that it has not answered yet, oldest first.
     orders: VecDeque<PendingOrder>,
     /// The link, which may be lost and come back.
@@ -237,6 +239,7 @@ impl Console {
             sender,
             reporter,
             answers,
+            inquiries: Vec::new(),
             orders: VecDeque::new(),
             cable: None,
             dial: 0,
@@ -441,20 +444,12 @@ impl Console {
                     self.lose_link(Failure { text, hints: Vec::new() });
                 }
             }
-            Effect::ListPorts => self.ask(|| Input::PortsListed(files::ports())),
-            Effect::ListFiles(directory) => self.ask(move || files::folder(&directory)),
-            Effect::ListRecordings => {
-                let written = self.recorder.path().map(ToOwned::to_owned);
-                self.ask(move || Input::RecordingsListed(files::recordings(files::state_folder(), written)));
-            }
-            Effect::ReadFile(path) => self.ask(move || {
-                let text = files::text(&path);
-                Input::FileRead { path, text }
-            }),
-            Effect::ReadBytes(path) => self.ask(move || {
-                let bytes = files::bytes(&path, LARGEST_SENT);
-                Input::BytesRead { path, bytes }
-            }),
+            Effect::ListPorts => self.ask(Inquiry::Ports),
+            Effect::ListFiles(directory) => self.ask(Inquiry::Folder(directory)),
+            Effect::ListRecordings => self.ask(Inquiry::Recordings),
+            Effect::ReadFile(path) => self.ask(Inquiry::Text(path)),
+            Effect::ReadBytes(path) => self.ask(Inquiry::Bytes(path)),
+            Effect::CheckImage { path, loader, allow } => self.ask(Inquiry::Image { path, loader, allow }),
             Effect::CreateFile { path, bytes } => self.write(Piece::New(path, bytes)),
             Effect::AppendFile { path, bytes } => self.write(Piece::More(path, bytes)),
             Effect::Mark(text) => self.recorder.mark(self.now(), &text),
@@ -466,18 +461,6 @@ impl Console {
                     None => Err("no link is open".to_owned()),
                 };
                 self.handle(Input::BreakSent(sent));
-            }
-            Effect::CheckImage { path, loader, allow } => {
-                let check = self.world.check;
-                self.ask(move || {
-                    if path.is_dir() {
-                        return files::folder(&path);
-                    }
-                    match files::open(&path).and_then(|_| check(path.clone(), loader, &allow)) {
-                        Ok(facts) => Input::ImageChecked(Box::new(facts)),
-                        Err(why) => Input::ImageUnreadable { path, why },
-                    }
-                });
             }
             Effect::UploadBegins { link, noted } => {
                 let note = self.world.note;

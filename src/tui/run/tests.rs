@@ -82,9 +82,14 @@ fn console_and_keys() -> (Console, SyncSender<TerminalEvent>) {
 }
 
 /// What a thread reports next.
+fn found(console: &Console) -> Found {
+    console.answers.recv_timeout(std::time::Duration::from_secs(60)).expect("an answer")
+}
+
+/// The same, where it is an input for the app.
 fn answer(console: &Console) -> Input {
-    match console.answers.recv_timeout(std::time::Duration::from_secs(60)).expect("an answer") {
-        Found::Answer(input) => input,
+    match found(console) {
+        Found::News(input) | Found::Answer(_, input) => input,
         Found::Dialled(_) => panic!("nothing is dialled here"),
     }
 }
@@ -260,6 +265,27 @@ fn what_is_not_a_regular_file_is_refused_and_not_waited_for() {
     type_keys(&mut console, &format!("1p{}\r", pipe.display()));
     let picture = Paper::new().picture(&console);
     assert!(picture.contains("Not connected") && picture.contains("a regular file"), "{picture}");
+}
+
+#[test]
+fn the_same_is_not_asked_twice_at_a_time_however_often_a_key_wants_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut console = console();
+    let list = |place: &std::path::Path| Effect::ListFiles(place.to_owned());
+    let other = folder.path().join("other");
+    console.perform(vec![list(folder.path()), list(folder.path()), list(folder.path()), list(&other)]);
+    assert_eq!(console.inquiries.len(), 2, "each is asked once");
+    let mut listed = Vec::new();
+    while !console.inquiries.is_empty() {
+        let found = found(&console);
+        if let Found::Answer(_, Input::FilesListed { directory, .. }) = &found {
+            listed.push(directory.clone());
+        }
+        console.take_found(found);
+    }
+    listed.sort();
+    // What was asked for meanwhile is looked at once more: it may have changed.
+    assert_eq!(listed, [folder.path(), folder.path(), other.as_path()]);
 }
 
 #[test]

@@ -54,7 +54,7 @@ impl Piece {
 }
 
 impl Writer {
-    /// `report` hears, in another thread, of every new file and of whatever could not be written.
+    /// `report` is told, in another thread, of every new file and of whatever could not be written.
     ///
     /// # Errors
     /// If the system gives no thread.

@@ -215,10 +215,9 @@ impl Bench {
         let theme = scene.theme;
         let Some(product) = scene.view.emulated() else {
             let texts = ["Here the sensors, the cable and the power of an emulated unit are in your hands.", NO_UNIT];
-            let room = usize::from(area.width).saturating_sub(4);
-            let broken = texts.into_iter().flat_map(|text| format::wrap(text, room));
-            let rows = broken.map(|line| Line::raw(format!("  {line}")));
-            return lines::draw(frame, area, [lines::rule(theme, area.width, "Bench", "")].into_iter().chain(rows));
+            let mut rows = vec![lines::rule(theme, area.width, "Bench", "")];
+            rows.extend(texts.iter().flat_map(|text| lines::paragraph(text, usize::from(area.width), Style::new())));
+            return lines::draw(frame, area, rows);
         };
         let newest = scene.view.unit.monitor.stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
         let newest = newest.map(|time| format!(", newest row {time}")).unwrap_or_default();
@@ -260,13 +259,9 @@ impl Bench {
             Wire::Shorted => ("shorted", theme.bad()),
         };
         let channel = channel_of(scene.view, product, place);
-        let says = channel.and_then(|channel| channel.reading.value()).map_or_else(
-            || "-".to_owned(),
-            |value| {
-                let source = scene.view.unit.monitor.stream.source.unwrap_or(Source::FieldValue);
-                format!("{value:.*}", super::overview::decimals(scene.view, source))
-            },
-        );
+        let source = scene.view.unit.monitor.stream.source.unwrap_or(Source::FieldValue);
+        let decimals = super::overview::decimals(scene.view, source);
+        let says = format::decimal(channel.and_then(|channel| channel.reading.value()), decimals);
         let words = channel.map_or("", Channel::words);
         let says_style = if scene.view.why_old().is_some() { theme.quiet() } else { Style::new() };
         let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, place + 1);

@@ -3,6 +3,7 @@
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
+use ratatui::style::Style;
 use ratatui::text::Line;
 
 use super::{Scene, ScreenId};
@@ -12,6 +13,7 @@ use crate::tui::input::{PortEntry, RecordingEntry};
 use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::link_name;
 use crate::tui::popup::Question;
+use crate::tui::theme::Theme;
 use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
@@ -41,6 +43,8 @@ pub const BINDINGS: &[Binding] = &[
     Binding { keys: &[Press::Plain(KeyCode::Char('x'))], cmd: Cmd::Disconnect, short: "close", long: "close the link" },
 ];
 
+/// The heading above the list.
+const PORTS: &str = "Serial ports";
 /// Rows below the list that explain the chosen entry.
 const DETAIL_ROWS: u16 = 6;
 /// Links used before that are shown, at most.
@@ -222,36 +226,30 @@ impl Connect {
     /// All rows of the list, and in which of them each entry is.
     fn rows(&self, scene: Scene, columns: u16) -> (Vec<Line<'static>>, Vec<usize>) {
         let theme = scene.theme;
-        let mut rows = vec![lines::rule(theme, columns, "Serial ports", "")];
+        let mut rows = vec![lines::rule(theme, columns, PORTS, "")];
         let mut places = Vec::new();
         match &self.ports {
             Ports::Listing => rows.push(Line::styled("  Looking for ports ...", theme.quiet())),
             Ports::Failed(why) => {
                 let text = format!("The ports cannot be listed: {}", visible::text(why));
-                let broken = format::wrap(&text, usize::from(columns).saturating_sub(4));
-                rows.extend(broken.into_iter().map(|line| Line::styled(format!("  {line}"), theme.bad())));
+                rows.extend(lines::paragraph(&text, usize::from(columns), theme.bad()));
             }
             Ports::Listed(ports) if ports.is_empty() => {
                 rows.push(Line::raw("  None found. Plug in the adapter and press R, or press P to type a path."));
             }
             Ports::Listed(_) => {}
         }
-        let mut heading = 0;
+        let mut heading = PORTS;
         for (number, entry) in self.entries().iter().enumerate() {
-            let section = match entry {
-                Entry::Port(_) => 0,
-                Entry::Emulated(_) => 1,
-                Entry::Recent(_) => 2,
-                Entry::Other | Entry::Recordings => 3,
+            let (section, remark) = match entry {
+                Entry::Port(_) => (PORTS, ""),
+                Entry::Emulated(_) => ("Emulated units", "no hardware needed"),
+                Entry::Recent(_) => ("Used before", ""),
+                Entry::Other | Entry::Recordings => ("Other", ""),
             };
             if section != heading {
                 heading = section;
-                rows.push(Line::default());
-                rows.push(match section {
-                    1 => lines::rule(theme, columns, "Emulated units", "no hardware needed"),
-                    2 => lines::rule(theme, columns, "Used before", ""),
-                    _ => lines::rule(theme, columns, "Other", ""),
-                });
+                rows.extend([Line::default(), lines::rule(theme, columns, section, remark)]);
             }
             let is_chosen = number == self.cursor;
             places.push(rows.len());
@@ -261,71 +259,10 @@ impl Connect {
     }
 
     fn detail(&self, scene: Scene, columns: u16, more: &str) -> Vec<Line<'static>> {
-        let theme = scene.theme;
-        let text = |line: String| Line::raw(format!("  {line}"));
         let entries = self.entries();
         let Some(entry) = entries.get(self.cursor) else { return Vec::new() };
-        let heading = match entry {
-            Entry::Port(port) => visible::text(&port.link),
-            Entry::Emulated(product) => format!("Emulated {}", product.name),
-            Entry::Recent(name) => visible::text(name),
-            Entry::Other => "Another port".into(),
-            Entry::Recordings => "Recordings".into(),
-        };
-        let mut shown = vec![Line::default(), lines::rule(theme, columns, &heading, more)];
-        match entry {
-            Entry::Port(port) => {
-                match &port.busy_by {
-                    Some(holder) => shown.push(Line::styled(
-                        format!("  In use by {}: it has to let go first.", visible::text(holder)),
-                        theme.warning(),
-                    )),
-                    None => shown
-                        .push(text("115200 baud, 8 data bits, no parity, 1 stop bit, flow control Xon/Xoff.".into())),
-                }
-                for product in Product::all() {
-                    let cable = &product.cable;
-                    shown.push(text(format!(
-                        "{}, {}: pin {} to DB-9 pin {}, {} to {}, ground {} to {}.",
-                        product.name,
-                        cable.connector,
-                        cable.transmit.unit,
-                        cable.transmit.db9,
-                        cable.receive.unit,
-                        cable.receive.db9,
-                        cable.ground.unit,
-                        cable.ground.db9,
-                    )));
-                }
-            }
-            Entry::Emulated(product) => {
-                shown.push(text(format!("{}, hosted in this program on a real pseudo-terminal.", product.title)));
-                shown.push(text("Behaves as the manual says. Its password for loading software is AXIO-2010.".into()));
-            }
-            Entry::Recent(name) => {
-                let is_ours = scene.view.link.name.as_deref() == Some(*name);
-                shown.push(text(match &scene.view.link.state {
-                    LinkState::Open if is_ours => "Connected now.".into(),
-                    LinkState::Opening if is_ours => "Being opened.".into(),
-                    LinkState::Lost(_) if is_ours => "Connected last: the link is lost.".into(),
-                    _ => "Connected before, according to the recordings.".into(),
-                }));
-                // Which folder that was is not recorded.
-                if name.contains('/') && !name.starts_with('/') && !name.contains("://") {
-                    shown.push(text("A path from the folder of that time: from another it leads elsewhere.".into()));
-                }
-            }
-            Entry::Recordings => {
-                shown.push(text(
-                    "Every connection is recorded. A recording shows on all screens what happened then.".into(),
-                ));
-            }
-            Entry::Other => {
-                shown.push(text("/dev/ttyUSB0 or COM3      a serial port that is not listed".into()));
-                shown.push(text("/dev/pts/3 or a link      a pseudo-terminal, e.g. of axcon emulate or socat".into()));
-                shown.push(text("tcp://host:port, rfc2217://host:port  a serial port in the network".into()));
-            }
-        }
+        let mut shown = vec![Line::default(), lines::rule(scene.theme, columns, &entry.heading(), more)];
+        shown.extend(entry.explained(scene));
         shown
     }
 
@@ -356,6 +293,80 @@ impl Entry<'_> {
             Entry::Recordings => "recordings ...".into(),
         }
     }
+
+    /// Its name above what explains it.
+    fn heading(&self) -> String {
+        match self {
+            Entry::Port(port) => visible::text(&port.link),
+            Entry::Emulated(product) => format!("Emulated {}", product.name),
+            Entry::Recent(name) => visible::text(name),
+            Entry::Other => "Another port".into(),
+            Entry::Recordings => "Recordings".into(),
+        }
+    }
+
+    fn explained(&self, scene: Scene) -> Vec<Line<'static>> {
+        match self {
+            Entry::Port(port) => about_port(scene.theme, port),
+            Entry::Emulated(product) => vec![
+                told(&format!("{}, hosted in this program on a real pseudo-terminal.", product.title)),
+                told("Behaves as the manual says. Its password for loading software is AXIO-2010."),
+            ],
+            Entry::Recent(name) => about_recent(scene.view, name),
+            Entry::Recordings => {
+                vec![told("Every connection is recorded. A recording shows on all screens what happened then.")]
+            }
+            Entry::Other => vec![
+                told("/dev/ttyUSB0 or COM3      a serial port that is not listed"),
+                told("/dev/pts/3 or a link      a pseudo-terminal, e.g. of axcon emulate or socat"),
+                told("tcp://host:port, rfc2217://host:port  a serial port in the network"),
+            ],
+        }
+    }
+}
+
+/// A line of what explains an entry.
+fn told(text: &str) -> Line<'static> {
+    Line::raw(format!("  {text}"))
+}
+
+fn about_port(theme: Theme, port: &PortEntry) -> Vec<Line<'static>> {
+    let state = match &port.busy_by {
+        Some(holder) => {
+            told(&format!("In use by {}: it has to let go first.", visible::text(holder))).style(theme.warning())
+        }
+        None => told("115200 baud, 8 data bits, no parity, 1 stop bit, flow control Xon/Xoff."),
+    };
+    let cables = Product::all().iter().map(|product| {
+        let cable = &product.cable;
+        told(&format!(
+            "{}, {}: pin {} to DB-9 pin {}, {} to {}, ground {} to {}.",
+            product.name,
+            cable.connector,
+            cable.transmit.unit,
+            cable.transmit.db9,
+            cable.receive.unit,
+            cable.receive.db9,
+            cable.ground.unit,
+            cable.ground.db9,
+        ))
+    });
+    std::iter::once(state).chain(cables).collect()
+}
+
+fn about_recent(view: &View, name: &str) -> Vec<Line<'static>> {
+    let is_ours = view.link.name.as_deref() == Some(name);
+    let mut shown = vec![told(match &view.link.state {
+        LinkState::Open if is_ours => "Connected now.",
+        LinkState::Opening if is_ours => "Being opened.",
+        LinkState::Lost(_) if is_ours => "Connected last: the link is lost.",
+        _ => "Connected before, according to the recordings.",
+    })];
+    // Which folder that was is not recorded.
+    if name.contains('/') && !name.starts_with('/') && !name.contains("://") {
+        shown.push(told("A path from the folder of that time: from another it leads elsewhere."));
+    }
+    shown
 }
 
 fn row(scene: Scene, entry: &Entry, is_chosen: bool, columns: usize) -> Line<'static> {
@@ -384,6 +395,5 @@ fn row(scene: Scene, entry: &Entry, is_chosen: bool, columns: usize) -> Line<'st
     let name = format::left(&format::keep_end(&name, NAME_COLUMNS), NAME_COLUMNS);
     let room = columns.saturating_sub(NAME_COLUMNS + 6 + format::width(&state) + 1);
     let text = format!(" {mark} {name}  {} {state} ", format::left(&description, room));
-    let style = if is_chosen { theme.bar() } else { ratatui::style::Style::new() };
-    Line::styled(text, style)
+    Line::styled(text, if is_chosen { theme.bar() } else { Style::new() })
 }

@@ -13,6 +13,7 @@ use crate::tui::keymap::{Binding, Cmd, Press};
 use crate::tui::view::LinkState;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
+use crate::wire::units;
 
 /// Name on the tab.
 pub const TITLE: &str = "Diagnostics";
@@ -48,16 +49,7 @@ impl Diagnostics {
     /// What a command does here; `last` is how far the longer half can be scrolled, `page` the height of the picture.
     pub fn on(&mut self, cmd: Cmd, last: usize, page: usize) -> Option<Action> {
         let page = page.saturating_sub(3).max(1);
-        self.scrolled = match cmd {
-            Cmd::Up => self.scrolled.saturating_sub(1),
-            Cmd::Down => self.scrolled + 1,
-            Cmd::PageUp => self.scrolled.saturating_sub(page),
-            Cmd::PageDown => self.scrolled + page,
-            Cmd::First => 0,
-            Cmd::Last => last,
-            _ => self.scrolled,
-        }
-        .min(last);
+        self.scrolled = cmd.moved(self.scrolled, last, page).unwrap_or(self.scrolled.min(last));
         None
     }
 
@@ -222,8 +214,8 @@ fn named(found: &[Tracked]) -> Vec<Tracked> {
     for tracked in &mut named {
         let is_shared = labels.iter().any(|(label, unit)| *label == tracked.label && *unit != tracked.unit);
         let had_state = stated.iter().any(|known| known.about == tracked.label);
-        if let Some(quantity) = tracked.unit.as_deref().and_then(quantity).filter(|_| is_shared || had_state) {
-            tracked.label = format!("{} {quantity}", tracked.label);
+        if let Some(unit) = tracked.unit.as_deref().and_then(units::unit).filter(|_| is_shared || had_state) {
+            tracked.label = format!("{} {}", tracked.label, unit.quantity);
         }
     }
     named
@@ -247,24 +239,12 @@ fn without_state(label: &str, stated: &mut Vec<Stated>) -> String {
     }
     let words: Vec<&str> = label.split(' ').collect();
     let is_state = |word: &&str| STATES.contains(&word.to_lowercase().as_str());
-    let state = words
-        .iter()
-        .position(is_state)
-        .filter(|state| *state > 0 && words.get(state + 1).is_some_and(|word| matches!(*word, "C" | "°C" | "degC")));
+    let is_celsius = |word: &&str| units::unit(word).is_some_and(|unit| unit.name == "C");
+    let state = words.iter().position(is_state);
+    let state = state.filter(|state| *state > 0 && words.get(state + 1).is_some_and(is_celsius));
     let Some(state) = state else { return label.to_owned() };
     stated.push(Stated { label: label.to_owned(), about: words[..state].join(" ") });
     [&words[..state], &words[state + 2..]].concat().join(" ")
-}
-
-/// What a unit measures, in a word.
-fn quantity(unit: &str) -> Option<&'static str> {
-    match unit.to_lowercase().replace(['µ', 'μ'], "u").as_str() {
-        "c" | "°c" | "degc" | "f" | "°f" => Some("temperature"),
-        "ohm" | "ohms" | "ω" => Some("resistance"),
-        "v" | "mv" | "uv" => Some("voltage"),
-        "a" | "ma" => Some("current"),
-        _ => None,
-    }
 }
 
 fn row(scene: Scene, tracked: &Tracked, label: usize, with_extremes: bool) -> Line<'static> {
@@ -300,6 +280,8 @@ mod tests {
             ["RTD5 temperature", "RTD5 raw", "RTD5 resistance", "RTD5 PV"]
         );
         assert_eq!(names(&["Supply 24.1 V", "TC1 100.1 C"]), ["Supply", "TC1"], "where nothing is mixed up");
+        assert_eq!(names(&["RTD1 10.0 kohm 20.0 C"]), ["RTD1 resistance", "RTD1 temperature"]);
+        assert_eq!(names(&["Scan 12 ms 80 Hz"]), ["Scan time", "Scan frequency"]);
     }
 
     #[test]

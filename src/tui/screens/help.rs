@@ -3,6 +3,7 @@
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::ScreenId;
@@ -115,8 +116,7 @@ fn keys(theme: Theme, columns: u16, screen: ScreenId) -> Vec<Line<'static>> {
 fn notes(theme: Theme, columns: u16) -> Vec<Line<'static>> {
     let mut rows = vec![lines::rule(theme, columns, "Good to know", "")];
     for note in NOTES {
-        let broken = format::wrap(note, usize::from(columns).saturating_sub(4));
-        rows.extend(broken.into_iter().map(|line| Line::raw(format!("  {line}"))));
+        rows.extend(lines::paragraph(note, usize::from(columns), Style::new()));
         rows.push(Line::default());
     }
     rows.pop();

@@ -77,16 +77,16 @@ const DETAIL_ROWS: u16 = 6;
 /// The page.
 #[derive(Debug, Default)]
 pub struct Recordings {
-    found: Found,
+    listing: Listing,
     cursor: usize,
     /// The pace to go on with after a pause.
     pace: Option<Pace>,
 }
 
 #[derive(Debug, Default)]
-enum Found {
+enum Listing {
     #[default]
-    Nothing,
+    Awaited,
     Listed(RecordingList),
     Failed(String),
 }
@@ -94,15 +94,15 @@ enum Found {
 impl Recordings {
     /// The list has come.
     pub fn listed(&mut self, found: Result<RecordingList, String>) {
-        self.found = found.map_or_else(Found::Failed, Found::Listed);
+        self.listing = found.map_or_else(Listing::Failed, Listing::Listed);
         self.cursor = self.cursor.min(self.entries().len().saturating_sub(1));
     }
 
     /// What was found, newest first.
     pub fn entries(&self) -> &[RecordingEntry] {
-        match &self.found {
-            Found::Listed(list) => &list.entries,
-            Found::Nothing | Found::Failed(_) => &[],
+        match &self.listing {
+            Listing::Listed(list) => &list.entries,
+            Listing::Awaited | Listing::Failed(_) => &[],
         }
     }
 
@@ -178,17 +178,17 @@ impl Recordings {
         lines::draw(frame, lower, detail);
         let (heading, list) = lines::split(rest, 1);
         lines::draw(frame, heading, [lines::rule(theme, area.width, "Recordings", &self.remark())]);
-        match &self.found {
-            Found::Nothing => lines::draw(frame, list, [Line::styled("  Looking for recordings ...", theme.quiet())]),
-            Found::Failed(why) => {
-                let broken = format::wrap(&visible::text(why), usize::from(list.width).saturating_sub(4));
-                lines::draw(frame, list, broken.into_iter().map(|line| Line::styled(format!("  {line}"), theme.bad())));
+        match &self.listing {
+            Listing::Awaited => lines::draw(frame, list, [Line::styled("  Looking for recordings ...", theme.quiet())]),
+            Listing::Failed(why) => {
+                let why = lines::paragraph(&visible::text(why), usize::from(list.width), theme.bad());
+                lines::draw(frame, list, why);
             }
-            Found::Listed(RecordingList { entries, .. }) if entries.is_empty() => {
+            Listing::Listed(RecordingList { entries, .. }) if entries.is_empty() => {
                 let text = "  None yet. Every connection is recorded from its first byte.";
                 lines::draw(frame, list, [Line::styled(text, theme.quiet())]);
             }
-            Found::Listed(RecordingList { entries, .. }) => {
+            Listing::Listed(RecordingList { entries, .. }) => {
                 let first = lines::first_visible(self.cursor, entries.len(), usize::from(list.height));
                 let shown = entries.iter().enumerate().skip(first);
                 let columns = usize::from(list.width);
@@ -203,14 +203,14 @@ impl Recordings {
 
     /// How many there are, and whether these are all.
     fn remark(&self) -> String {
-        match &self.found {
-            Found::Listed(RecordingList { entries, older: 0 }) if !entries.is_empty() => {
+        match &self.listing {
+            Listing::Listed(RecordingList { entries, older: 0 }) if !entries.is_empty() => {
                 format!("{}, newest first", entries.len())
             }
-            Found::Listed(RecordingList { entries, older: older @ 1.. }) => {
+            Listing::Listed(RecordingList { entries, older: older @ 1.. }) => {
                 format!("{} of {}, newest first", entries.len(), format::grouped(entries.len() + older))
             }
-            Found::Listed(_) | Found::Nothing | Found::Failed(_) => String::new(),
+            Listing::Listed(_) | Listing::Awaited | Listing::Failed(_) => String::new(),
         }
     }
 
@@ -254,7 +254,7 @@ impl Recordings {
                 .flat_map(|part| format::pieces(part, room))
                 .map(|piece| Line::styled(format!("  {piece}"), theme.strong())),
         );
-        rows.extend(format::wrap(&text, room).into_iter().map(|line| Line::raw(format!("  {line}"))));
+        rows.extend(lines::paragraph(&text, usize::from(columns), Style::new()));
         rows.truncate(usize::from(DETAIL_ROWS));
         rows
     }

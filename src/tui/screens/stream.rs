@@ -7,12 +7,12 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::Scene;
-use super::overview::plugged_line;
+use super::overview::{decimals, plugged_line, source_words, value_text, without_values};
 use crate::monitor::{Channel, Stream as Values};
 use crate::time::{Duration, Instant};
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::popup::{Purpose, Question};
+use crate::tui::popup::{NamedFor, Question};
 use crate::tui::theme::Theme;
 use crate::tui::view::View;
 use crate::tui::visible;
@@ -172,7 +172,7 @@ impl Stream {
             }
             Cmd::Mark => return Some(Action::Mark(self.held.map(|held| held.cursor))),
             Cmd::Export if view.export.is_some() => return Some(Action::EndExport),
-            Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportStream, view))),
+            Cmd::Export => return Some(Action::Ask(Question::file_name(NamedFor::ExportStream, view))),
             _ => {}
         }
         None
@@ -215,9 +215,7 @@ impl Stream {
         let (theme, values) = (scene.theme, &scene.view.unit.monitor.stream);
         let Some(newest) = values.newest else {
             let mut rows = vec![lines::rule(theme, area.width, "Stream", "")];
-            let room = usize::from(area.width).saturating_sub(4);
-            let broken = super::overview::without_values(scene).into_iter().flat_map(|text| format::wrap(text, room));
-            rows.extend(broken.map(|line| Line::raw(format!("  {line}"))));
+            rows.extend(without_values(scene, area.width));
             return lines::draw(frame, area, rows);
         };
         let table = self.table(scene, area.width);
@@ -284,7 +282,7 @@ impl Stream {
         Some(Curve {
             samples: channel.samples(window.0, window.1),
             window,
-            quantity: Quantity::of(source, super::overview::decimals(scene.view, source)),
+            quantity: Quantity::of(source, decimals(scene.view, source)),
             cursor: self.held.map(|held| held.cursor),
             marks: values.marks.iter().copied().collect(),
             without: without_value(channel),
@@ -305,10 +303,9 @@ impl Stream {
     /// What its values span, where that is not all that is on the screen, and which time it shows.
     fn remark(&self, scene: Scene, curve: &Curve, number: usize, charts: &[(usize, Rect)]) -> String {
         let values = &scene.view.unit.monitor.stream;
-        let decimals = super::overview::decimals(scene.view, values.source.unwrap_or(Source::FieldValue));
-        let known = curve.samples.iter().filter_map(|&(_, value)| value);
-        let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-        let span = format!("{low:.decimals$} to {high:.decimals$} {}", curve.quantity.unit);
+        let decimals = decimals(scene.view, values.source.unwrap_or(Source::FieldValue));
+        let span = curve.extremes().filter(|_| charts.len() > 1);
+        let span = span.map(|(low, high)| format!("{low:.decimals$} to {high:.decimals$} {}", curve.quantity.unit));
         let state = if self.held.is_some() { "held, End follows again" } else { "follows" };
         // A chart that is far from full yet has less than its name says.
         let (from, to) = curve.window;
@@ -318,21 +315,17 @@ impl Stream {
         let is_chosen = self.is_chosen(values, number);
         let (columns, rows) = charts.first().map_or((0, 0), |(_, area)| room(*area));
         let parts = [
-            (charts.len() > 1 && low <= high, span),
-            (is_chosen, window),
-            (is_chosen && charts.len() > 1, "Enter enlarges".into()),
-            (self.alone && columns * rows > 1, "Enter shows all".into()),
+            span,
+            is_chosen.then_some(window),
+            (is_chosen && charts.len() > 1).then(|| "Enter enlarges".into()),
+            (self.alone && columns * rows > 1).then(|| "Enter shows all".into()),
         ];
-        let parts: Vec<String> = parts.into_iter().filter_map(|(is_wanted, text)| is_wanted.then_some(text)).collect();
-        parts.join(", ")
+        parts.into_iter().flatten().collect::<Vec<String>>().join(", ")
     }
 
     fn table(&self, scene: Scene, columns: u16) -> Vec<Line<'static>> {
         let (theme, values) = (scene.theme, &scene.view.unit.monitor.stream);
-        let source = match values.source {
-            Some(Source::ProcessValue) => "process value (7130h) in counts",
-            Some(Source::FieldValue) | None => "field value (6100h) in °C",
-        };
+        let source = source_words(values.source.unwrap_or(Source::FieldValue));
         let every = values.period().map(|period| format!(", every {}", format::period(period))).unwrap_or_default();
         let remark = format!("{source}{every}, {}", format::counted(values.rows, "row"));
         let mut rows = vec![lines::rule(theme, columns, "Stream", &remark)];
@@ -352,8 +345,8 @@ impl Stream {
     fn row(&self, scene: Scene, channel: &Channel, number: usize, columns: u16) -> Line<'static> {
         let (theme, stream) = (scene.theme, &scene.view.unit.monitor.stream);
         let source = stream.source.unwrap_or(Source::FieldValue);
-        let decimals = super::overview::decimals(scene.view, source);
-        let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
+        let decimals = decimals(scene.view, source);
+        let show = |value: Option<f64>| format::decimal(value, decimals);
         let reading = match self.held {
             None => Some(channel.reading),
             Some(held) => channel.at(held.cursor).map(|(_, reading)| reading),
@@ -361,12 +354,8 @@ impl Stream {
         let is_chosen = self.is_chosen(stream, number);
         let is_old = scene.view.why_old().is_some() || self.held.is_some();
         let (state, style) = state(theme, channel, reading);
-        let unit = if source == Source::FieldValue { " °C" } else { "   " };
-        // Where there is no value its state says why; a unit after nothing would look like a value.
-        let value = match reading.and_then(Reading::value) {
-            Some(value) => format!("{value:.decimals$}{unit}"),
-            None => "-   ".into(),
-        };
+        // Where there is no value its state says why.
+        let value = value_text(reading.and_then(Reading::value), source, decimals);
         let name = format!("  {} {:<8}", if is_chosen { "›" } else { " " }, channel.name);
         let mut line = Line::from(vec![
             Span::styled(name, if is_chosen { theme.strong() } else { Style::new() }),

@@ -25,7 +25,7 @@ impl View {
             Event::EntriesRead(count) => self.unit.entries_read = *count,
             Event::Row { .. } | Event::Page { .. } if self.returning.is_some() => {
                 if let Some(returning) = &mut self.returning {
-                    returning.wait(event.clone());
+                    returning.keep(event.clone());
                 }
             }
             Event::Row { .. } | Event::Page { .. } => {
@@ -189,7 +189,7 @@ impl View {
                 self.load.product_unknown = report.verdict == Verdict::Refused && report.product.is_none();
                 // The evidence ends where the unit has ended to talk.
                 self.load.is_silent = report.left_in_the_middle() && self.can_send() && self.is_silent_since(now);
-                self.load.is_of_before = false;
+                self.load.is_of_earlier_unit = false;
                 self.load.report = Some((**report).clone());
             }
         }

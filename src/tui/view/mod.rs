@@ -133,8 +133,8 @@ pub struct Load {
     pub report: Option<LoadReport>,
     /// The last one was refused because nobody knew the product.
     pub product_unknown: bool,
-    /// The report is of the unit that was on the cable before.
-    pub is_of_before: bool,
+    /// The report is of the unit that was on the cable before the one there now.
+    pub is_of_earlier_unit: bool,
     /// The unit has fallen silent in it: it is in its loader, or without power.
     pub is_silent: bool,
 }
@@ -285,7 +285,7 @@ impl View {
     pub fn begin_unit(&mut self) {
         self.unit = UnitView::default();
         self.load.product_unknown = false;
-        self.load.is_of_before = self.load.report.is_some();
+        self.load.is_of_earlier_unit = self.load.report.is_some();
     }
 
     /// Whether keys and commands can reach a unit.

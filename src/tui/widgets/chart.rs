@@ -64,10 +64,13 @@ impl Quantity {
 impl Curve {
     /// The scale of its values in an area of this many rows; `None` if there is no value.
     fn scale(&self, rows: u16) -> Option<Scale> {
-        let known = self.samples.iter().filter_map(|&(_, value)| value);
-        let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-        let rows = rows.saturating_sub(AXIS_ROWS);
-        (low <= high).then(|| Scale::new(low, high, self.quantity.least_span, rows))
+        let (low, high) = self.extremes()?;
+        Some(Scale::new(low, high, self.quantity.least_span, rows.saturating_sub(AXIS_ROWS)))
+    }
+
+    /// Its lowest and its highest value; nothing if there is none.
+    pub fn extremes(&self) -> Option<(f64, f64)> {
+        scale::extremes(self.samples.iter().filter_map(|&(_, value)| value))
     }
 
     /// Columns that its labels take in an area of this many rows.

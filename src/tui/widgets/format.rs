@@ -28,6 +28,11 @@ pub fn counted(number: impl TryInto<u64>, what: &str) -> String {
     }
 }
 
+/// A number with this many digits after its point; `-` for none.
+pub fn decimal(number: Option<f64>, decimals: usize) -> String {
+    number.map_or_else(|| "-".to_owned(), |number| format!("{number:.decimals$}"))
+}
+
 /// `0:21`, `12:05`, `1:00:00`.
 pub fn minutes(duration: Duration) -> String {
     let seconds = duration.as_secs();
@@ -210,6 +215,7 @@ mod tests {
         assert_eq!([0, 1, 1200].map(|number| counted(number, "row")), ["0 rows", "1 row", "1,200 rows"]);
         assert_eq!([0, 1, 2].map(|number| counted(number, "entry")), ["0 entries", "1 entry", "2 entries"]);
         assert_eq!([0, 999, 1000, 242_846, 1_000_000].map(grouped), ["0", "999", "1,000", "242,846", "1,000,000"]);
+        assert_eq!([decimal(Some(23.456), 1), decimal(Some(23.5), 0), decimal(None, 3)], ["23.5", "24", "-"]);
     }
 
     #[test]

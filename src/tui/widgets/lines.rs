@@ -2,6 +2,7 @@
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::format;
@@ -35,8 +36,38 @@ pub fn labelled(theme: Theme, label: &str, value: impl Into<Span<'static>>) -> L
     Line::from(vec![Span::styled(format!("  {}", format::left(label, LABEL_COLUMNS)), theme.quiet()), value.into()])
 }
 
+/// The same for a text in several lines: the label is beside the first of them.
+pub fn labelled_rows(theme: Theme, label: &str, text: impl IntoIterator<Item = String>) -> Vec<Line<'static>> {
+    let labels = std::iter::once(label).chain(std::iter::repeat(""));
+    labels.zip(text).map(|(label, line)| labelled(theme, label, line)).collect()
+}
+
 /// Columns of a label, the blank after it included.
 pub const LABEL_COLUMNS: usize = 12;
+
+/// A text broken between words, with two columns to its left and right in an area of `columns`.
+pub fn paragraph(text: &str, columns: usize, style: Style) -> Vec<Line<'static>> {
+    let broken = format::wrap(text, columns.saturating_sub(4)).into_iter();
+    broken.map(|line| Line::styled(format!("  {line}"), style)).collect()
+}
+
+/// Columns of a gauge's bar at most.
+const MOST_GAUGE_COLUMNS: usize = 100;
+/// Columns beside it: the blanks before it, and the percentage.
+const BESIDE_GAUGE: usize = 11;
+
+/// How much of something is done, from 0 to 1, in an area of `columns`: `  ██████░░░░   60 %`.
+pub fn gauge(theme: Theme, share: f64, columns: usize) -> Line<'static> {
+    let share = share.clamp(0.0, 1.0);
+    let room = columns.saturating_sub(BESIDE_GAUGE).min(MOST_GAUGE_COLUMNS);
+    let filled = (share * room as f64).floor() as usize;
+    Line::from(vec![
+        Span::raw("  "),
+        Span::styled("█".repeat(filled), theme.good()),
+        Span::styled("░".repeat(room - filled), theme.quiet()),
+        Span::styled(format!("  {:>3.0} %", (share * 100.0).floor()), theme.strong()),
+    ])
+}
 
 /// Draws lines from the top of an area on; what does not fit is left out.
 pub fn draw(frame: &mut Frame, area: Rect, lines: impl IntoIterator<Item = Line<'static>>) {
@@ -70,6 +101,14 @@ mod tests {
                 assert_eq!(rule(theme, columns, "Values", remark).width(), usize::from(columns), "{columns} {remark}");
             }
         }
+    }
+
+    #[test]
+    fn a_gauge_is_full_only_when_all_is_done_and_takes_any_share() {
+        let theme = Theme::new(crate::tui::theme::Palette::Mono);
+        let drawn = |share| gauge(theme, share, 21).to_string();
+        assert_eq!(drawn(0.999), "  █████████░   99 %");
+        assert_eq!([drawn(-1.0), drawn(1.0), drawn(2.0)], [drawn(0.0), drawn(7.0), "  ██████████  100 %".to_owned()]);
     }
 
     #[test]

@@ -41,6 +41,12 @@ const TIME_STEPS: [u64; 21] = [
     24 * HOUR,
 ];
 
+/// The lowest and the highest of these values; nothing if there is none.
+pub fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    (low <= high).then_some((low, high))
+}
+
 /// A scale of values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scale {

@@ -1,13 +1,14 @@
 //! A curve in one line of text.
 
+use super::scale::extremes;
+
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 /// The newest values, one column each, scaled between their extremes but over no less than `least_span`, so that noise
 /// does not look like drama. A missing value leaves a gap.
 pub fn sparkline(values: &[Option<f64>], columns: usize, least_span: f64) -> String {
     let newest = &values[values.len().saturating_sub(columns)..];
-    let known = || newest.iter().flatten().copied();
-    let (low, high) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    let Some((low, high)) = extremes(newest.iter().flatten().copied()) else { return " ".repeat(newest.len()) };
     let spare = (least_span - (high - low)).max(0.0) / 2.0;
     let (low, high) = (low - spare, high + spare);
     let bar = |value: f64| {

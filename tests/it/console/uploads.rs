@@ -15,7 +15,7 @@ fn an_older_version_is_refused_before_the_password_is_asked_for_and_goes_if_the_
     let plan = desk.picture();
     assert!(plan.contains("passed in spite of downgrade") && plan.contains("Enter start"), "{plan}");
     desk.press(KeyCode::Enter).keys("AXIO-2010").press(KeyCode::Enter);
-    desk.wait_for("after 1.0.0");
+    desk.wait_for("1.0.0 afterwards");
 }
 
 #[test]
@@ -29,7 +29,7 @@ fn an_upload_goes_from_the_plan_to_the_new_banner() {
     desk.press(KeyCode::Enter);
     desk.wait_for("50 %");
     let verdict = desk.wait_for("── Verdict");
-    assert!(verdict.contains("Done") && verdict.contains("before 1.1.0, after 1.2.0"), "{verdict}");
+    assert!(verdict.contains("Done") && verdict.contains("1.1.0 before, 1.2.0 afterwards"), "{verdict}");
     assert_eq!(desk.unit.unit().flash()[..0xC000 * 2], flash_with(&full_image("1.2.0"))[..0xC000 * 2]);
     desk.press(KeyCode::Enter);
     assert!(desk.picture().contains("the same version again"), "{}", desk.picture());
@@ -60,7 +60,7 @@ fn a_cancelled_upload_can_be_sent_again_after_the_label_has_been_read() {
         desk.keys("y");
     }
     desk.wait_for("── Verdict");
-    assert!(desk.picture().contains("after 1.2.0"), "{}", desk.picture());
+    assert!(desk.picture().contains("1.2.0 afterwards"), "{}", desk.picture());
     desk.keys("q");
     assert!(desk.over);
 }
@@ -74,7 +74,7 @@ fn a_question_that_an_upload_has_outrun_goes_with_it() {
         desk.press(key);
         let asked = desk.picture();
         assert!(asked.contains("Leave axcon?") || asked.contains("Cancel the upload?"), "{asked}");
-        let verdict = desk.wait_for("after 1.2.0");
+        let verdict = desk.wait_for("1.2.0 afterwards");
         assert!(verdict.contains("Done") && !verdict.contains("╭"), "{verdict}");
         desk.keys("q");
         assert!(desk.over, "there is nothing left to ask: {}", desk.picture());

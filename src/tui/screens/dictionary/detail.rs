@@ -1,13 +1,14 @@
 //! Everything about one entry: the pane beside or below the table.
 
-use ratatui::style::Style;
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 
 use super::row::Row;
 use super::{Scene, without_unit};
 use crate::device::dictionary::{Access, Bound, Entry, Limits};
 use crate::dump::{self, Measure};
 use crate::session::Job;
+use crate::tui::theme::Theme;
+use crate::tui::view::View;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
@@ -16,68 +17,18 @@ impl Row<'_> {
     pub(super) fn detail(&self, scene: Scene, columns: u16, has_room: bool) -> Vec<Line<'static>> {
         let theme = scene.theme;
         let room = usize::from(columns).saturating_sub(2 + lines::LABEL_COLUMNS);
-        let section = self.known.map(|(object, _)| format!("section {}", object.section)).unwrap_or_default();
-        let long = self.known.map(|_| format!("manual, {section}")).unwrap_or_default();
-        let address = self.at.to_string();
-        // What is left beside address, remark, and the rule between and around them.
-        let left = |remark: &str| {
-            let taken = format::width(&address) + 1 + format::width(remark) + lines::BESIDE_HEADING;
-            usize::from(columns).saturating_sub(taken)
-        };
-        let fits = |remark: &str| format::width(&self.name()) <= left(remark);
-        // Beside the table there are rows for it, and no columns.
-        let remark = match has_room {
-            true => "",
-            false if fits(&long) => &long,
-            false => &section,
-        };
-        let title = format!("{address} {}", format::keep_ends(&self.name(), left(remark)));
-        let mut rows = vec![lines::rule(theme, columns, &title, remark)];
+        let mut rows = vec![self.heading(theme, columns, has_room)];
         let mut labelled = |label: &str, text: String, most: usize| {
             let most = if has_room { usize::MAX } else { most };
-            for (number, line) in format::wrap(&text, room).into_iter().take(most).enumerate() {
-                let label = if number == 0 { label } else { "" };
-                rows.push(lines::labelled(theme, label, Span::styled(line, Style::new())));
-            }
+            rows.extend(lines::labelled_rows(theme, label, format::wrap(&text, room).into_iter().take(most)));
         };
-        let mut value = self.value();
-        if let Some(read) = self.read.filter(|_| self.measure().is_some_and(|measure| measure.is_scaled())) {
-            value.push_str(&format!(" (raw {})", read.number()));
-        }
-        if let Some(meaning) = self.meaning() {
-            value.push_str(&format!(": {meaning}"));
-        }
-        match self.read {
-            Some(read) if read.deviates => value.push_str("; not as the factory made it"),
-            Some(_) => {}
-            None => match &scene.view.unit.dictionary {
-                Some(read) if !read.reading.is_complete() => value = "not read: the reading was not completed".into(),
-                Some(_) => value = "not shown by the unit".into(),
-                None if scene.view.job == Some(Job::ReadDictionary) => value = "being read".into(),
-                None if scene.view.can_send() => value = "not read yet: V reads it".into(),
-                None => value = format!("not read. {}", without_unit(scene.view)),
-            },
-        }
-        labelled("Value", value, 1);
-        let Some((_, entry)) = self.known else {
+        labelled("Value", self.value_in_words(scene.view), 1);
+        let Some((object, entry)) = self.known else {
             let text = self.read.map(|read| visible::text(&read.text)).unwrap_or_default();
             labelled("Printed", text, 3);
             return rows;
         };
-        let factory = entry.default.map_or_else(
-            || "none: the unit itself supplies it".to_owned(),
-            |default| {
-                let meaning = entry.meaning(default.value).map(|text| format!(": {text}")).unwrap_or_default();
-                let node = if default.plus_node_id { " + node-ID" } else { "" };
-                let raw = dump::shown(entry, default.value);
-                let value = match self.measure() {
-                    Some(measure) => measure.quantity(default.value.as_f64(), &raw),
-                    None => raw,
-                };
-                format!("{value}{node}{meaning}")
-            },
-        );
-        labelled("Factory", factory, 1);
+        labelled("Factory", self.factory_in_words(entry), 1);
         let access = match entry.access {
             Access::ReadOnly => "read only",
             Access::ReadWrite => "read and write",
@@ -97,9 +48,63 @@ impl Row<'_> {
             labelled("Printed", visible::text(&read.text), 1);
         }
         if has_room {
-            labelled("Described", format!("in the {long}"), 1);
+            labelled("Described", format!("in the manual, section {}", object.section), 1);
         }
         rows
+    }
+
+    /// Its address and name, and where the manual has it. Beside the table there are rows for that, and no columns.
+    fn heading(&self, theme: Theme, columns: u16, has_room: bool) -> Line<'static> {
+        let (name, address) = (self.name(), self.at.to_string());
+        // What is left beside address, remark, and the rule between and around them.
+        let left = |remark: &str| {
+            let taken = format::width(&address) + 1 + format::width(remark) + lines::BESIDE_HEADING;
+            usize::from(columns).saturating_sub(taken)
+        };
+        let section = self.known.filter(|_| !has_room).map(|(object, _)| format!("section {}", object.section));
+        let section = section.unwrap_or_default();
+        let long = format!("manual, {section}");
+        let is_roomy = !section.is_empty() && format::width(&name) <= left(&long);
+        let remark = if is_roomy { long } else { section };
+        let title = format!("{address} {}", format::keep_ends(&name, left(&remark)));
+        lines::rule(theme, columns, &title, &remark)
+    }
+
+    /// Its value with all that is to be said of it, or why there is none.
+    fn value_in_words(&self, view: &View) -> String {
+        let Some(read) = self.read else {
+            return match &view.unit.dictionary {
+                Some(read) if !read.reading.is_complete() => "not read: the reading was not completed".to_owned(),
+                Some(_) => "not shown by the unit".to_owned(),
+                None if view.job == Some(Job::ReadDictionary) => "being read".to_owned(),
+                None if view.can_send() => "not read yet: V reads it".to_owned(),
+                None => format!("not read. {}", without_unit(view)),
+            };
+        };
+        let mut value = self.value();
+        if self.measure().is_some_and(|measure| measure.is_scaled()) {
+            value.push_str(&format!(" (raw {})", read.number()));
+        }
+        if let Some(meaning) = self.meaning() {
+            value.push_str(&format!(": {meaning}"));
+        }
+        if read.deviates {
+            value.push_str("; not as the factory made it");
+        }
+        value
+    }
+
+    /// The factory's value with its unit and what it stands for.
+    fn factory_in_words(&self, entry: &Entry) -> String {
+        let Some(default) = entry.default else { return "none: the unit itself supplies it".to_owned() };
+        let meaning = entry.meaning(default.value).map(|text| format!(": {text}")).unwrap_or_default();
+        let node = if default.plus_node_id { " + node-ID" } else { "" };
+        let raw = dump::shown(entry, default.value);
+        let value = match self.measure() {
+            Some(measure) => measure.quantity(default.value.as_f64(), &raw),
+            None => raw,
+        };
+        format!("{value}{node}{meaning}")
     }
 }
 

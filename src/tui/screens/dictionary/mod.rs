@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
+use ratatui::style::Style;
 use ratatui::text::Line;
 
 mod detail;
@@ -20,7 +21,7 @@ use crate::dump::{self, Dump};
 use crate::session::{Command, Job};
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::popup::{Purpose, Question, Wanted};
+use crate::tui::popup::{NamedFor, PickedFor, Question};
 use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
@@ -44,7 +45,7 @@ pub const BINDINGS: &[Binding] = &[
     },
     Binding {
         keys: &[Press::Plain(KeyCode::Char('o'))],
-        cmd: Cmd::Only,
+        cmd: Cmd::Filter,
         short: "only",
         long: "everything, only deviations, only what differs from the dump",
     },
@@ -88,13 +89,13 @@ const TABLE_COLUMNS: u16 = 140;
 pub struct Dictionary {
     cursor: usize,
     words: String,
-    only: Only,
+    filter: Filter,
     other: Option<Other>,
 }
 
 /// Which entries are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Only {
+enum Filter {
     #[default]
     Everything,
     Deviations,
@@ -130,7 +131,7 @@ impl Dictionary {
     /// A dump to compare with has been read.
     pub fn compare(&mut self, name: String, dump: Dump) {
         self.other = Some(Other { name, dump });
-        self.only = Only::Differences;
+        self.filter = Filter::Differences;
         self.cursor = 0;
     }
 
@@ -138,29 +139,20 @@ impl Dictionary {
     pub fn on(&mut self, cmd: Cmd, view: &View, area: Rect) -> Option<Action> {
         let last = self.rows(view).len().saturating_sub(1);
         let page = usize::from(table(area).height).max(1);
-        self.cursor = match cmd {
-            Cmd::Up => self.cursor.saturating_sub(1),
-            Cmd::Down => self.cursor + 1,
-            Cmd::PageUp => self.cursor.saturating_sub(page),
-            Cmd::PageDown => self.cursor + page,
-            Cmd::First => 0,
-            Cmd::Last => last,
-            _ => self.cursor,
-        }
-        .min(last);
+        self.cursor = cmd.moved(self.cursor, last, page).unwrap_or(self.cursor.min(last));
         match cmd {
             Cmd::Find => return Some(Action::Ask(Question::find(&self.words))),
-            Cmd::Only => {
-                self.only = match self.only {
-                    Only::Everything => Only::Deviations,
-                    Only::Deviations if self.other.is_some() => Only::Differences,
-                    Only::Deviations | Only::Differences => Only::Everything,
+            Cmd::Filter => {
+                self.filter = match self.filter {
+                    Filter::Everything => Filter::Deviations,
+                    Filter::Deviations if self.other.is_some() => Filter::Differences,
+                    Filter::Deviations | Filter::Differences => Filter::Everything,
                 };
                 self.cursor = 0;
             }
             Cmd::Back if view.job == Some(Job::ReadDictionary) => return Some(Action::Command(Command::Cancel)),
             Cmd::Back => {
-                (self.only, self.other, self.cursor) = (Only::Everything, None, 0);
+                (self.filter, self.other, self.cursor) = (Filter::Everything, None, 0);
                 self.words.clear();
             }
             Cmd::Compare | Cmd::Export if view.unit.dictionary.is_none() => {
@@ -176,8 +168,8 @@ impl Dictionary {
             Cmd::Compare if view.current_dictionary().is_none() => {
                 return Some(Action::Tell("What was read is from before the restart: V reads it again.".to_owned()));
             }
-            Cmd::Compare => return Some(Action::Choose(Wanted::Dump)),
-            Cmd::Export => return Some(Action::Ask(Question::file(Purpose::ExportDictionary, view))),
+            Cmd::Compare => return Some(Action::PickFile(PickedFor::Dump)),
+            Cmd::Export => return Some(Action::Ask(Question::file_name(NamedFor::ExportDictionary, view))),
             _ => {}
         }
         None
@@ -185,7 +177,7 @@ impl Dictionary {
 
     /// Whether something is left out, or compared: Esc ends that.
     pub fn is_narrowed(&self) -> bool {
-        self.only != Only::Everything || self.other.is_some() || !self.words.is_empty()
+        self.filter != Filter::Everything || self.other.is_some() || !self.words.is_empty()
     }
 
     /// The keys that mean something now, for the footer.
@@ -226,10 +218,10 @@ impl Dictionary {
     }
 
     fn chosen<'a>(&self, mut rows: Vec<Row<'a>>) -> Vec<Row<'a>> {
-        rows.retain(|row| match self.only {
-            Only::Everything => true,
-            Only::Deviations => row.read.is_some_and(|read| read.deviates),
-            Only::Differences => row.difference.is_some(),
+        rows.retain(|row| match self.filter {
+            Filter::Everything => true,
+            Filter::Deviations => row.read.is_some_and(|read| read.deviates),
+            Filter::Differences => row.difference.is_some(),
         });
         if !self.words.is_empty() {
             let words: Vec<&str> = self.words.split_whitespace().collect();
@@ -270,14 +262,14 @@ impl Dictionary {
         lines::draw(frame, head, heading.into_iter().chain([Line::styled(heads, theme.quiet())]));
         if rows.is_empty() {
             let text = match (view.product(), &view.unit.dictionary) {
-                (None, Some(_)) if self.only == Only::Deviations => {
+                (None, Some(_)) if self.filter == Filter::Deviations => {
                     "Compared with nothing: the unit has not said what it is, so its factory values are not known. Esc \
                      shows everything again."
                 }
-                (_, Some(_)) if self.only == Only::Deviations && self.words.is_empty() => {
+                (_, Some(_)) if self.filter == Filter::Deviations && self.words.is_empty() => {
                     "Nothing differs from the factory's. Esc shows everything again."
                 }
-                (_, Some(_)) if self.only == Only::Differences && self.words.is_empty() => {
+                (_, Some(_)) if self.filter == Filter::Differences && self.words.is_empty() => {
                     "Nothing differs between the two. Esc shows everything again."
                 }
                 (None, None) if view.job == Some(Job::ReadDictionary) => "The dictionary is being read.",
@@ -285,14 +277,13 @@ impl Dictionary {
                     "Nothing to show: the unit has not said what it is. V reads its dictionary all the same."
                 }
                 (None, None) => without_unit(view),
-                (Some(_), None) if self.only == Only::Deviations => {
+                (Some(_), None) if self.filter == Filter::Deviations => {
                     "Nothing has been read of the unit, so nothing is known to differ: V reads it. Esc shows the manual's \
                      entries again."
                 }
                 _ => "Nothing here matches. O chooses what is shown, / what it has to contain, Esc shows everything.",
             };
-            let broken = format::wrap(text, columns.saturating_sub(4));
-            return lines::draw(frame, table, broken.into_iter().map(|line| Line::raw(format!("  {line}"))));
+            return lines::draw(frame, table, lines::paragraph(text, columns, Style::new()));
         }
         let cursor = self.cursor.min(rows.len() - 1);
         let first = lines::first_visible(cursor, rows.len(), usize::from(table.height));
@@ -320,10 +311,10 @@ impl Dictionary {
         let view = scene.view;
         let dump = self.other.as_ref().and_then(|other| other_product(&other.dump, view));
         let dump = dump.map(|(theirs, _)| format!("dump of an {theirs}"));
-        let only = match self.only {
-            Only::Everything => None,
-            Only::Deviations => Some("only those".to_owned()),
-            Only::Differences => Some("only differences".into()),
+        let only = match self.filter {
+            Filter::Everything => None,
+            Filter::Deviations => Some("only those".to_owned()),
+            Filter::Differences => Some("only differences".into()),
         };
         let words = (!self.words.is_empty()).then(|| format!("with '{}'", visible::text(&self.words)));
         let is_outdated = view.unit.dictionary.as_ref().is_some_and(|read| read.is_outdated);
@@ -350,7 +341,7 @@ impl Dictionary {
             }
         };
         // `only those` are those that are not as the factory made them, and what is old is never shown as if it were not.
-        let least = compared.clone().filter(|_| self.only == Only::Deviations || is_outdated);
+        let least = compared.clone().filter(|_| self.filter == Filter::Deviations || is_outdated);
         let text = |compared: &Option<String>, time: &Option<String>| {
             let parts = [&dump, &counted, compared, time, &only, &words];
             parts.into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join(", ")

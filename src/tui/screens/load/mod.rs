@@ -303,14 +303,11 @@ impl Load {
             }
             Stage::Report { facts, scrolled } => {
                 let (all, room) = findings_shown(facts, view, (self.packed, self.loader), area);
-                let last = all.saturating_sub(room);
+                if let Some(place) = cmd.moved(*scrolled, all.saturating_sub(room), room) {
+                    *scrolled = place;
+                    return None;
+                }
                 match cmd {
-                    Cmd::Up => *scrolled = scrolled.saturating_sub(1),
-                    Cmd::Down => *scrolled = (*scrolled + 1).min(last),
-                    Cmd::PageUp => *scrolled = scrolled.saturating_sub(room),
-                    Cmd::PageDown => *scrolled = (*scrolled + room).min(last),
-                    Cmd::First => *scrolled = 0,
-                    Cmd::Last => *scrolled = last,
                     Cmd::Back => {
                         self.stage = Stage::Picking;
                         return Some(self.list());

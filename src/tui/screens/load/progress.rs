@@ -51,9 +51,6 @@ impl Load {
 fn gauge_and_numbers(scene: Scene, progress: &Progress, columns: usize) -> Vec<Line<'static>> {
     let theme = scene.theme;
     let share = if progress.bytes_total == 0 { 0.0 } else { progress.bytes as f64 / progress.bytes_total as f64 };
-    let share = share.clamp(0.0, 1.0);
-    let room = columns.saturating_sub(11).min(100);
-    let filled = (share * room as f64).floor() as usize;
     let left = progress.eta().map_or_else(
         || "time left not known yet".to_owned(),
         |eta| format!("{} left", format::minutes(Duration::from_secs_f64(eta.as_secs_f64().ceil()))),
@@ -72,12 +69,7 @@ fn gauge_and_numbers(scene: Scene, progress: &Progress, columns: usize) -> Vec<L
     let again = if progress.again { ": once more, the loader had lost something" } else { "" };
     let of = |part: usize, whole: usize| format!("{} of {}", format::grouped(part), format::grouped(whole));
     vec![
-        Line::from(vec![
-            Span::raw("  "),
-            Span::styled("█".repeat(filled), theme.good()),
-            Span::styled("░".repeat(room - filled), theme.quiet()),
-            Span::styled(format!("  {:>3.0} %", (share * 100.0).floor()), theme.strong()),
-        ]),
+        lines::gauge(theme, share, columns),
         Line::default(),
         lines::labelled(theme, "Records", of(progress.records, progress.records_total) + again),
         lines::labelled(theme, "Characters", of(progress.bytes, progress.bytes_total)),

@@ -186,44 +186,11 @@ fn plan(
 ) -> Vec<Line<'static>> {
     let room = usize::from(columns).saturating_sub(2);
     let mut rows = vec![lines::rule(theme, columns, "Plan", "")];
-    let product =
-        facts.product.as_deref().map_or("the right product".into(), |name| format!("an {}", visible::text(name)));
-    let Amount { characters, time, .. } = amount(facts, packed);
-    let time = format::minutes(Duration::from_secs_f64(time.as_secs_f64().ceil()));
-    let records = if packed { ", in records of another length" } else { "" };
-    let expected = match (&facts.product, facts.version) {
-        (Some(product), Some(version)) => format!("name {} {version}", visible::text(product)),
-        _ => "name what the file holds".into(),
-    };
     if facts.ok {
-        let steps = [
-            format!("Make sure that the unit is {product}."),
-            match view.facts.state {
-                UnitState::Loader => "Send neither L nor a password: the unit waits in its loader already.".into(),
-                _ => "Send L and the password; the unit resets into its loader.".into(),
-            },
-            format!(
-                "Send {} characters{records}: some {time} with what the loader needs.",
-                format::grouped(characters)
-            ),
-            format!("Wait for the banner of the new software: it must {expected}."),
-        ];
-        for (number, step) in (1..).zip(steps) {
+        for (number, step) in (1..).zip(steps(view, facts, packed)) {
             rows.extend(hanging(Span::raw(format!("  {number}. ")), &step, room));
         }
-        rows.push(lines::labelled(theme, "Unit now", unit_version(view)));
-        // The unit that was left in the middle still waits somewhere, though it is not the one that is there now.
-        if let Some(noted) = view.link.noted.as_ref().filter(|_| view.facts.state == UnitState::Application) {
-            let image = file_name(Path::new(&noted.image));
-            let product = visible::text(&noted.product);
-            let note = format!("{image} was begun here for an {product}, {}", visible::text(&noted.begun));
-            rows.push(lines::labelled(theme, "Our note", format::keep_start(&note, room.saturating_sub(12))));
-        }
-        let change = Change::of(view, facts);
-        rows.push(lines::labelled(theme, "Afterwards", format!("{} ({})", expected_version(facts), change.words())));
-        rows.extend(
-            change.remark().map(|remark| lines::labelled(theme, "Note", Span::styled(remark, theme.warning()))),
-        );
+        rows.extend(versions(theme, view, facts, room));
     }
     let against = objections(facts, view, loader);
     if against.is_empty() {
@@ -240,6 +207,45 @@ fn plan(
         let refused = |objection: String| hanging(Span::styled("  Cannot start: ", theme.bad()), &objection, room);
         rows.extend(against.into_iter().flat_map(refused));
     }
+    rows
+}
+
+/// What will be done, one sentence each.
+fn steps(view: &View, facts: &ImageFacts, packed: bool) -> [String; 4] {
+    let product = facts.product.as_deref().map(visible::text);
+    let Amount { characters, time, .. } = amount(facts, packed);
+    let time = format::minutes(Duration::from_secs_f64(time.as_secs_f64().ceil()));
+    let records = if packed { ", in records of another length" } else { "" };
+    let unit = product.as_ref().map_or("the right product".to_owned(), |name| format!("an {name}"));
+    let expected = match (product, facts.version) {
+        (Some(product), Some(version)) => format!("name {product} {version}"),
+        _ => "name what the file holds".to_owned(),
+    };
+    [
+        format!("Make sure that the unit is {unit}."),
+        match view.facts.state {
+            UnitState::Loader => "Send neither L nor a password: the unit waits in its loader already.".to_owned(),
+            _ => "Send L and the password; the unit resets into its loader.".to_owned(),
+        },
+        format!("Send {} characters{records}: some {time} with what the loader needs.", format::grouped(characters)),
+        format!("Wait for the banner of the new software: it must {expected}."),
+    ]
+}
+
+/// What the unit runs, or ran, and what it will run, in lines of `room` columns.
+fn versions(theme: Theme, view: &View, facts: &ImageFacts, room: usize) -> Vec<Line<'static>> {
+    let mut rows = vec![lines::labelled(theme, "Unit now", unit_version(view))];
+    // The unit that was left in the middle still waits somewhere, though it is not the one that is there now.
+    if let Some(noted) = view.link.noted.as_ref().filter(|_| view.facts.state == UnitState::Application) {
+        let image = file_name(Path::new(&noted.image));
+        let product = visible::text(&noted.product);
+        let note = format!("{image} was begun here for an {product}, {}", visible::text(&noted.begun));
+        let note = format::keep_start(&note, room.saturating_sub(lines::LABEL_COLUMNS));
+        rows.push(lines::labelled(theme, "Our note", note));
+    }
+    let change = Change::of(view, facts);
+    rows.push(lines::labelled(theme, "Afterwards", format!("{} ({})", expected_version(facts), change.words())));
+    rows.extend(change.remark().map(|remark| lines::labelled(theme, "Note", Span::styled(remark, theme.warning()))));
     rows
 }
 

@@ -1,10 +1,13 @@
 //! How an upload has ended, and what to do next.
 
 use ratatui::layout::Rect;
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use crate::session::{LoadReport, SEE_POWER, UnitNow, Verdict};
 use crate::tui::screens::Scene;
+use crate::tui::theme::Theme;
+use crate::tui::view::{LinkState, View};
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
 
@@ -13,10 +16,37 @@ const FRAME_ROWS: usize = 6;
 /// The label of the unit's last words.
 const HEARD: &str = "Heard";
 
+/// A label, and the lines beside it.
+type Told = (&'static str, Vec<String>);
+
 pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line<'static>> {
     let theme = scene.theme;
+    let product = report.product.as_deref().map(visible::text).unwrap_or_default();
+    let remark = match scene.view.load.is_of_earlier_unit {
+        true => format!("{product}, not of the unit that is there now"),
+        false => product,
+    };
+    let (word, style) = word(theme, report);
+    let mut rows = vec![
+        lines::rule(theme, area.width, "Verdict", &remark),
+        Line::default(),
+        Line::from(vec![Span::raw("  "), Span::styled(word, style)]),
+        Line::default(),
+    ];
     let room = usize::from(area.width).saturating_sub(lines::LABEL_COLUMNS + 4);
-    let (word, style) = match report.verdict {
+    let mut told = told(scene.view, report, room);
+    shorten(&mut told, usize::from(area.height).saturating_sub(FRAME_ROWS));
+    rows.extend(told.into_iter().flat_map(|(label, text)| lines::labelled_rows(theme, label, text)));
+    rows.push(Line::default());
+    rows.push(Line::from(vec![
+        Span::styled("  Enter", theme.key()),
+        Span::raw(" goes back to the file and its plan."),
+    ]));
+    rows
+}
+
+fn word(theme: Theme, report: &LoadReport) -> (&'static str, Style) {
+    match report.verdict {
         Verdict::Done => ("Done", theme.good()),
         Verdict::Refused => ("Refused, nothing was changed", theme.warning()),
         Verdict::UnitRefused => ("The unit refused", theme.bad()),
@@ -27,71 +57,60 @@ pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line
         Verdict::Failed => ("Failed", theme.bad()),
         Verdict::WrongApplication => ("The unit does not run what was sent", theme.bad()),
         Verdict::Interrupted => ("Cancelled", theme.warning()),
-    };
-    let load = &scene.view.load;
-    let unit = match report.unit {
-        UnitNow::Loader if load.is_silent => "silent: in its loader, or without power",
+    }
+}
+
+/// What happened, what is true of the unit, and what to do next, in lines of `room` columns.
+fn told(view: &View, report: &LoadReport, room: usize) -> Vec<Told> {
+    let doubt = doubt(view, report);
+    let unit = doubt.unwrap_or(match report.unit {
         UnitNow::Application => "runs its application",
         UnitNow::Loader => "waits in its loader for a file",
         UnitNow::Unknown => "nobody can say",
-    };
-    let version = |version: Option<crate::version::Version>| version.map_or("not known".into(), |v| v.to_string());
-    let mut rows = vec![
-        lines::rule(
-            theme,
-            area.width,
-            "Verdict",
-            &match (report.product.as_deref().map(visible::text), load.is_of_before) {
-                (product, false) => product.unwrap_or_default(),
-                (product, true) => format!("{}, not of the unit that is there now", product.unwrap_or_default()),
-            },
-        ),
-        Line::default(),
-        Line::from(vec![Span::raw("  "), Span::styled(word, style)]),
-        Line::default(),
-    ];
-    let mut told: Vec<(&str, Vec<String>)> = Vec::new();
-    let mut paragraph = |label, text: &str| told.push((label, format::wrap(&visible::text(text), room)));
-    paragraph("Happened", &format!("{}.", visible::sentence(&report.what).trim_end_matches('.')));
-    paragraph(if load.is_of_before { "Unit then" } else { "Unit now" }, unit);
-    let is_untouched = matches!(report.verdict, Verdict::Refused | Verdict::UnitRefused | Verdict::NoAnswer);
-    let versions = match (report.version_before, report.version_after) {
-        (Some(before), None) if is_untouched && report.unit == UnitNow::Application => format!("{before}, as before"),
-        (before, after) => format!("before {}, after {}", version(before), version(after)),
-    };
-    paragraph("Version", &versions);
+    });
+    let advice = if doubt.is_some() { SEE_POWER } else { report.advice() };
+    let sentence = |text: &str| format!("{}.", visible::sentence(text).trim_end_matches('.'));
+    let mut told: Vec<Told> = Vec::new();
+    let mut tell = |label, text: &str| told.push((label, format::wrap(&visible::text(text), room)));
+    tell("Happened", &sentence(&report.what));
+    tell(if view.load.is_of_earlier_unit { "Unit then" } else { "Unit now" }, unit);
+    tell("Version", &versions(report));
     let (sent, total) = (format::grouped(report.records), format::grouped(report.records_total));
-    paragraph("Sent", &format!("{sent} of {total} records in {}", format::minutes(report.duration)));
+    tell("Sent", &format!("{sent} of {total} records in {}", format::minutes(report.duration)));
     if let Some(address) = report.address.filter(|_| report.verdict != Verdict::Done) {
-        paragraph("Stopped at", &format!("{address:#08x}"));
+        tell("Stopped at", &format!("{address:#08x}"));
     }
     if !report.heard.is_empty() {
-        paragraph(HEARD, &report.heard);
+        tell(HEARD, &report.heard);
     }
     if let Some(remark) = &report.remark {
-        paragraph("Note", remark);
+        tell("Note", remark);
     }
-    let advice = match load.is_silent {
-        true => SEE_POWER,
-        false => report.advice(),
-    };
-    paragraph("What next", &format!("{}.", visible::sentence(advice)));
-    shorten(&mut told, usize::from(area.height).saturating_sub(FRAME_ROWS));
-    for (label, broken) in told {
-        for (number, line) in broken.into_iter().enumerate() {
-            rows.push(lines::labelled(theme, if number == 0 { label } else { "" }, line));
-        }
+    tell("What next", &sentence(advice));
+    told
+}
+
+/// What can be said of the unit if nothing is heard of it: also of one that was on the cable before.
+fn doubt(view: &View, report: &LoadReport) -> Option<&'static str> {
+    let is_back = view.returning.is_none() && !view.load.is_of_earlier_unit;
+    let is_lost = matches!(view.link.state, LinkState::Lost(_)) || !is_back;
+    report.doubt(is_lost, view.load.is_silent)
+}
+
+/// The software before and after, as far as it is known: `1.1.0 before, unknown afterwards`.
+fn versions(report: &LoadReport) -> String {
+    let is_untouched = matches!(report.verdict, Verdict::Refused | Verdict::UnitRefused | Verdict::NoAnswer);
+    match (report.version_before, report.version_after) {
+        (Some(before), None) if is_untouched && report.unit == UnitNow::Application => format!("{before}, as before"),
+        (Some(before), Some(after)) => format!("{before} before, {after} afterwards"),
+        (Some(before), None) => format!("{before} before, unknown afterwards"),
+        (None, Some(after)) => format!("unknown before, {after} afterwards"),
+        (None, None) => "unknown".to_owned(),
     }
-    rows.push(Line::default());
-    rows.push(Line::from(vec![
-        Span::styled("  Enter", theme.key()),
-        Span::raw(" goes back to the file and its plan."),
-    ]));
-    rows
 }
 
 /// A unit may say any number of words: what has no room must not be what there is to do next.
-fn shorten(told: &mut [(&str, Vec<String>)], room: usize) {
+fn shorten(told: &mut [Told], room: usize) {
     let over = told.iter().map(|(_, lines)| lines.len()).sum::<usize>().saturating_sub(room);
     let Some((_, heard)) = told.iter_mut().find(|(label, _)| *label == HEARD).filter(|_| over > 0) else { return };
     heard.truncate(heard.len().saturating_sub(over).max(1));

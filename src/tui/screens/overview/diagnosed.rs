@@ -7,6 +7,7 @@ use crate::monitor::Tracked;
 use crate::tui::screens::Scene;
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
+use crate::wire::units;
 
 /// Columns of a channel and its value on a page of diagnostics, where the stream is off.
 const DIAGNOSED_COLUMNS: usize = 2 + 6 + 12;
@@ -60,7 +61,8 @@ fn channels(scene: Scene) -> &'static [String] {
 
 /// A channel's temperature on the newest page of diagnostics.
 fn value(scene: Scene, name: &str) -> Option<String> {
-    let is_celsius = |found: &&Tracked| found.unit.as_deref().is_some_and(|unit| matches!(unit, "C" | "°C" | "degC"));
+    let unit = |found: &Tracked| found.unit.as_deref().and_then(units::unit);
+    let is_celsius = |found: &&Tracked| unit(found).is_some_and(|unit| unit.name == "C");
     let found =
         scene.view.unit.monitor.diagnostics.found.iter().filter(is_celsius).find(|found| found.label == name)?;
     Some(format!("{} °C", found.text(found.value?)))

@@ -3,6 +3,7 @@
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
+use ratatui::style::Style;
 use ratatui::text::Line;
 
 mod diagnosed;
@@ -173,8 +174,31 @@ pub fn decimals(view: &View, source: Source) -> usize {
     )
 }
 
-/// What to do to see values.
-pub fn without_values(scene: Scene) -> Vec<&'static str> {
+/// What rows of this source carry.
+pub fn source_words(source: Source) -> &'static str {
+    match source {
+        Source::FieldValue => "field value (6100h) in °C",
+        Source::ProcessValue => "process value (7130h) in counts",
+    }
+}
+
+/// A value and its unit, the digits of all rows in the same columns. A unit after nothing would look like a value.
+pub fn value_text(value: Option<f64>, source: Source, decimals: usize) -> String {
+    let unit = match source {
+        Source::FieldValue => " °C",
+        Source::ProcessValue => "   ",
+    };
+    value.map_or_else(|| "-   ".to_owned(), |value| format!("{value:.decimals$}{unit}"))
+}
+
+/// What stands in the place of values where there are none: what to do to see them.
+pub fn without_values(scene: Scene, columns: u16) -> Vec<Line<'static>> {
+    let told = to_see_values(scene).into_iter();
+    told.flat_map(|text| lines::paragraph(text, usize::from(columns), Style::new())).collect()
+}
+
+/// The same in sentences.
+fn to_see_values(scene: Scene) -> Vec<&'static str> {
     if scene.view.link.name.is_none() {
         return vec!["Not connected. Press 1 to choose a port or an emulated unit."];
     }

@@ -4,7 +4,7 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-use super::{CHART_ROWS, Overview, decimals, diagnosed, without_values};
+use super::{CHART_ROWS, Overview, decimals, diagnosed, source_words, value_text, without_values};
 use crate::monitor::Channel;
 use crate::tui::screens::Scene;
 use crate::tui::widgets::spark::sparkline;
@@ -21,6 +21,8 @@ const LEAST_TREND: usize = 12;
 const LIMITS_AT: u16 = 110;
 /// ... of this width each.
 const LIMIT_COLUMNS: usize = 9;
+/// Digits after the point of a limit.
+const LIMIT_DECIMALS: usize = 1;
 
 impl Overview {
     /// The values with their heading, and what has to be said of them below.
@@ -30,17 +32,12 @@ impl Overview {
         let newest = stream.newest.map(|at| format::time_of_day(scene.start_of_day, at));
         let Some(source) = stream.source else {
             let mut shown = vec![lines::rule(theme, columns, "Values", "")];
-            let room = usize::from(columns).saturating_sub(4);
-            let broken = without_values(scene).into_iter().flat_map(|text| format::wrap(text, room));
-            shown.extend(broken.map(|line| Line::raw(format!("  {line}"))));
+            shown.extend(without_values(scene, columns));
             shown.extend(diagnosed::values(scene, columns));
             shown.push(Line::default());
             return shown;
         };
-        let what = match source {
-            Source::FieldValue => "field value (6100h) in °C",
-            Source::ProcessValue => "process value (7130h) in counts",
-        };
+        let what = source_words(source);
         let remark = format!("{what}, {}, newest {}", format::counted(stream.rows, "row"), newest.unwrap_or_default());
         let mut shown = vec![lines::rule(theme, columns, "Values", &remark)];
         // They are temperatures: beside counts they would say nothing.
@@ -86,15 +83,8 @@ fn value_row(
     has_limits: bool,
 ) -> Line<'static> {
     let theme = scene.theme;
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
-    let unit = match source {
-        Source::FieldValue => " °C",
-        Source::ProcessValue => "   ",
-    };
-    let value = match channel.reading.value() {
-        Some(value) => format!("{}{unit}", number(Some(value))),
-        None => "-   ".into(),
-    };
+    let number = |value: Option<f64>| format::decimal(value, decimals);
+    let value = value_text(channel.reading.value(), source, decimals);
     let limits = scene.view.limits(&channel.name).filter(|_| source == Source::FieldValue);
     let beyond = limits.zip(channel.reading.value()).and_then(|(limits, value)| limits.word(value));
     let (state, style) = match beyond {
@@ -105,8 +95,8 @@ fn value_row(
     let limit_columns = match has_limits {
         true => {
             let limits = limits.unwrap_or_default();
-            let show = |limit: Option<f64>| limit.map_or_else(|| "-".to_owned(), |limit| format!("{limit:.1}"));
-            [limits.low, limits.high, limits.shutdown].map(|limit| format!("{:>LIMIT_COLUMNS$}", show(limit))).concat()
+            let column = |limit: Option<f64>| format!("{:>LIMIT_COLUMNS$}", format::decimal(limit, LIMIT_DECIMALS));
+            [limits.low, limits.high, limits.shutdown].map(column).concat()
         }
         false => String::new(),
     };
@@ -159,7 +149,7 @@ fn limits_line(scene: Scene, source: Source, channel: &str, has_columns: bool) -
         }
         (Some(_), None) => format!("  {channel} has no limits."),
         (Some(read), Some(limits)) => {
-            let show = |limit: Option<f64>| limit.map_or_else(|| "-".to_owned(), |limit| format!("{limit:.1}"));
+            let show = |limit: Option<f64>| format::decimal(limit, LIMIT_DECIMALS);
             format!(
                 "  Limits of {channel}: low {}, high {}, shutdown {} °C, read {}.",
                 show(limits.low),

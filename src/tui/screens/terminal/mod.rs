@@ -18,7 +18,7 @@ use crate::monitor::{Origin, Scrollback, TextLine};
 use crate::record::Record;
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::popup::{Question, Wanted};
+use crate::tui::popup::{PickedFor, Question};
 use crate::tui::view::{Sending, View};
 use crate::tui::visible;
 use crate::tui::widgets::{format, lines};
@@ -230,7 +230,7 @@ impl Terminal {
                 }
             }
             Cmd::Break => return Some(Action::Break),
-            Cmd::SendFile => return Some(Action::Choose(Wanted::ToSend)),
+            Cmd::SendFile => return Some(Action::PickFile(PickedFor::ToSend)),
             Cmd::Times => self.with_times = !self.with_times,
             Cmd::Find => return Some(Action::Ask(Question::find(&self.words))),
             Cmd::FindNext => {
@@ -310,8 +310,6 @@ fn body(view: &View, area: Rect) -> (Rect, Rect) {
 fn sending_rows(scene: Scene, sending: &Sending, columns: u16) -> Vec<Line<'static>> {
     let theme = scene.theme;
     let share = if sending.total == 0 { 1.0 } else { sending.sent as f64 / sending.total as f64 };
-    let room = usize::from(columns).saturating_sub(11).min(100);
-    let filled = (share * room as f64).floor() as usize;
     let (sent, total) = (format::grouped(sending.sent), format::grouped(sending.total));
     let mut told = vec![
         Span::raw(format!("  {sent} of {total} bytes out, ")),
@@ -324,12 +322,7 @@ fn sending_rows(scene: Scene, sending: &Sending, columns: u16) -> Vec<Line<'stat
     }
     vec![
         lines::rule(theme, columns, "Sending a file", &visible::text(&sending.name)),
-        Line::from(vec![
-            Span::raw("  "),
-            Span::styled("█".repeat(filled), theme.good()),
-            Span::styled("░".repeat(room - filled), theme.quiet()),
-            Span::styled(format!("  {:>3.0} %", (share * 100.0).floor()), theme.strong()),
-        ]),
+        lines::gauge(theme, share, usize::from(columns)),
         Line::from(told),
     ]
 }
