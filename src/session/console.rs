@@ -1,24 +1,24 @@
 //! Talks with the firmware: switching the stream on and off (T).
 //!
-//! Questions are answered by what they offer. A question that is not understood is left with Enter and no answer, and the
-//! job says what it was waiting for; it never guesses. A unit may take the Enter for a value of its own, and stream: then
-//! the stream is switched off again.
+//! Questions are answered by what they offer. A question that is not understood is left with Enter and no answer, and
+//! the job says what it was waiting for; it never guesses. A unit may take the Enter for its default value, and stream:
+//! then the stream is switched off again.
 
-use super::event::{Awaited, Event, Job, Outcome};
+use super::event::{Awaited, Job, Outcome};
 use super::job::{Desk, Signal, Work};
 use super::leaving::{ENTER, Leaving};
 use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::stream::Source;
-use crate::wire::{Message, Prompt, SourceKeys, Text, visible};
+use crate::wire::{Message, Prompt, SourceKeys, Text, is_question, visible};
 
 /// How long a unit may take to ask or to answer.
 pub(super) const ANSWER: Duration = Duration::from_millis(1500);
 /// How long a single key may go without a reaction before Enter is sent after it.
 const KEY_ALONE: Duration = Duration::from_millis(400);
-/// How long after T a line without a question means "switched off".
+/// How long after a line that follows T the question may take; without one, T has switched the stream off.
 pub(super) const NO_QUESTION: Duration = Duration::from_millis(400);
-/// How long after T rows may still arrive that were on their way: those an adapter and the unit's own buffer held.
+/// How long after T rows may still arrive that were on their way, in an adapter and in the unit's own buffer.
 pub(super) const ROWS_ON_THEIR_WAY: Duration = Duration::from_millis(300);
 /// How often T is pressed to switch the stream off: it may be lost on the line.
 const MOST_TOGGLES: u32 = 3;
@@ -42,12 +42,14 @@ pub(super) struct StreamOn {
     /// A stream was known to be on when the job began.
     found_on: bool,
     is_cancelled: bool,
+    /// The last line since T is worded as a question.
+    asks: bool,
     stage: OnStage,
-    /// A question was not understood, or is not wanted any more.
+    /// Set once the outcome is known and an open question is left, unanswered.
     leaving: Option<Leaving>,
     deadline: Option<Instant>,
     heard: Option<Span>,
-    /// The question for the repetition time: many a unit names in it what it takes.
+    /// The question for the repetition time, in which many units name the times they take.
     question: Option<String>,
 }
 
@@ -59,7 +61,7 @@ enum OnStage {
     Source { enter_sent: bool },
     /// The period has been sent; whether the unit has asked for it once more.
     Period { again: bool },
-    /// Nobody has refused it: the stream is on, and its first row proves that.
+    /// The unit has not refused the period: the stream counts as on, and its first row proves that.
     Row,
 }
 
@@ -71,6 +73,7 @@ impl StreamOn {
             was_on: false,
             found_on: false,
             is_cancelled: false,
+            asks: false,
             stage: OnStage::Toggled,
             leaving: None,
             deadline: None,
@@ -81,6 +84,7 @@ impl StreamOn {
 
     fn toggle(&mut self, desk: &mut Desk<'_>) {
         desk.send(b"t");
+        self.asks = false;
         self.stage = OnStage::Toggled;
         self.deadline = Some(desk.now + ANSWER);
     }
@@ -108,13 +112,14 @@ impl StreamOn {
             (OnStage::Toggled, Message::Prompt(_)) => return self.give_up(Awaited::SourceQuestion, desk),
             (OnStage::Toggled, Message::Row(_)) => {}
             (OnStage::Toggled, _) => {
+                self.asks = *message == Message::Text && is_question(&text.text);
                 let soon = desk.now + NO_QUESTION;
                 self.deadline = self.deadline.map(|deadline| deadline.min(soon));
             }
             (OnStage::Period { .. } | OnStage::Row, Message::Row(row)) if row.source == self.source => {
                 return Some(self.ended(Outcome::StreamRuns { was_on: self.was_on }));
             }
-            // It may ask once more now.
+            // The unit may ask once more now.
             (OnStage::Period { .. } | OnStage::Row, Message::Refusal) => {
                 let refused = self.refused(desk);
                 self.leaving = Some(Leaving::if_asked(ENTER, LEFT, desk.now + NO_QUESTION, refused));
@@ -126,8 +131,11 @@ impl StreamOn {
 
     fn tick(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         match &mut self.stage {
-            // It was on. To set it, or to have it as it was, it is switched on again.
-            OnStage::Toggled if desk.pending.is_none() && !self.was_on && (self.found_on || !self.is_cancelled) => {
+            // The stream was on, and T has switched it off. It is switched on again: to set it or, if the job has been
+            // cancelled, to have it as it was.
+            OnStage::Toggled
+                if !self.asks && desk.pending.is_none() && !self.was_on && (self.found_on || !self.is_cancelled) =>
+            {
                 self.was_on = true;
                 self.toggle(desk);
                 None
@@ -146,7 +154,6 @@ impl StreamOn {
             OnStage::Period { .. } if self.is_cancelled => Some(self.ended(Outcome::Done(Job::StreamOn))),
             OnStage::Period { .. } => {
                 desk.facts.stream = Some(self.source);
-                desk.events.push_back(Event::FactsChanged);
                 self.stage = OnStage::Row;
                 self.deadline = Some(desk.now + FIRST_VALUES + self.period * 2);
                 None
@@ -200,7 +207,7 @@ impl StreamOn {
     fn cancel(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.is_cancelled = true;
         match &self.stage {
-            // What the unit makes of what has been sent shows within a moment.
+            // Within a moment it shows what the unit makes of the keys that have been sent.
             OnStage::Toggled | OnStage::Period { .. } => None,
             OnStage::Row if desk.pending.is_none() => Some(ON_CANCELLED),
             OnStage::Source { .. } | OnStage::Row => {
@@ -214,7 +221,8 @@ impl StreamOn {
 impl Work for StreamOn {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         if let Some(leaving) = &mut self.leaving {
-            // It has taken the Enter for its own values. One that streamed before does so again, as it was found.
+            // The unit has taken the Enter for its default values, and streams. If its stream was on before, it stays
+            // on.
             if matches!(signal, Signal::Heard(_, Message::Row(_))) && !self.was_on {
                 desk.send(b"t");
                 desk.facts.stream = None;
@@ -260,6 +268,8 @@ pub(super) struct StreamOff {
     toggles: u32,
     /// Something has come since the first T: a unit is there.
     heard: bool,
+    /// The last line since T is worded as a question.
+    asks: bool,
     is_cancelled: bool,
     deadline: Option<Instant>,
 }
@@ -276,7 +286,7 @@ enum OffStage {
 impl StreamOff {
     fn toggle(&mut self, desk: &mut Desk<'_>) {
         desk.send(b"t");
-        (self.stage, self.leaving) = (OffStage::Toggled, None);
+        (self.stage, self.leaving, self.asks) = (OffStage::Toggled, None, false);
         self.toggled_at = desk.now;
         self.toggles += 1;
         self.deadline = Some(desk.now + ANSWER);
@@ -290,7 +300,7 @@ impl StreamOff {
                 self.leave(desk, Outcome::Done(Job::StreamOff));
             }
             (OffStage::Toggled, Message::Row(_)) if desk.now < self.toggled_at + ROWS_ON_THEIR_WAY => {}
-            // The key was lost.
+            // Rows go on, so the key was lost.
             (_, Message::Row(_)) => {
                 if self.is_cancelled || self.toggles == MOST_TOGGLES {
                     return Some(self.ended(still_on(Some(text.span))));
@@ -298,6 +308,7 @@ impl StreamOff {
                 self.toggle(desk);
             }
             _ => {
+                self.asks = *message == Message::Text && is_question(&text.text);
                 let soon = desk.now + NO_QUESTION;
                 self.deadline = self.deadline.map(|deadline| deadline.min(soon));
             }
@@ -307,6 +318,12 @@ impl StreamOff {
 
     fn tick(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         match (&self.stage, desk.pending) {
+            // Which question it is, rows show: they go on if it was whether to stop.
+            (_, None) if self.asks => {
+                desk.facts.stream = None;
+                self.leave(desk, Outcome::Done(Job::StreamOff));
+                None
+            }
             (_, Some(text)) => {
                 let span = text.span;
                 self.leave(desk, still_on(Some(span)));
@@ -374,7 +391,7 @@ impl Work for StreamOff {
             Signal::Heard(text, message) => self.heard(text, message, desk),
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => self.tick(desk),
             Signal::Tick | Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
-            // What T has done shows within a moment.
+            // Within a moment it shows what T has done.
             Signal::Cancel => {
                 self.is_cancelled = true;
                 None

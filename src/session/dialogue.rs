@@ -1,16 +1,17 @@
-//! Which lines answer a key that was sent: they do not count as not understood, even where no single line of them means
+//! Which lines answer a key that was sent: they do not count as not understood, even if no single one of them means
 //! anything.
 //!
-//! A dialogue is questions, echoes and sentences in words of the unit's own; a page of diagnostics has headings; the view
-//! of the object dictionary has titles and hints. Their jobs read what matters in them. The
-//! count of lines not understood is about the rest. Keys tell, typed or sent by a job, so a recording gives the same.
+//! A dialogue has questions, echoes and sentences in the unit's own words, a page of diagnostics has headings, and the
+//! view of the object dictionary has titles and hints. Jobs read what matters in them; the count of lines not
+//! understood is about all other lines. The keys show which is which, typed or sent by a job, so a recording gives the
+//! same count.
 
 use super::keys::{Key, Typed};
 use crate::time::{Duration, Instant};
 use crate::wire::{MenuKey, diagnostics};
 
-/// How long what comes after a key, or after the last page, is its answer: pages come every second, and a unit that
-/// computes needs a moment.
+/// How long what comes after a key is its answer, and what comes after a page belongs to pages: pages come every
+/// second, and a unit that computes needs a moment.
 const ANSWER: Duration = Duration::from_secs(3);
 
 /// The dialogue that is open, as far as keys tell.
@@ -24,9 +25,9 @@ pub(super) struct Dialogue {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asked {
-    /// The menu, which has not shown itself yet: anything may answer an `m`.
+    /// The menu, which has not come yet: anything may answer an `m`.
     Menu,
-    /// The menu, which has come, the view, a switch with its questions.
+    /// The menu, which has come, or what another of its keys opens, such as the view or a question.
     Answer,
     /// Pages, which come until the key is pressed again.
     Pages,
@@ -74,12 +75,12 @@ impl Dialogue {
         self.asked == Some(Asked::Pages) && at <= self.until
     }
 
-    /// A unit says its name: no page does, so it has restarted and shows no more of them.
+    /// The unit names its product. No page does, so it has restarted and shows no more pages.
     pub(super) fn named(&mut self) {
         self.asked = self.asked.filter(|asked| *asked != Asked::Pages);
     }
 
-    /// An entry of the menu has come: how many of the lines before it were its titles.
+    /// An entry of the menu has come: returns how many of the lines before it were titles of the menu.
     pub(super) fn menu(&mut self) -> u64 {
         if self.asked == Some(Asked::Menu) {
             self.asked = Some(Asked::Answer);

@@ -1,15 +1,15 @@
-//! Tells the echo of a password from what the unit says itself on the line after it.
+//! Distinguishes the echo of a password from what the unit says itself on the line after it.
 //!
-//! Not every unit echoes a line end, or anything: `Password wrong` may come where the echo would. So what comes is compared
-//! with the keys that were sent. It is their echo if it is made of them in their order, in capitals or not, whatever
-//! the line has lost, doubled or damaged of it, with what hides them again (backspaces, stars) in between. Everything else
-//! is the unit's own text, including a mask that it shows instead of the keys.
+//! Not every unit echoes a line end, or anything: `Password wrong` may come where the echo would. So what comes is
+//! compared with the keys that were sent. It is their echo if it consists of them in their order, in either case, even
+//! if the line has lost, doubled or damaged some, and with what hides them again (backspaces, stars) in between.
+//! Everything else is the unit's own text, including a mask that it shows instead of the keys.
 //!
-//! What holds whatever happens:
-//! - Nothing is lost, and all comes out in its order. Bytes that may become an echo are kept back until the next ones
-//!   tell, or until they are asked for: then they are secret where an echo is to be expected.
-//! - Four keys that follow upon each other never come through.
-//! - Where there are more keys than are compared, all is secret.
+//! What always holds:
+//! - Nothing is lost or reordered. Bytes that may become an echo are kept back until the next ones decide, or until
+//!   they are [asked for](Echo::flush): then they are secret if an echo is to be expected at this place.
+//! - Four consecutive keys never come through.
+//! - If there are more keys than are compared, everything is secret.
 
 use zeroize::Zeroizing;
 
@@ -17,18 +17,19 @@ use super::redactor::{LONGEST, Piece, Pieces, SHORTEST};
 use crate::endpoint::Secrecy;
 use crate::wire::{XOFF, XON};
 
-/// Bytes that are kept back at most: a unit may hide what it has echoed behind any number of signs.
+/// Most bytes that are kept back: a unit may hide what it has echoed with any number of signs.
 const MOST_KEPT: usize = 64;
-/// This many of the keys make what follows a part of an echo part of it too, as long as keys are missing.
+/// After part of an echo, and as long as keys of it are missing, a run of this many keys is part of it as well.
 const SHORTEST_REST: usize = 2;
 
 /// The keys that may come back, and how far they have.
 #[derive(Default)]
 pub(super) struct Echo {
     keys: Zeroizing<Vec<u8>>,
-    /// There are more.
+    /// More keys have been typed than are kept.
     is_beyond: bool,
-    /// They are being typed, so each may come back alone; else the echo comes in one piece, before anything else.
+    /// The keys are being typed, so each may come back alone; otherwise the echo comes in one piece, before anything
+    /// else.
     by_hand: bool,
     /// How many of the keys have come back, including those lost on the way.
     back: usize,
@@ -50,13 +51,13 @@ struct Run {
     kept: Vec<(u8, Nature)>,
     /// How many of them are keys, those handed out included.
     matched: usize,
-    /// After the last of those among the keys.
+    /// Position in the keys after the last one that has matched.
     next: usize,
-    /// The same, if they are keys that have not come back before.
+    /// The same, if the run consists of keys that have not come back before.
     due: Option<usize>,
-    /// The last byte is not one of the keys: damage in place of one, if the next byte is the key after that.
+    /// The last byte is not the next key. It is damage in place of that key if the byte after it is the key after that.
     is_doubtful: bool,
-    /// The last key.
+    /// The last key that has matched.
     last: u8,
     /// Some of it has been handed out as secret.
     is_echo: bool,
@@ -85,11 +86,11 @@ impl Echo {
     pub(super) fn begin(&mut self) {
         self.finish();
         let out = std::mem::take(&mut self.out);
-        // With its room from the beginning: a vector that grows leaves unwiped copies behind.
+        // Allocated in full size: a vector that grows leaves unwiped copies behind.
         *self = Echo { keys: Zeroizing::new(Vec::with_capacity(LONGEST)), out, ..Echo::default() };
     }
 
-    /// These keys of it have been typed.
+    /// These keys of the password have been typed.
     pub(super) fn typed(&mut self, keys: &[u8]) {
         self.by_hand = true;
         for &key in keys.iter().filter(|key| !key.is_ascii_control()) {
@@ -106,7 +107,7 @@ impl Echo {
         (self.by_hand, self.spoken) = (false, false);
     }
 
-    /// Takes bytes of the line and gives those whose nature is known, in their order.
+    /// Takes bytes of the line. Returns those of which it is known whether they are secret, in their order.
     pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<Piece> {
         for &byte in bytes {
             if matches!(byte, XON | XOFF) {
@@ -128,13 +129,13 @@ impl Echo {
         !self.run.kept.is_empty() || !self.out.is_empty()
     }
 
-    /// What was kept back: no more will come soon. If it does all the same, it goes on with it.
+    /// Hands out what was kept back, since no more will come soon. If more comes all the same, the run goes on with it.
     pub(super) fn flush(&mut self) -> Vec<Piece> {
         self.tell();
         std::mem::take(&mut self.out).into_inner()
     }
 
-    /// The line is over. What it left is [handed out](Echo::flush) next.
+    /// The line is over. What is still kept of it has to be [handed out](Echo::flush) next.
     pub(super) fn finish(&mut self) {
         self.tell();
         self.run = Run::default();
@@ -145,7 +146,7 @@ impl Echo {
         let erases = matches!(self.last, 0x08 | 0x7F) && byte == b' ';
         let is_own = self.escape.covers(byte) || byte.is_ascii_control() || erases;
         self.last = byte;
-        // The bytes of a run that has come to nothing are looked at again, without its first one.
+        // The bytes of a run that was no echo are looked at again, without its first one.
         let mut rest = vec![(byte, is_own)];
         while let Some((byte, is_own)) = rest.pop() {
             if !self.goes_on(byte, is_own) {
@@ -158,7 +159,8 @@ impl Echo {
         }
     }
 
-    /// Takes a byte into the run, or begins one with it, or says it aloud if it can be none. `false`: the run is over.
+    /// Adds a byte to the run, begins a run with it, or hands it out if it cannot be part of one. `false`: it does not
+    /// belong to the run, which is over.
     fn goes_on(&mut self, byte: u8, is_own: bool) -> bool {
         if self.run.matched == 0 {
             match self.find(0, byte).filter(|_| !is_own) {
@@ -203,7 +205,7 @@ impl Echo {
         self.run.matched += 1;
     }
 
-    /// Where the keys go on after the first one from `from` on that this byte may be.
+    /// The position after the first key, from `from` on, that this byte may be.
     fn find(&self, from: usize, byte: u8) -> Option<usize> {
         let keys = self.keys.get(from..)?;
         keys.iter().position(|key| key.eq_ignore_ascii_case(&byte)).map(|at| from + at + 1)
@@ -215,14 +217,15 @@ impl Echo {
         self.run.matched > 0 && self.run.matched >= shortest.min(self.keys.len())
     }
 
-    /// Whether the run is an echo. One that has come to its end is not for being in the right place: the unit's own words
-    /// begin there as well, with a key or two. But what is typed by hand may come back key by key, with words between.
+    /// Whether the run is an echo. A run that has ended is not one just because it is where the echo has to come: the
+    /// unit's own text begins there too, perhaps with the same letters. But what is typed by hand may come back key by
+    /// key, with words between.
     fn is_echo(&self, has_ended: bool) -> bool {
         let is_due = self.run.due.is_some() && (self.by_hand || !self.spoken && !has_ended);
         self.run.matched > 0 && (self.is_long_enough() || self.run.is_echo || is_due)
     }
 
-    /// Another byte has come that is not of the run. Gives what of it is to be looked at again.
+    /// A byte has come that does not belong to the run. Returns the bytes of the run that are to be looked at again.
     fn end_run(&mut self) -> Vec<(u8, bool)> {
         let doubtful = if self.run.is_doubtful { self.run.kept.pop() } else { None };
         let is_echo = self.is_echo(true);
@@ -259,7 +262,7 @@ impl Echo {
         }
     }
 
-    /// The unit says this itself.
+    /// Hands out a byte that the unit says itself.
     fn say(&mut self, byte: u8, is_own: bool) {
         self.spoken |= byte.is_ascii_alphanumeric() && !is_own;
         self.out.push(&[byte], Secrecy::Open);
@@ -276,7 +279,7 @@ impl Escape {
             (Escape::Begun, b'[') | (Escape::Parameters, b'0'..=b'9' | b';' | b'?') => Escape::Parameters,
             _ => Escape::None,
         };
-        // Of those without parameters only the bracket is known to be none of the keys.
+        // In a sequence without `[`, what follows ESC may be one of the keys.
         matches!(before, Escape::Parameters) || *self != Escape::None
     }
 }
@@ -287,7 +290,7 @@ mod tests {
     use crate::record::REDACTED;
     use proptest::prelude::*;
 
-    /// What is left of these pieces of a line. After each the line falls silent.
+    /// What comes out for these pieces of a line, with stars for what is secret. After each the line falls silent.
     fn redacted(echo: &mut Echo, pieces: &[&[u8]]) -> Vec<u8> {
         let mut all = Vec::new();
         for piece in pieces {
@@ -323,6 +326,8 @@ mod tests {
             ("AXIO-2010", "Application rejects it, V2.0"),
             ("AXIO-2010", "#########"),
             ("AXIO-2010", "\x1b[31mWrong\x1b[0m"),
+            // Keys that are none of the next ones.
+            ("Pa55-Wort", "Paaaa, no"),
         ] {
             assert_eq!(after(password, &[says]), says, "{password}");
         }
@@ -345,7 +350,14 @@ mod tests {
             (&["Pa5~-Wort!"], "*********!"),
             (&["Pa55~~-Wort ok"], "****~~***** ok"),
             (&["Pa55-W~~rt ok"], "******~~** ok"),
-            // It stops where it is due.
+            (&["Pa~5-Wort"], "*********"),
+            // Nothing follows in which the last key could be seen to be damaged.
+            (&["Pa55-Wor?", " no"], "********? no"),
+            // Damage is forgotten where the line pauses.
+            (&["so Pa5~", "5- no"], "so Pa5~** no"),
+            // What has come to nothing may hold the beginning of the echo.
+            (&["PaPa55-Wort"], "Pa*********"),
+            // Incomplete, but where the echo has to come.
             (&["Pa"], "**"),
             (&["Pa\x1355\x11-Wort"], "**\x13**\x11*****"),
         ] {
@@ -376,6 +388,20 @@ mod tests {
     fn more_keys_than_are_compared_make_all_secret() {
         let mut echo = sent(&"x".repeat(LONGEST + 1));
         assert_eq!(redacted(&mut echo, &[b"abc\x13d"]), b"***\x13*");
+        // What was kept back by then comes first.
+        let mut echo = Echo::default();
+        echo.begin();
+        echo.typed(&[b'x'; LONGEST]);
+        assert_eq!(echo.push(b"x\x1b["), []);
+        echo.typed(b"x");
+        let pieces =
+            [(b"x".to_vec(), Secrecy::Secret), (b"\x1b[".to_vec(), Secrecy::Open), (b"y".to_vec(), Secrecy::Secret)];
+        assert_eq!(echo.push(b"y"), pieces);
+    }
+
+    #[test]
+    fn what_is_known_to_be_an_echo_is_not_kept_back() {
+        assert_eq!(sent("Pa55-Wort").push(b"Pa55"), [(b"Pa55".to_vec(), Secrecy::Secret)]);
     }
 
     #[test]
@@ -411,7 +437,7 @@ mod tests {
                 prop_assert!(was == *is || *is == REDACTED);
             }
             let secret = secret.to_ascii_lowercase();
-            // Where the line pauses, three keys of either side may be seen; within a piece never four.
+            // Where the line pauses, three keys on either side may be seen; within a piece never four.
             let mut at = 0;
             for piece in pieces {
                 let shown = &found[at..at + piece.len()];

@@ -11,17 +11,18 @@ use crate::record::Span;
 use crate::secret::Secret;
 use crate::time::{Duration, Instant};
 use crate::version::Version;
+use crate::wire::dictionary::{Reading, Shown};
 use crate::wire::stream::{Row, Source};
 use crate::wire::{MenuKey, Text};
 
-/// What the user wants of the unit. One job runs at a time, and one more may be given while it is being found out who is
-/// there; [`Command::Keys`] and [`Command::Cancel`] are not jobs.
+/// What the user wants of the unit. One job runs at a time, and one more is queued if it is given while the unit is
+/// being identified. [`Command::Keys`] and [`Command::Cancel`] are not jobs.
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Keys for the unit as they are, from the raw terminal or the menu. Refused while a job other than
     /// [`Command::Identify`] runs.
     Keys(Vec<u8>),
-    /// Send a file as it is, as if it were typed, with news of how far it has come: [`Event::FileProgress`].
+    /// Send a file as it is, as if it were typed. [`Event::FileProgress`] reports how far it has come.
     SendFile(Vec<u8>),
     /// Find out what is at the other end.
     Identify,
@@ -36,9 +37,10 @@ pub enum Command {
     StreamOff,
     /// Restore the default object dictionary; the unit resets itself (AXTC4CO manual, section 4.1.2).
     RestoreDefaults,
-    /// Read the whole object dictionary through V. Scanning and CAN are halted meanwhile (AXTC4CO manual, section 4.1.1).
+    /// Read the whole object dictionary through V. Scanning and CAN are halted meanwhile (AXTC4CO manual, section
+    /// 4.1.1).
     ReadDictionary,
-    /// Read this many pages of diagnostics, or until it is cancelled; then no more come.
+    /// Read this many pages of diagnostics, or all until the job is cancelled; then stop them.
     Diagnostics {
         /// How many.
         pages: Option<u32>,
@@ -70,9 +72,9 @@ pub struct LoadOrder {
     pub loader: Option<LoaderKind>,
     /// Send long records instead of the file's: fewer characters for the same words.
     pub packed: bool,
-    /// Defects of the image that do not matter, for this unit: those the user knows of and wants all the same.
+    /// Defects of the image, as such or for this unit, that the user knows of and allows.
     pub allowed: Vec<DefectId>,
-    /// A defect on purpose, to prove the proof.
+    /// Makes the sender misbehave in a known way, so that a test shows that the checker notices.
     #[doc(hidden)]
     pub flaw: Option<Flaw>,
 }
@@ -92,7 +94,7 @@ impl LoadOrder {
         }
     }
 
-    /// Its progress before anything has been done: the unit is being looked at.
+    /// Its progress before anything has been done: the unit is being identified.
     pub fn at_its_beginning(&self) -> Progress {
         let (records_total, bytes_total) = super::upload::size(self);
         Progress {
@@ -163,7 +165,7 @@ pub enum Refusal {
     /// The password is empty or holds a control character, which would end it early.
     #[error("the password is empty or holds a control character")]
     Password,
-    /// There is a unit to ask.
+    /// The session has a unit, which is asked instead of listened to.
     #[error("only a recording is listened to; a unit is asked")]
     Live,
     /// The session listens to a recording.
@@ -172,8 +174,8 @@ pub enum Refusal {
     /// The unit asks for the password, and a file is not one.
     #[error("the unit asks for a password: answer that first, or leave it with Enter")]
     PasswordOpen,
-    /// A key has been typed whose question takes whatever is sent as its answer: after a `Ye` the key of another job
-    /// completes the word that restores the defaults.
+    /// The question after a key that was typed takes whatever is sent as its answer: after a `Ye`, a key that another
+    /// job sends could complete the word that restores the defaults.
     #[error("the question after the {} that was typed is still open: end it on the terminal with Enter", .0.letter())]
     QuestionOpen(MenuKey),
     /// The unit holds us by XOFF, and too much waits already.
@@ -181,7 +183,7 @@ pub enum Refusal {
     Held,
 }
 
-/// News.
+/// What has happened.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// The unit has printed a line (or a page, or a prompt); what it means is in the message, if anything.
@@ -202,7 +204,7 @@ pub enum Event {
         /// What it says.
         row: Row,
     },
-    /// So many entries of the object dictionary have been read.
+    /// This many entries of the object dictionary have been read so far.
     EntriesRead(usize),
     /// A page of diagnostics is complete.
     Page {
@@ -231,8 +233,8 @@ pub enum Event {
         /// Bytes of the file.
         total: usize,
     },
-    /// A file that is sent as it is makes no progress: the unit has held it by XOFF for long. Reported once for each hold.
-    /// Nothing is given up: the user ends the wait, or the unit does, and then [`Event::FileProgress`] says so.
+    /// A file that is sent as it is makes no progress: the unit has held it by XOFF for a long time. Reported once for
+    /// each hold. The wait goes on until the user cancels, or the unit sends XON and [`Event::FileProgress`] follows.
     FileHeld {
         /// Since when.
         since: Instant,
@@ -252,8 +254,8 @@ pub enum Outcome {
     Identified,
     /// The job has done what it should.
     Done(Job),
-    /// The unit has taken the Yes that restores its defaults, and shows only what its menu shows anyway: a restart was not
-    /// seen.
+    /// The unit has taken the Yes that restores its defaults, but has printed only what its menu has as well: no
+    /// restart was seen.
     DefaultsTaken,
     /// The stream runs as asked; rows have come.
     StreamRuns {
@@ -280,7 +282,7 @@ pub enum Outcome {
         /// Where it said so.
         heard: Option<Span>,
     },
-    /// The job was cancelled and has left the unit in peace.
+    /// The job was cancelled, and has ended what it had begun with the unit.
     Cancelled(Job),
     /// An upload has ended, well or not.
     Loaded(Box<LoadReport>),
@@ -295,14 +297,14 @@ pub enum Outcome {
     },
 }
 
-/// What a job has waited for in vain. As text it says, as a sentence without its stop, what did not happen.
+/// What a job has waited for in vain. Its text says what did not happen, as a sentence without a full stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Awaited {
     /// The question that offers the stream's sources, after T.
-    #[error("the unit did not ask which values its stream is to send")]
+    #[error("the unit did not ask, in words that are understood, which values its stream is to send")]
     SourceQuestion,
     /// The question after that one.
-    #[error("the unit did not ask for the repetition time")]
+    #[error("the unit did not ask, in words that are understood, for the repetition time")]
     PeriodQuestion,
     /// The first row of a stream that was switched on.
     #[error("no row of the stream came")]
@@ -311,7 +313,7 @@ pub enum Awaited {
     #[error("the unit did not confirm that the stream is off")]
     StreamOff,
     /// The question after D.
-    #[error("the unit did not ask for the Yes that restores its defaults")]
+    #[error("the unit did not ask, in words that are understood, for the Yes that restores its defaults")]
     DefaultsQuestion,
     /// The banner of a unit that restores its defaults.
     #[error("the banner after the reset did not come")]
@@ -326,7 +328,7 @@ pub enum Awaited {
     #[error("no entry of the object dictionary came")]
     Entry,
     /// The first page of diagnostics.
-    #[error("no page of diagnostics came")]
+    #[error("no page of diagnostics came that is understood")]
     Page,
     /// One more, after the first ones.
     #[error("the next page of diagnostics did not come")]
@@ -341,9 +343,9 @@ pub enum Awaited {
 pub enum FileEnd {
     /// All of it has left.
     Whole,
-    /// The user has had enough; nothing of it leaves any more.
+    /// The user has cancelled; no more of it leaves.
     Cancelled,
-    /// The link is gone. Of what had left for it last, some may not have reached the unit.
+    /// The link is gone. Some of the bytes that left last may not have reached the unit.
     LinkLost,
 }
 
@@ -389,18 +391,27 @@ impl DictionaryReading {
 pub struct ReadEntry {
     /// Where it lies.
     pub at: ObjectAddress,
-    /// Its value; `None` where the unit shows none, it is doubtful, or the entry is not known.
-    pub value: Option<Value>,
     /// What the line says besides index and sub-index.
     pub text: String,
     /// Where in the record it was read.
     pub span: Span,
-    /// What of the text says the value, where something does.
-    pub numeral: Option<String>,
+    /// What the text says of the value; `None` where the product's manual does not have the entry, or is not known.
+    pub reading: Option<Reading>,
+}
+
+impl ReadEntry {
+    /// Its value, where the unit shows one that is certain.
+    pub fn value(&self) -> Option<Value> {
+        match self.reading.as_ref()?.shown {
+            Shown::Value(value) => Some(value),
+            Shown::Nothing | Shown::Hexadecimal => None,
+        }
+    }
+
     /// The text says a value, but which one is uncertain: this unit prints hexadecimal numbers without a mark.
-    pub doubtful: bool,
-    /// Whether the product's manual has it.
-    pub known: bool,
+    pub fn is_doubtful(&self) -> bool {
+        self.reading.as_ref().is_some_and(|reading| reading.shown == Shown::Hexadecimal)
+    }
 }
 
 /// What is known of the unit, and from where.
@@ -422,21 +433,21 @@ pub struct Facts {
     pub stream: Option<Source>,
     /// Whether pages of diagnostics come, no matter what asked for them, and where the first sign of that is.
     pub diagnostics: Option<Span>,
-    /// Lines that no recogniser understood and that answer no key: titles of the menu, questions, pages and the view are
-    /// none.
+    /// Lines that no recogniser understood and that answer no key: titles of the menu, questions, pages and the view do
+    /// not count.
     pub unrecognised_lines: u64,
 }
 
 impl Facts {
-    /// The loader talks: what the application said of itself is history. The product stays what it is.
+    /// The loader talks: what the application said of itself does not hold any more, except for the product.
     pub(super) fn enter_loader(&mut self) {
         let product = self.product.take();
         let unrecognised_lines = self.unrecognised_lines;
         *self = Facts { state: UnitState::Loader, product, unrecognised_lines, ..Facts::default() };
     }
 
-    /// The unit says which product it is. If that is another one than before, the plug is in another unit: what the one
-    /// before said of itself is not true of it.
+    /// The unit says which product it is. If that is another one than before, the cable is in another unit, and what
+    /// the one before said of itself is forgotten.
     pub(super) fn name_product(&mut self, product: Known<String>) {
         let is_other = |before: &Known<String>| !before.value.eq_ignore_ascii_case(&product.value);
         if self.product.as_ref().is_some_and(is_other) {

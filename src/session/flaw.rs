@@ -1,7 +1,7 @@
-//! Defects that a proof puts into the upload on purpose.
+//! Known ways to misbehave, so that a test can show that the checker of uploads notices them.
 //!
-//! A checker that has never found anything may be blind. So the swarm (`tests/it/swarm.rs`) also runs the machine with one
-//! of the defects that real senders have, and has to notice each. Nothing but that test ever names one.
+//! A checker that has never found anything may be blind. So the swarm (`tests/it/swarm.rs`) also runs the upload with each
+//! of the defects that real senders have, and has to notice every one. Nothing but that test ever names one.
 
 /// One defect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub enum Flaw {
     EndsAtOnce,
     /// Sends the line ends most files have, CR LF, whatever the loader takes.
     SendsCrLf,
-    /// Goes on with the next record behind an error text, a prompt, or a banner.
+    /// Goes on with the next record after an error text, a prompt, or a banner.
     SendsBehindErrors,
     /// Waits for no XON where the loader must be writing.
     IgnoresHolds,

@@ -2,11 +2,11 @@
 //!
 //! What may hold the password is separated on the way, so that it reaches no record, message or fact.
 
-use super::Session;
 use super::event::{Event, Job, Known, Origin, UnitState};
 use super::job::Signal;
 use super::redactor::Piece;
 use super::watching::Saw;
+use super::{Mode, Session};
 use crate::endpoint::Secrecy;
 use crate::record::{Direction, REDACTED};
 use crate::time::{Duration, Instant};
@@ -16,10 +16,12 @@ use crate::wire::{Confidence, Item, LoaderText, MenuKey, Message, NmtState, Prom
 /// latency of 16 ms.
 const PROMPT_QUIET: Duration = Duration::from_millis(60);
 
-/// The same after a line that may be a question: a text about it goes on. Less than a job waits after such a line.
+/// Silence after a complete line that makes it a question, if it may be one: a text that only mentions the subject goes
+/// on. Less than a job waits after such a line.
 const LINE_QUIET: Duration = Duration::from_millis(250);
 
-/// Bytes of a question for the password at most; what goes on longer is looked at when the unit has fallen silent.
+/// Up to this many bytes, a text is checked for the question for the password while it comes. A longer one is checked
+/// when the unit has fallen silent.
 const LONGEST_PROMPT: usize = 200;
 
 /// How long what comes after a request for the menu counts as its answer.
@@ -58,7 +60,8 @@ impl PromptWatch {
         self.line.as_ref().map(|(due, ..)| *due)
     }
 
-    /// Something has come since the last line: words are another text, but signs alone are where the answer to it goes.
+    /// Text has followed the line. If it has letters or digits, the line was no question; signs alone mark the place
+    /// for the answer.
     fn goes_on(&mut self, now: Instant, pending: Option<&Text>) {
         let Some(text) = pending else { return };
         if text.text.contains(char::is_alphanumeric) {
@@ -86,7 +89,7 @@ impl Session {
         self.password.wait_for_more(self.now);
     }
 
-    /// Nothing has followed what looks like the beginning of the password for long enough.
+    /// Takes what looked like the beginning of the password, since nothing has followed it for long enough.
     pub(super) fn hand_out_echo(&mut self) {
         let pieces = self.password.hand_out();
         self.take_in(pieces);
@@ -119,45 +122,45 @@ impl Session {
         let pending = self.framer.pending();
         self.prompt.goes_on(self.now, pending.as_ref());
         let asks_password = pending.as_ref().is_some_and(|text| {
-            text.text.len() <= LONGEST_PROMPT
-                && !self.prompt.has_seen(text)
-                && self.vocabulary.asks_password(&text.text, self.is_behind_load())
+            text.text.len() <= LONGEST_PROMPT && self.vocabulary.asks_password(&text.text, self.is_after_load())
         });
         if asks_password {
             self.password.question();
         }
-        self.prompt.due = pending.filter(|text| !self.prompt.has_seen(text)).map(|_| self.now + PROMPT_QUIET);
+        self.prompt.due = pending.map(|_| self.now + PROMPT_QUIET);
     }
 
     /// A line is complete.
     fn line(&mut self, mut text: Text) {
         self.prompt.line = None;
-        if self.recognises {
+        let recognises = self.mode != Mode::Plain;
+        if recognises {
             self.password.scrub(&mut text.text);
         }
-        let matters = self.password.is_asked() || self.recognises;
-        let question = matters.then(|| self.vocabulary.question_before_row(&text.text)).flatten();
+        let matters = self.password.is_asked() || recognises;
+        let before_row = matters.then(|| self.vocabulary.before_row(&text.text)).flatten();
         // Rows of the stream may go on while the unit waits for its password.
-        let still_asks = match question {
-            Some((prompt, _)) => prompt == Prompt::Password,
+        let still_asks = match before_row {
+            Some((prompt, _)) => prompt == Some(Prompt::Password),
             None => self.password.is_asked() && self.vocabulary.is_row(&text.text),
         };
         if !still_asks {
             self.password.question_over();
         }
-        if !self.recognises {
+        if !recognises {
             return;
         }
         if self.prompt.was(&text) {
             return;
         }
-        if let Some((prompt, at)) = question {
-            if prompt == Prompt::Password {
+        if let Some((prompt, at)) = before_row {
+            if prompt == Some(Prompt::Password) {
                 self.password.question();
             }
             let row = Text { text: text.text.split_off(at), ..text.clone() };
             if !self.prompt.was(&text) {
-                self.heard(text, Message::Prompt(prompt));
+                let message = prompt.map_or_else(|| self.understand(&text.text), Message::Prompt);
+                self.heard(text, message);
             }
             text = row;
         }
@@ -173,12 +176,12 @@ impl Session {
         if !is_question(line) {
             return None;
         }
-        let is_password = self.vocabulary.asks_password(line, self.is_behind_load());
+        let is_password = self.vocabulary.asks_password(line, self.is_after_load());
         let prompt = if is_password { Some(Prompt::Password) } else { self.vocabulary.prompt(line) };
         prompt.filter(|&prompt| running.work.awaits(prompt))
     }
 
-    /// Looks at what the unit has fallen silent after, if it has for long enough.
+    /// Looks at the text after which the unit has fallen silent, if it has been silent for long enough.
     pub(super) fn look_if_due(&mut self) {
         if self.prompt.due.is_some_and(|due| due <= self.now) {
             self.look_at_prompt();
@@ -196,7 +199,7 @@ impl Session {
         let Some(mut text) = self.framer.pending() else { return };
         self.password.scrub(&mut text.text);
         self.prompt.seen = text.span.end;
-        let is_password = self.vocabulary.asks_password(&text.text, self.is_behind_load());
+        let is_password = self.vocabulary.asks_password(&text.text, self.is_after_load());
         let message = match self.vocabulary.prompt(&text.text) {
             _ if is_password => Message::Prompt(Prompt::Password),
             Some(prompt) => Message::Prompt(prompt),
@@ -208,13 +211,13 @@ impl Session {
         }
     }
 
-    /// L has been sent, and nothing has been answered since: a question that comes now is that for the password, or leads
-    /// to it.
-    fn is_behind_load(&self) -> bool {
+    /// L has been sent, and nothing has been answered since: a question that comes now is that for the password, or
+    /// leads to it.
+    fn is_after_load(&self) -> bool {
         self.keys.question() == Some(MenuKey::Load)
     }
 
-    /// After long enough without a sign of the stream, it has stopped.
+    /// Notes that the stream has stopped, once there has been no sign of it for long enough.
     pub(super) fn look_at_stream(&mut self) {
         if self.toggled.is_over(self.dated) {
             self.stream_stopped();
@@ -227,7 +230,7 @@ impl Session {
         }
     }
 
-    /// What a line means. A row without a number looks the same from either source: it is one of what was asked for.
+    /// What a line means. A row without a number looks the same from either source: it counts as the one asked for.
     fn understand(&self, line: &str) -> Message {
         match self.vocabulary.line(line) {
             Message::Row(row) => {
@@ -239,12 +242,11 @@ impl Session {
     }
 
     fn heard(&mut self, text: Text, message: Message) {
-        self.look_at_stream();
         if self.toggled.heard(self.dated, &message) {
             self.stream_stopped();
         }
         self.learn(&text, &message);
-        // A unit that starts has forgotten that it stopped us, and will never say "go on".
+        // A unit that starts has forgotten that it stopped us, and will never send the XON.
         let starts = matches!(
             message,
             Message::Software(_)
@@ -283,7 +285,7 @@ impl Session {
         self.counted = *message == Message::Text && !is_page && !self.dialogue.owns(self.dated, &text.text);
         let identifies = self.job() == Some(Job::Identify);
         let facts = &mut self.facts;
-        // While the unit is being identified, this is decided when the whole answer is in.
+        // While the unit is being identified, its state is decided once the whole answer has come.
         if facts.state == UnitState::Silent && !identifies {
             facts.state = UnitState::Unknown;
         }
@@ -302,18 +304,18 @@ impl Session {
                 facts.unrecognised_lines = facts.unrecognised_lines.saturating_sub(self.dialogue.menu());
             }
             Message::FirstStart => facts.state = UnitState::Application,
-            // "Press any key" and "restarting" an application may say as well.
+            // An application may print "press any key" and "restarting" as well.
             Message::Loader(LoaderText::Waiting) => facts.enter_loader(),
             Message::Loader(_) => {}
             Message::Software(name) => {
-                // Three numbers with points between them are not enough to make a unit of whatever talks there.
+                // Three numbers with points between them do not show that what talks is a unit.
                 if name.product.is_some() || name.confidence > Confidence::Bare {
                     facts.state = UnitState::Application;
                 }
                 if name.product.is_some() {
                     self.dialogue.named();
                 }
-                // An object of the view may be called like the product; a banner has its version as well.
+                // An object in the view may have the product's name; a banner has the version as well.
                 if name.product.is_some() && name.version.is_some() && !asked && facts.stream.is_some() {
                     self.toggled.restarted(self.dated);
                 }
@@ -340,7 +342,7 @@ impl Session {
         if matches!(message, Message::Prompt(Prompt::WaitingForFile)) {
             facts.enter_loader();
         }
-        // One that names itself and wants a key is a loader.
+        // What prints a loader's header and then wants a key is a loader.
         let headed = self.loader_headed_at.is_some_and(|at| self.dated <= at + LOADER_HEADER);
         let wants_key = matches!(message, Message::Loader(LoaderText::AnyKey) | Message::Prompt(Prompt::AnyKey));
         if headed && wants_key {

@@ -2,7 +2,8 @@
 //!
 //! The question is `m`, which a unit may be asked at any time (AXTC4CO manual, section 4.1). It may be in a dialogue
 //! that swallows the key, so the question is repeated in other forms: Enter leaves every prompt, `x` the view of the
-//! object dictionary (section 4.1.1). A loader that waits for a file calls the key an error, and so shows itself.
+//! object dictionary (section 4.1.1). A loader that waits for a file reports the key as an error, and so reveals
+//! itself.
 
 use super::event::{Event, Outcome, UnitState};
 use super::job::{Desk, Signal, Work};
@@ -15,10 +16,10 @@ const ANSWER: Duration = Duration::from_millis(800);
 const QUIET: Duration = Duration::from_millis(150);
 /// How long an answer may go on: the stream may continue after the menu.
 const LONGEST_ANSWER: Duration = Duration::from_millis(1500);
-/// How long a unit may have stopped us before it is asked all the same: no page takes that long to write, so its XON has
-/// been lost, or it has lost its power since.
+/// How long a unit may have been holding us before it is asked regardless: no page takes that long to write, so its XON
+/// has been lost, or it has lost its power since.
 const STALE_HOLD: Duration = Duration::from_secs(4);
-/// Entries that make a menu of lines that look like entries.
+/// From this many different entries on, lines that look like entries of the menu are the menu.
 const MENU_ENTRIES: u32 = 3;
 
 /// The ways to ask. Xon first: if an earlier program left the unit stopped, it could not answer.
@@ -58,7 +59,7 @@ impl Identify {
                 self.software = true;
                 self.named |= name.product.is_some();
             }
-            // What else a loader says an application may say as well: "press any key", "restarting".
+            // An application may print the other texts of a loader as well: "press any key", "restarting".
             Message::Loader(LoaderText::Waiting | LoaderText::Error(_)) | Message::Prompt(Prompt::WaitingForFile) => {
                 self.loader = true;
             }
@@ -73,7 +74,7 @@ impl Identify {
 
     fn conclude(&self, desk: &mut Desk<'_>) -> Option<Outcome> {
         if self.loader && desk.facts.state != UnitState::Application {
-            // It may have had nothing to say but its error.
+            // If the loader has only reported an error, the facts do not show this yet.
             desk.facts.enter_loader();
         } else if !self.is_answered() && desk.facts.state != UnitState::Application {
             let alive = self.alive || desk.pending.is_some();
@@ -87,7 +88,7 @@ impl Work for Identify {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
             Signal::Begin => {
-                // Noise contains an XOFF sooner or later, and no unit follows it with an XON.
+                // Noise contains an XOFF sooner or later, and no XON follows it.
                 if desk.facts.state == UnitState::Unknown && desk.transmitter.held_since().is_some() {
                     desk.transmitter.hold(desk.now, false);
                     desk.events.push_back(Event::Held(false));
@@ -105,7 +106,8 @@ impl Work for Identify {
             }
             Signal::Hold(_) | Signal::Typed(_) | Signal::Over => None,
             Signal::Tick if self.deadline.is_some_and(|deadline| deadline <= desk.now) => {
-                // Not every menu names its unit; but a line may have been lost on its way, so that is asked once more.
+                // Not every menu names its unit. But the line that does may have been lost, so the unit is asked once
+                // more.
                 let is_nameless = self.asked == 1 && !self.loader && !self.named;
                 if self.is_answered() && !is_nameless || self.asked == QUESTIONS.len() {
                     return self.conclude(desk);

@@ -19,38 +19,39 @@ pub(super) enum Signal<'a> {
     Heard(&'a Text, &'a Message),
     /// The unit has stopped us (`true`) or lets us go on; the transmitter knows already.
     Hold(bool),
-    /// Its deadline has come, or it is looked after early.
+    /// Its deadline has come, or time has passed before that.
     Tick,
-    /// The user has had enough.
+    /// The user cancels the job.
     Cancel,
     /// The port is gone: nothing can be sent or heard any more.
     LinkLost,
-    /// In a recording: this was sent then.
+    /// In a recording: this was sent.
     Typed(&'a Typed),
     /// In a recording: it has ended.
     Over,
 }
 
-/// What a job can do.
+/// What a job can see and do.
 pub(super) struct Desk<'a> {
     pub(super) now: Instant,
     pub(super) transmitter: &'a mut Transmitter,
     pub(super) facts: &'a mut Facts,
     pub(super) events: &'a mut VecDeque<Event>,
-    /// Words without a line end, the last thing the unit has printed: perhaps a question. `None` for signs alone, like the
-    /// `>` of a command line.
+    /// Words without a line end, the last thing the unit has printed: perhaps a question. `None` for signs alone, like
+    /// the `>` of a command line.
     pub(super) pending: Option<&'a Text>,
-    /// Set when what the unit prints from now on is an answer, and not part of a line it has fallen silent in.
+    /// To be set if what the unit prints from now on is an answer, and not the rest of the line in which it fell
+    /// silent.
     pub(super) cut: bool,
-    /// Set when the job has read something from what it was told, and no recogniser had.
+    /// To be set if the job has understood a line that no recogniser did.
     pub(super) understood: bool,
-    /// The line it has been given has been counted as not understood.
+    /// The line that the job is given has been counted as not understood.
     pub(super) counted: bool,
     /// Bytes received so far: text that begins here or later is newer than this moment.
     pub(super) received: u64,
-    /// Is told when secret bytes have been queued.
+    /// Has to be told when secret bytes have been queued.
     pub(super) password: &'a mut PasswordGuard,
-    /// What a job puts here goes out as if it were typed: a password among it is known by where it is asked for.
+    /// What a job puts here goes out as if it were typed: a password in it is recognised by the question it answers.
     pub(super) typed: Vec<u8>,
 }
 
@@ -58,7 +59,7 @@ impl Desk<'_> {
     /// Sends keys.
     pub(super) fn send(&mut self, keys: &[u8]) {
         self.cut = true;
-        // Only a unit that holds us lets this queue fill, and jobs send a few bytes between two deadlines.
+        // There is room: the queue fills only while the unit holds us, and jobs send a few bytes between two deadlines.
         self.transmitter.push_text(keys, Secrecy::Open, Sender::Job);
     }
 
@@ -78,14 +79,14 @@ impl Desk<'_> {
 
 /// A job.
 pub(super) trait Work {
-    /// Takes a signal; gives the outcome when it is over.
+    /// Takes a signal; returns the outcome once the job is over.
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome>;
 
-    /// When it wants to be looked after.
+    /// When the job wants its next [`Signal::Tick`].
     fn deadline(&self) -> Option<Instant>;
 
-    /// Whether this is the question it waits for now. Where a unit ends it as a line and falls silent, only that tells it
-    /// from a text about the same.
+    /// Whether the job waits for this question now. If a unit ends a question as a line and falls silent, only this
+    /// distinguishes it from a text on the same subject.
     fn awaits(&self, _: Prompt) -> bool {
         false
     }

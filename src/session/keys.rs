@@ -1,9 +1,9 @@
 //! What is sent to a unit, as its keys: the letters its menu takes, in either case and without Enter (AXTC4CO manual,
-//! section 4.1), told from those of an answer or of a file.
+//! section 4.1), as opposed to those of an answer or of a file.
 
 use crate::wire::MenuKey;
 
-/// Bytes of a piece that a user may have typed: anything longer is a record of a file, and its letters are not keys.
+/// Most bytes of a piece that a user may have typed: a longer one is a record of a file, and its letters are not keys.
 pub(super) const LONGEST_TYPED: usize = 16;
 
 const ESCAPE: u8 = 0x1B;
@@ -51,7 +51,7 @@ pub(super) struct Stroke<'a> {
     pub(super) keys: &'a [u8],
     /// The Enter after them, or nothing. It is never secret.
     pub(super) enter: &'a [u8],
-    /// The last of the keys is an L of the menu, and what follows may be the password.
+    /// Set if the last of the keys is an L of the menu: what follows may be the password.
     pub(super) opens: Option<MenuKey>,
 }
 
@@ -80,7 +80,7 @@ enum Place {
     Open,
     /// After characters that are not keys, so an `l` is part of a word.
     Word,
-    /// Within what one key sends that has no character: Escape, `[` or `O`, parameters, and a letter or `~`.
+    /// Within the sequence that a key without a character sends: Escape, `[` or `O`, parameters, and a letter or `~`.
     Escape,
 }
 
@@ -99,7 +99,7 @@ impl KeyReader {
         self.place = Place::Open;
     }
 
-    /// Reads what has been typed, and gives it in parts: Enter ends one, and so does an L of the menu.
+    /// Reads what has been typed, and returns it in parts: Enter ends one, and so does an L of the menu.
     pub(super) fn strokes<'a>(&mut self, typed: &'a [u8], by: TypedBy) -> Vec<Stroke<'a>> {
         if by == TypedBy::Hand {
             self.begin();
@@ -154,7 +154,7 @@ impl KeyReader {
         key
     }
 
-    /// The unit has shown its menu, or has restarted: no question is open any more, whatever would have ended it.
+    /// The unit has shown its menu, or has restarted: no question is open any more, even if no Enter has ended it.
     pub(super) fn question_over(&mut self) {
         self.question = None;
     }
@@ -232,6 +232,9 @@ mod tests {
     fn letters_of_a_file_are_no_keys_and_open_no_question() {
         let mut reader = KeyReader::default();
         assert_eq!(reader.read(b"S30D00000000DEADBEEF"), Typed::File);
+        assert_eq!(reader.read(&[b'l'; LONGEST_TYPED + 1]), Typed::File);
+        assert_eq!(reader.question(), None);
+        assert_eq!(reader.read(&[b'1'; LONGEST_TYPED]), Typed::Keys(vec![Key::Other; LONGEST_TYPED]));
         assert_eq!(reader.read(b"s"), Typed::Keys(vec![DIAGNOSTICS]));
     }
 }

@@ -1,7 +1,7 @@
 //! Leaving a question that a job does not answer.
 //!
-//! A unit may take the key that leaves a question for an answer, and ask the next one. So the line is watched for a while,
-//! and whatever is asked meanwhile is left as well.
+//! A unit may take the key that leaves a question for an answer, and ask the next one. So the line is watched for a
+//! while, and whatever is asked meanwhile is left as well.
 
 use super::event::Outcome;
 use super::job::{Desk, Signal};
@@ -13,7 +13,7 @@ pub(super) const ENTER: &[u8] = b"\r";
 /// Questions that are left, one after the other, before a unit that goes on asking is given up.
 const MOST: u32 = 3;
 
-/// Questions on their way out, and how the job ends once none is open.
+/// Leaves open questions, and keeps how the job ends once none is open.
 #[derive(Debug)]
 pub(super) struct Leaving {
     /// What leaves a question.
@@ -46,11 +46,12 @@ impl Leaving {
         self.due = desk.now + self.wait;
     }
 
-    /// Takes a signal; gives the outcome when no question is open any more. `cancelled` is what the job ends as when the
-    /// user has had enough, or the link is gone.
+    /// Takes a signal; returns the outcome once no question is open any more. `cancelled` is the outcome if the user
+    /// cancels or the link is lost.
     pub(super) fn handle(&mut self, signal: Signal<'_>, cancelled: Outcome, desk: &mut Desk<'_>) -> Option<Outcome> {
         match signal {
-            // A row of the stream, or a page, may end the line of a question that is still open.
+            // Other messages change nothing: a row of the stream, or a page, may end the line of a question that is
+            // open.
             Signal::Heard(_, message) => self.is_asked |= matches!(message, Message::Prompt(_)),
             Signal::Tick if self.due <= desk.now => return self.time_is_up(desk),
             Signal::Cancel => self.then = cancelled,
@@ -60,7 +61,7 @@ impl Leaving {
         None
     }
 
-    /// The job ends otherwise than it was going to.
+    /// Changes how the job ends.
     pub(super) fn end_as(&mut self, then: Outcome) {
         self.then = then;
     }
@@ -70,12 +71,12 @@ impl Leaving {
         self.then.clone()
     }
 
-    /// When it wants to be looked after.
+    /// When the next [`Signal::Tick`] is wanted.
     pub(super) fn due(&self) -> Instant {
         self.due
     }
 
-    /// The unit has had its time. Leaves the next question if there is one; otherwise the job is over.
+    /// The wait is over: leaves the next question if there is one, otherwise ends the job.
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         if (self.is_asked || desk.pending.is_some()) && self.left < MOST {
             self.leave(desk);

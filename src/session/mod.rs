@@ -1,8 +1,8 @@
 //! Our end of the cable: commands in, bytes and events out.
 //!
-//! A session appends every byte to the record first, then splits them into lines, recognises what it can, folds that into
-//! [`Facts`], and drives at most one job: a dialogue with the unit that ends in an [`Outcome`]. It knows the unit only
-//! through bytes. Whatever a job does, lines and rows are reported as events too.
+//! A session appends every byte to the record first, then splits them into lines, recognises what it can, folds that
+//! into [`Facts`], and drives at most one job: a dialogue with the unit that ends in an [`Outcome`]. It knows the unit
+//! only through bytes. Whatever a job does, lines and rows are reported as events too.
 
 mod console;
 mod diagnostics;
@@ -53,7 +53,7 @@ use watching::Saw;
 /// A conversation with one unit.
 pub struct Session {
     now: Instant,
-    /// The moment that what is heard is dated at: before `now` for bytes that had to wait for us.
+    /// The time at which what is heard is dated: before `now` for bytes that had to wait for us.
     dated: Instant,
     record: Record,
     framer: Framer,
@@ -61,25 +61,22 @@ pub struct Session {
     transmitter: Transmitter,
     facts: Facts,
     running: Option<Running>,
-    /// The job that begins when it is known who is there.
+    /// The job that begins once the unit has been identified.
     queued: Option<Running>,
     events: VecDeque<Event>,
     prompt: PromptWatch,
-    /// What is secret of all that is typed and received.
+    /// Decides what is secret of all that is typed and received.
     password: PasswordGuard,
-    /// It listens to a recording: nothing is ever sent.
-    passive: bool,
-    /// Lines are looked at for what they mean.
-    recognises: bool,
+    mode: Mode,
     /// When the menu was asked for last.
     menu_asked_at: Option<Instant>,
-    /// What is typed, read as soon as it is: it may have to wait before it leaves.
+    /// Reads keys as they are typed: they may have to wait before they leave.
     typing: KeyReader,
-    /// What leaves, typed or sent by a job.
+    /// Reads keys as they leave, typed or sent by a job.
     keys: KeyReader,
     /// Which lines answer a key.
     dialogue: Dialogue,
-    /// A loader has printed who it is, and nothing but text since.
+    /// When a loader printed its header, if nothing but unknown text has come since.
     loader_headed_at: Option<Instant>,
     /// Whether the stream is still on.
     toggled: Toggled,
@@ -87,11 +84,22 @@ pub struct Session {
     pages: Pages,
     /// The current line was counted as not understood.
     counted: bool,
-    /// What the stream was asked to send, or was last seen to.
+    /// What the stream was asked to send, or was last seen to send.
     source: Option<Source>,
 }
 
-/// The job that runs, and which it is.
+/// What a session is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    /// A unit: lines are looked at for what they mean, and jobs talk to it.
+    Live,
+    /// A unit on a plain terminal: lines are not looked at.
+    Plain,
+    /// A recording: lines are looked at, and nothing is ever sent.
+    Recording,
+}
+
+/// A job, and which it is.
 struct Running {
     job: Job,
     work: Box<dyn Work + Send>,
@@ -103,7 +111,7 @@ struct Running {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Turn {
     Now,
-    /// When it is known who is there.
+    /// Once the unit has been identified.
     Next,
 }
 
@@ -130,8 +138,7 @@ impl Session {
             events: VecDeque::new(),
             prompt: PromptWatch::default(),
             password: PasswordGuard::default(),
-            passive: false,
-            recognises: true,
+            mode: Mode::Live,
             menu_asked_at: None,
             typing: KeyReader::default(),
             keys: KeyReader::default(),
@@ -144,22 +151,22 @@ impl Session {
         }
     }
 
-    /// A conversation in which nothing is recognised but flow control and prompts, for a terminal that must keep up with
-    /// any flood: facts and rows stay unknown, and no job has a chance.
+    /// A conversation in which nothing is recognised but flow control and prompts, for a terminal that must keep up
+    /// with any flood: facts and rows stay unknown, and no job can work.
     ///
     /// # Panics
     /// If `baud` is 0.
     pub fn plain(baud: u32) -> Self {
-        Session { recognises: false, ..Session::new(baud) }
+        Session { mode: Mode::Plain, ..Session::new(baud) }
     }
 
-    /// A conversation from a recording: it is fed what both ends said ([`Session::handle_sent`]) and sends nothing; jobs
-    /// read what they can from what they hear, until [`Session::recording_over`].
+    /// A conversation from a recording: it is fed what both ends said ([`Session::handle_sent`]) and sends nothing;
+    /// jobs read what they can from what they hear, until [`Session::recording_over`].
     ///
     /// # Panics
     /// If `baud` is 0.
     pub fn of_recording(baud: u32) -> Self {
-        Session { passive: true, ..Session::new(baud) }
+        Session { mode: Mode::Recording, ..Session::new(baud) }
     }
 
     /// Takes a command, or says why not.
@@ -176,18 +183,19 @@ impl Session {
             Command::Load(order) => order.password.clone(),
             _ => None,
         };
+        let is_recording = self.mode == Mode::Recording;
         let (job, work): (Job, Box<dyn Work + Send>) = match command {
             Command::Cancel => {
                 self.cancel();
                 return Ok(());
             }
-            Command::ReadDictionary if self.passive => (Job::ReadDictionary, Box::<overheard::Dictionary>::default()),
-            Command::Diagnostics { pages } if self.passive => {
+            Command::ReadDictionary if is_recording => (Job::ReadDictionary, Box::<overheard::Dictionary>::default()),
+            Command::Diagnostics { pages } if is_recording => {
                 (Job::Diagnostics, Box::new(overheard::Diagnostics::new(pages)))
             }
-            Command::Overhear if self.passive => (Job::Overhear, Box::new(overheard::Everything::new())),
+            Command::Overhear if is_recording => (Job::Overhear, Box::new(overheard::Everything::new())),
             Command::Overhear => return Err(Refusal::Live),
-            _ if self.passive => return Err(Refusal::ReadOnly),
+            _ if is_recording => return Err(Refusal::ReadOnly),
             Command::Keys(keys) => return self.keys(&keys),
             Command::SendFile(bytes) => {
                 self.may_send_file()?;
@@ -231,7 +239,8 @@ impl Session {
         let question = self.typing.question().filter(|_| job != Job::SendFile);
         match (&self.running, question) {
             (None, None) => Ok(Turn::Now),
-            // Asking who is there takes a moment and changes nothing: a user who is quicker waits for it unawares.
+            // Identifying the unit takes a moment and changes nothing, so the next job waits for it instead of being
+            // refused.
             (Some(Running { job: Job::Identify, .. }), None) if self.queued.is_none() && job != Job::Identify => {
                 Ok(Turn::Next)
             }
@@ -255,27 +264,26 @@ impl Session {
         self.signal(Signal::Cancel);
     }
 
-    /// The key, D or L, that was typed by hand and whose question has not been answered yet: what is sent next belongs to
-    /// the answer.
+    /// The key, D or L, that was typed by hand and whose question has not been answered yet: what is sent next belongs
+    /// to the answer.
     pub fn open_question(&self) -> Option<MenuKey> {
         self.typing.question().filter(|_| self.running.is_none())
     }
 
-    /// The port is gone: the running job ends with what that means, and nothing more is sent.
+    /// The port is gone: ends the running job, and sends nothing more.
     pub fn link_lost(&mut self, now: Instant) {
         self.now = self.now.max(now);
         self.transmitter.clear();
         self.signal(Signal::LinkLost);
-        self.watch(Saw::LinkLost);
+        self.forget_pages();
         self.toggled = Toggled::default();
         self.transmitter.clear();
         self.cut_line();
     }
 
-    /// The port is back, the unit behind it perhaps in another state: it does not stop us until it says so, and a password
-    /// that it was waiting for it may still be waiting for.
+    /// The port is back, and the unit may be in another state. It does not hold us until it sends XOFF again. If it was
+    /// asking for its password, it may still be.
     pub fn link_back(&mut self, now: Instant) {
-        self.now = self.now.max(now);
         self.transmitter.hold(now, false);
         self.password.cut_off();
         self.question_over();
@@ -283,14 +291,14 @@ impl Session {
         self.cut_line();
     }
 
-    /// Forgets who is there: what was known may be about another unit.
+    /// Forgets what is known of the unit: another one may be connected.
     pub fn forget_unit(&mut self) {
         self.facts = Facts { unrecognised_lines: self.facts.unrecognised_lines, ..Facts::default() };
         self.source = None;
         self.events.push_back(Event::FactsChanged);
     }
 
-    /// In a recording: these bytes were sent then.
+    /// In a recording: these bytes were sent.
     pub fn handle_sent(&mut self, now: Instant, bytes: &[u8]) {
         self.pass_to(now);
         self.record.push(self.now, Direction::ToUnit, Secrecy::Open, bytes);
@@ -298,12 +306,12 @@ impl Session {
         self.signal(Signal::Typed(&typed));
     }
 
-    /// In a recording: a remark. The recorder notes there that the link was lost, and that it was back.
+    /// In a recording: a remark, by which the recorder notes that the link was lost, or was back.
     pub fn handle_mark(&mut self, now: Instant, text: &str) {
         self.pass_to(now);
         if text == LINK_LOST {
             self.link_lost(now);
-            // Rows will show whether it still streams, once the link is back.
+            // Once the link is back, rows show whether the unit still streams.
             self.stream_stopped();
         } else if text.starts_with(LINK_BACK) {
             self.link_back(now);
@@ -313,16 +321,14 @@ impl Session {
     /// In a recording: it has ended. The running job ends with what it has heard.
     pub fn recording_over(&mut self, now: Instant) {
         self.pass_to(now);
-        self.hand_out_echo();
         self.look_at_prompt();
-        self.look_at_stream();
         if self.facts.state == UnitState::Silent && self.record.received() > 0 {
             self.facts.state = UnitState::Unknown;
         }
         self.signal(Signal::Over);
     }
 
-    /// The next piece of news.
+    /// The next event.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.events.pop_front()
     }
@@ -362,21 +368,23 @@ impl Session {
     /// # Errors
     /// While the unit asks for its password, or holds what waits already.
     pub fn may_send_file(&self) -> Result<(), Refusal> {
-        match () {
-            () if self.password_open() => Err(Refusal::PasswordOpen),
-            () if self.held_since().is_some() && self.waiting() > 0 => Err(Refusal::Held),
-            () => Ok(()),
+        if self.password_open() {
+            return Err(Refusal::PasswordOpen);
         }
+        if self.held_since().is_some() && self.waiting() > 0 {
+            return Err(Refusal::Held);
+        }
+        Ok(())
     }
 
     fn keys(&mut self, keys: &[u8]) -> Result<(), Refusal> {
-        // A job that waits for the identification to end would send its keys after these, and into what they open.
+        // A queued job would send its keys after these, and into a question that these may open.
         let busy = self.running.as_ref().filter(|running| running.job != Job::Identify).or(self.queued.as_ref());
         if let Some(busy) = busy {
             return Err(Refusal::Busy(busy.job));
         }
         self.type_in(keys, TypedBy::Hand)?;
-        // The next question who is there begins with Enter, which would be the answer.
+        // The next attempt to identify the unit begins with Enter, which would be the answer to the question.
         if self.typing.question().is_some() && self.job() == Some(Job::Identify) {
             self.signal(Signal::Cancel);
         }
@@ -398,8 +406,8 @@ impl Session {
         Ok(())
     }
 
-    /// Takes the first part of a backlog; the rest follows, before anything that is due, through
-    /// [`handle_backlog`](Endpoint::handle_backlog). So a key does not have to wait for a whole flood.
+    /// Takes the first part of a backlog, so that a key does not have to wait for a whole flood. The rest has to follow
+    /// through [`handle_backlog`](Endpoint::handle_backlog) before any timer is handled.
     pub fn begin_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
         self.now = self.now.max(now);
         for piece in backlog {
@@ -408,13 +416,13 @@ impl Session {
         }
     }
 
-    /// The time is `now`, also for what has been heard.
+    /// Sets the time to `now`, also for dating what is heard.
     fn pass_to(&mut self, now: Instant) {
         self.now = self.now.max(now);
         self.dated = self.now;
     }
 
-    /// What is printed soon may answer what has been sent: the menu that was asked for is not a banner.
+    /// Notes what has been sent, since what is printed soon may answer it: a menu that was asked for is not a banner.
     fn note_typed(&mut self, sent: &[u8]) -> Typed {
         if sent.len() <= LONGEST_TYPED {
             self.look_if_due();
@@ -478,7 +486,7 @@ impl Session {
         match outcome {
             Some(outcome) => {
                 self.transmitter.withdraw_job(running.first_piece, last_words);
-                // A job leaves its own questions. During one the user may have typed, and a file is what he types.
+                // Other jobs leave the questions they open. During these two, what has been sent may be the user's.
                 if !matches!(running.job, Job::Identify | Job::SendFile) {
                     self.keys.question_over();
                 }
@@ -496,14 +504,20 @@ impl Session {
         }
     }
 
+    /// Time has passed for those who listen for pages, and for the running job.
+    fn look_after(&mut self) {
+        self.watch(Saw::Tick);
+        self.signal(Signal::Tick);
+    }
+
     /// No question is open any more, typed or from a job.
     fn question_over(&mut self) {
         self.typing.question_over();
         self.keys.question_over();
     }
 
-    /// Something is sent: what the unit prints from now on is an answer, and not part of the text it has fallen silent
-    /// after. A line in the middle of which it is goes on.
+    /// Something is sent: what the unit prints from now on is an answer, and not the rest of the text after which it
+    /// fell silent. A line that the unit is still printing goes on.
     fn cut_answered(&mut self) {
         if self.framer.pending().is_none_or(|text| self.prompt.has_seen(&text)) {
             self.cut_line();
@@ -521,14 +535,12 @@ impl Endpoint for Session {
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         self.pass_to(now);
         self.append(bytes);
-        self.watch(Saw::Tick);
-        self.signal(Signal::Tick);
+        self.look_after();
     }
 
     fn handle_backlog(&mut self, now: Instant, backlog: &[Arrived]) {
         self.begin_backlog(now, backlog);
-        self.watch(Saw::Tick);
-        self.signal(Signal::Tick);
+        self.look_after();
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -538,12 +550,11 @@ impl Endpoint for Session {
         }
         self.look_if_due();
         self.look_at_stream();
-        self.watch(Saw::Tick);
-        self.signal(Signal::Tick);
+        self.look_after();
     }
 
     fn poll_transmit(&mut self) -> Option<Transmit> {
-        if self.passive {
+        if self.mode == Mode::Recording {
             return None;
         }
         let transmit = self.transmitter.poll(self.now)?;

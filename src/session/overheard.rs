@@ -1,4 +1,4 @@
-//! Jobs on a recording: nobody can be asked, so they listen to what was said, and end when the recording does.
+//! Jobs on a recording: there is no unit to ask, so they listen to what was said, and end when the recording does.
 
 use super::diagnostics::Page;
 use super::dictionary::Collector;
@@ -12,7 +12,7 @@ use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::{LoaderText, MenuKey, Message};
 
-/// How soon after a walk has left the view another one begins to read what was lost on the line.
+/// How soon after a walk has left the view another one begins, if it is to read what was lost on the line.
 const ANOTHER_WALK: Duration = Duration::from_secs(2);
 
 /// Reads the entries of the object dictionary that somebody walked through.
@@ -33,7 +33,8 @@ pub(super) struct Dictionary {
 }
 
 impl Dictionary {
-    /// Ends the walk where it is: no entry that comes later belongs to it. Gives what was read of it.
+    /// Ends the walk where it is: no entry that comes later belongs to it. Returns what was read, and when its last
+    /// entry came.
     fn break_off(&mut self) -> Option<(Instant, DictionaryReading)> {
         self.viewing = self.viewing.map(|_| false);
         if self.collector.count() == 0 {
@@ -51,8 +52,8 @@ impl Dictionary {
         self.collector.has_all() || (self.left.is_some() && self.collector.product.is_none())
     }
 
-    /// The same where the outcome has to wait for the end of the recording. A walk that had everything counts for more than
-    /// part of a later one.
+    /// Ends the walk where it is, and keeps what was read until the recording ends. A complete walk is not replaced by
+    /// an incomplete later one.
     fn keep(&mut self) {
         if let Some(ended) = self.break_off() {
             let is_better =
@@ -74,7 +75,7 @@ impl Dictionary {
         }
     }
 
-    /// When it is too late for a second walk for the lines that were lost: that one begins at once.
+    /// When it is too late for a second walk that reads what was lost on the line: such a walk begins at once.
     fn due(&self) -> Option<Instant> {
         self.left.map(|left| left + ANOTHER_WALK)
     }
@@ -264,8 +265,8 @@ mod tests {
     use crate::endpoint::Endpoint;
     use crate::session::{Command, Session};
 
-    /// What a recording has to tell: what was sent (`>`), remarks (`!`) and what came, each with the milliseconds since the
-    /// one before.
+    /// A recording: what was sent (`>`), remarks (`!`) and what came, each with the milliseconds since the entry
+    /// before.
     type Story<'a> = &'a [(u64, &'a str)];
 
     fn played(story: Story<'_>, command: Command) -> (Vec<Event>, Session) {
@@ -293,8 +294,8 @@ mod tests {
         format!("{}{}", entries.join(" "), if reading.is_complete() { "" } else { " ..." })
     }
 
-    /// The walks through the dictionary as the job that listens to everything reports them: when the last entry came, which
-    /// ones, and whether that is all; and the reading that the job for the dictionary gives.
+    /// The walks through the dictionary as the job that listens to everything reports them: when the last entry came,
+    /// which ones, and whether that is all; and the reading that the job for the dictionary gives.
     fn readings(story: Story<'_>) -> (Vec<(u64, String)>, Option<String>) {
         let (events, _) = played(story, Command::Overhear);
         let overheard = events.iter().filter_map(|event| match event {
@@ -346,6 +347,13 @@ mod tests {
     }
 
     #[test]
+    fn an_entry_after_the_menu_shows_that_the_walk_goes_on() {
+        let story = [(0, FIRST), (50, MENU), (500, SECOND)];
+        let expected = (vec![(550, "6126:01 6126:02 ...".into())], Some("6126:01 6126:02 ...".into()));
+        assert_eq!(readings(&story), expected);
+    }
+
+    #[test]
     fn an_entry_with_the_products_name_is_not_a_banner() {
         let story = [
             (0, ">v"),
@@ -388,10 +396,25 @@ mod tests {
             panic!("{events:?}")
         };
         assert_eq!(heard.map(Span::len), Some(14));
+        let heading = [(0, BANNER), (50, ">v"), (50, "6126h Thermocouple Scaling Factor\r\n")];
+        let (events, _) = played(&heading, Command::ReadDictionary);
+        let Some(Event::Finished(Outcome::NoAnswer { awaited: Awaited::Entry, heard, .. })) = events.last() else {
+            panic!("{events:?}")
+        };
+        assert_eq!(heard.map(Span::len), Some(33));
         let (_, session) = played(
             &[(0, "Supply 24.1 V\r\n"), (1_000, "Supply 24.1 V\r\n"), (900, "!link lost")],
             Command::Diagnostics { pages: None },
         );
         assert_eq!(session.facts().diagnostics, None);
+    }
+
+    #[test]
+    fn no_more_pages_are_given_than_were_asked_for() {
+        let page = "Supply 24.1 V\r\n";
+        // The first is known to be one by the second.
+        let (events, _) = played(&[(0, page), (1_000, page), (900, "")], Command::Diagnostics { pages: Some(1) });
+        assert_eq!(events.iter().filter(|event| matches!(event, Event::Page { .. })).count(), 1, "{events:?}");
+        assert_eq!(events.last(), Some(&Event::Finished(Outcome::Done(Job::Diagnostics))));
     }
 }

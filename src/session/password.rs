@@ -1,15 +1,16 @@
 //! Keeps the password to the line: decides which bytes are secret, of those that are typed and of those that come.
 //!
-//! It knows the password from three sides, and none of them needs the others:
-//! - *The question.* As long as the unit asks for the password, what is typed is secret. The session hears the question
-//!   and its end; rows of the stream that go on meanwhile do not end it.
+//! It recognises the password in three ways, none of which needs the others:
+//! - *The question.* As long as the unit asks for the password, what is typed is secret. The session reports the
+//!   question and its end; rows of the stream that go on meanwhile do not end it.
 //! - *The keys.* After an L of the menu what follows up to Enter may be the password, even if the unit asks for it in
 //!   unknown words; and a password that has been begun goes on up to its Enter, whatever becomes of the question.
-//! - *The answers.* After a secret that was typed or sent comes its echo, up to the end of the line: the [`Echo`] tells
-//!   it from what the unit says itself. Wherever else the unit repeats it, the [`Redactor`] finds it.
+//! - *The answers.* After a secret that was typed or sent comes its echo, up to the end of the line: the [`Echo`]
+//!   distinguishes it from what the unit says itself. Wherever else the unit repeats it, the [`Redactor`] finds it.
 //!
-//! What holds whatever happens:
-//! - What has been called secret is never called open later, and nothing that is typed or received is lost by being secret.
+//! What always holds:
+//! - What has been called secret is never called open later, and nothing that is typed or received is lost by being
+//!   secret.
 //! - A limit makes more secret, never less: what is typed beyond [`LONGEST`] is as secret as what is before it.
 //! - It has no `Debug`, so that nothing that holds it can be printed with the password in it.
 
@@ -43,8 +44,8 @@ enum Asked {
     #[default]
     No,
     Yes,
-    /// It did, or a password was being typed, when the link was lost. A replugged adapter resets no unit, so it may still
-    /// be asking: until Enter, or until it says something else.
+    /// The unit was asking, or a password was being typed, when the link was lost. A replugged adapter does not reset
+    /// the unit, so it may still be asking, until Enter is typed or the unit says something else.
     Perhaps,
 }
 
@@ -57,7 +58,7 @@ enum Typed {
     /// What may be a password: it goes on up to Enter.
     Secret(TypedSecret),
     /// Nothing after an L and its Enter. The Enter may have come before the question, as from a script that sends
-    /// everything at once: the next line may be the password still.
+    /// everything at once: the next line may still be the password.
     Nothing,
 }
 
@@ -77,7 +78,7 @@ impl PasswordGuard {
         self.asked = Asked::Yes;
     }
 
-    /// It has gone on to something else.
+    /// The unit has gone on to something else.
     pub(super) fn question_over(&mut self) {
         let is_answered_perhaps = self.asked == Asked::Perhaps && matches!(self.typed, Typed::Secret(_));
         if !is_answered_perhaps {
@@ -85,7 +86,8 @@ impl PasswordGuard {
         }
     }
 
-    /// It shows its menu, or has started: it cannot be asking any more. What was typed in doubt were keys.
+    /// The unit shows its menu, or has started: it cannot be asking any more. What was typed while that was unknown
+    /// were keys of the menu.
     pub(super) fn at_menu(&mut self) {
         if self.asked != Asked::Perhaps {
             return;
@@ -99,18 +101,18 @@ impl PasswordGuard {
         }
     }
 
-    /// Whether it asks, or may.
+    /// Whether the unit asks, or may be asking.
     pub(super) fn is_asked(&self) -> bool {
         self.asked != Asked::No
     }
 
-    /// Whether a password is in the air: the unit asks, or may be echoing one.
+    /// Whether the unit asks for a password, or may be echoing one.
     pub(super) fn is_open(&self) -> bool {
         self.is_asked() || self.echoes
     }
 
-    /// The link was lost. What had been typed of a password is not part of the next one, but the unit may still be asking
-    /// for it. What is looked for stays.
+    /// The link was lost. What had been typed of a password is not part of the next one, but the unit may still be
+    /// asking for it. The known password is still looked for.
     pub(super) fn cut_off(&mut self) {
         if self.is_asked() || matches!(self.typed, Typed::Secret(_)) {
             self.asked = Asked::Perhaps;
@@ -118,7 +120,7 @@ impl PasswordGuard {
         (self.echoes, self.typed) = (false, Typed::Open);
     }
 
-    /// What the next keys are, typed by hand or of a file that is sent as if typed.
+    /// Whether the next keys are secret, typed by hand or of a file that is sent as if typed.
     pub(super) fn secrecy_of(&self, stroke: &Stroke<'_>) -> Secrecy {
         let is_secret = match self.typed {
             _ if self.is_open() => true,
@@ -129,7 +131,7 @@ impl PasswordGuard {
         if is_secret { Secrecy::Secret } else { Secrecy::Open }
     }
 
-    /// These keys have been typed; what they are was [asked](PasswordGuard::secrecy_of) before.
+    /// These keys have been typed. [Ask](PasswordGuard::secrecy_of) before whether they are secret.
     pub(super) fn typed(&mut self, stroke: &Stroke<'_>) {
         let is_secret = self.secrecy_of(stroke) == Secrecy::Secret;
         let typed = match std::mem::take(&mut self.typed) {
@@ -180,8 +182,9 @@ impl PasswordGuard {
         self.echoes = true;
     }
 
-    /// Takes some of the bytes that have come and gives those whose nature is known, in their order. To be called until
-    /// none are left: each time what was given has been looked at first, since a job may answer to it with a secret.
+    /// Takes some of the bytes that have come. Returns those of which it is known whether they are secret, in their
+    /// order. To be called until none are left. What it returns has to be handled before the next call, since a job may
+    /// answer it with a secret.
     pub(super) fn take(&mut self, bytes: &mut &[u8]) -> Vec<Piece> {
         let is_line_end = |byte: &u8| matches!(byte, b'\r' | b'\n');
         if !self.echoes {
@@ -202,7 +205,7 @@ impl PasswordGuard {
         self.redact(pieces)
     }
 
-    /// What is not an echo may hold the password all the same, or another one.
+    /// Looks for the known password in what is not an echo. It need not be the one that is echoed.
     fn redact(&mut self, pieces: Vec<Piece>) -> Vec<Piece> {
         let mut redacted = Vec::new();
         for (bytes, secrecy) in pieces {
@@ -226,7 +229,7 @@ impl PasswordGuard {
         self.due
     }
 
-    /// Nothing has followed what looked like the beginning of the password for long enough.
+    /// Hands out what looked like the beginning of the password, since nothing has followed it for long enough.
     pub(super) fn hand_out(&mut self) -> Vec<Piece> {
         self.due = None;
         let pieces = self.echo.flush();
@@ -241,10 +244,10 @@ impl PasswordGuard {
     }
 }
 
-/// What has been typed of a password by hand, as the unit has it: with what was taken back taken back.
+/// What has been typed of a password by hand, as the unit has it: with backspaces applied.
 ///
-/// It keeps as much as is ever compared. Of the rest it only counts the keys, so that taking back works; they are as
-/// secret as the others, and leaning on a key at the question does not grow the memory.
+/// It keeps as much as is ever compared. Further keys are only counted, so that backspaces work; they are as secret as
+/// the others. So a key that is held down at the question does not use up memory.
 struct TypedSecret {
     kept: Zeroizing<Vec<u8>>,
     /// How many more have been typed.
@@ -253,7 +256,7 @@ struct TypedSecret {
 
 impl TypedSecret {
     fn new() -> Self {
-        // With its room from the beginning: a vector that grows leaves unwiped copies behind.
+        // Allocated in full size: a vector that grows leaves unwiped copies behind.
         TypedSecret { kept: Zeroizing::new(Vec::with_capacity(LONGEST)), beyond: 0 }
     }
 
@@ -296,7 +299,7 @@ mod tests {
         shown
     }
 
-    /// What is left of what comes, in one piece.
+    /// What comes out for what comes in one piece, with stars for what is secret.
     fn hear(guard: &mut PasswordGuard, said: &str) -> String {
         let mut bytes = said.as_bytes();
         let mut pieces = Vec::new();
@@ -374,6 +377,36 @@ mod tests {
     }
 
     #[test]
+    fn after_enter_what_the_unit_says_itself_is_no_echo_of_single_keys() {
+        let mut guard = PasswordGuard::default();
+        type_in(&mut guard, "lAXIO-2010\r");
+        assert_eq!(hear(&mut guard, "Access denied\r\n"), "Access denied\r\n");
+        // And nothing is an echo of the password before.
+        type_in(&mut guard, "lGeheim-2\r");
+        assert_eq!(hear(&mut guard, "AXTC4CO refuses\r\n"), "AXTC4CO refuses\r\n");
+    }
+
+    #[test]
+    fn keys_that_are_typed_before_the_echo_has_ended_do_not_bring_it_to_light() {
+        let masked = "A*X*I*O*-*2*0*1*0*\r\n";
+        let mut guard = PasswordGuard::default();
+        type_in(&mut guard, "lAXIO-2010\rm");
+        assert_eq!(hear(&mut guard, masked), "******************\r\n");
+        // A line that ends in the middle of the password does not either.
+        let mut guard = PasswordGuard::default();
+        type_in(&mut guard, "lAXI");
+        assert_eq!(hear(&mut guard, "\r\n"), "\r\n");
+        type_in(&mut guard, "O-2010\r");
+        assert_eq!(hear(&mut guard, masked), "******************\r\n");
+        // Even within an escape sequence.
+        let mut guard = PasswordGuard::default();
+        type_in(&mut guard, "lAX");
+        assert_eq!(hear(&mut guard, "AX\x1b[\r\n"), "**\x1b[\r\n");
+        type_in(&mut guard, "2010\r");
+        assert_eq!(hear(&mut guard, "2010\r\n"), "****\r\n");
+    }
+
+    #[test]
     fn what_was_kept_back_of_an_echo_when_the_link_was_lost_comes_first() {
         let mut guard = PasswordGuard::default();
         guard.sent(b"AXIO-2010");
@@ -439,7 +472,7 @@ mod tests {
             assert!(!guard.is_open(), "{typed:?}");
             assert_eq!(type_in(&mut guard, "m"), "m");
         }
-        // It says something else before anything is typed.
+        // The unit says something else before anything is typed.
         let mut guard = lost("");
         guard.question_over();
         assert_eq!(type_in(&mut guard, "ml"), "ml");
@@ -448,7 +481,7 @@ mod tests {
         assert_eq!(type_in(&mut guard, "AXIO"), "****");
         guard.question_over();
         assert_eq!(type_in(&mut guard, "-2010\r"), "*****/");
-        // Its menu shows that what was typed were keys.
+        // The unit's menu shows that what was typed were keys.
         let mut guard = lost("");
         assert_eq!(type_in(&mut guard, "m"), "*");
         guard.at_menu();

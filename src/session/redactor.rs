@@ -1,9 +1,9 @@
 //! Keeps the password out of the record wherever the unit repeats it.
 //!
 //! Its echo on the line where it was typed is found in whatever form it comes (`echo.rs`). This is for the rest: a unit
-//! that says `wrong password: ...` on the next line, in capitals or not. Bytes that may be the beginning of the password
-//! are kept back until the next ones tell, for a moment at most: they are handed out once the line falls silent, or
-//! when flow control comes among them, which cannot wait. The password is looked for across either, so no more of it than
+//! that says `wrong password: ...` on the next line, in either case. Bytes that may be the beginning of the password
+//! are kept back until the next ones decide, for a moment at most: they are handed out once the line falls silent, or
+//! when flow control comes among them, which cannot wait. The password is looked for across both, so no more of it than
 //! its first three characters can be seen.
 
 use zeroize::Zeroizing;
@@ -12,20 +12,22 @@ use crate::endpoint::Secrecy;
 use crate::record::REDACTED;
 use crate::wire::{XOFF, XON};
 
-/// A password shorter than this is found in too much that has nothing to do with it, and so is its beginning.
+/// Fewest bytes that are looked for: a shorter password, or beginning of one, occurs in too much that has nothing to do
+/// with it.
 pub(super) const SHORTEST: usize = 4;
-/// Longer ones are compared as far as this.
+/// Most bytes of a password that are compared.
 pub(super) const LONGEST: usize = 128;
 
 /// Finds one secret in a stream of bytes.
 #[derive(Default)]
 pub(super) struct Redactor {
     secret: Zeroizing<Vec<u8>>,
-    /// Length of the longest part of the secret that is both its beginning and the end of its first bytes, by their number.
+    /// At `n - 1`: length of the longest proper prefix of the secret's first `n` bytes that is also their suffix
+    /// (Knuth, Morris and Pratt).
     fallback: Vec<usize>,
-    /// The secret's first bytes that have come last, as they came.
+    /// The last bytes that came, as they came, as far as they are the beginning of the secret.
     matched: Zeroizing<Vec<u8>>,
-    /// How many of these have been handed out.
+    /// How many of `matched` have been handed out.
     told: usize,
     /// What was kept back for the secret that was looked for before, and has not been handed out.
     left: Pieces,
@@ -35,15 +37,15 @@ pub(super) struct Redactor {
 pub(super) type Piece = (Vec<u8>, Secrecy);
 
 impl Redactor {
-    /// Looks for this secret from now on. What is too short to be looked for, as an Enter alone is, leaves the one that
-    /// was looked for before.
+    /// Looks for this secret from now on. One that is too short, such as an Enter alone, is ignored: the one before is
+    /// still looked for.
     pub(super) fn look_for(&mut self, secret: &[u8]) {
         let secret = &secret[..secret.len().min(LONGEST)];
         if secret.len() < SHORTEST || secret.eq_ignore_ascii_case(&self.secret) {
             return;
         }
         let left = Pieces(self.flush());
-        // With its room from the beginning: a vector that grows leaves unwiped copies behind.
+        // Allocated in full size: a vector that grows leaves unwiped copies behind.
         let matched = Zeroizing::new(Vec::with_capacity(secret.len()));
         *self = Redactor { left, matched, secret: Zeroizing::new(secret.to_vec()), ..Redactor::default() };
         self.fallback = vec![0; secret.len()];
@@ -57,7 +59,7 @@ impl Redactor {
         }
     }
 
-    /// Takes bytes and gives those whose nature is known, in their order.
+    /// Takes bytes. Returns those of which it is known whether they are secret, in their order.
     pub(super) fn push(&mut self, bytes: &[u8]) -> Vec<Piece> {
         let mut pieces = std::mem::take(&mut self.left);
         if self.secret.is_empty() {
@@ -100,7 +102,7 @@ impl Redactor {
         self.matched.len() > self.told || !self.left.0.is_empty()
     }
 
-    /// What was kept back: no more will come soon. If it does all the same, it is known as the rest.
+    /// Hands out what was kept back, since no more will come soon. If the rest comes all the same, it is recognised.
     pub(super) fn flush(&mut self) -> Vec<Piece> {
         let mut pieces = std::mem::take(&mut self.left);
         self.tell(&mut pieces);
@@ -133,7 +135,7 @@ impl Redactor {
     }
 }
 
-/// Bytes in their order, those of the same nature together.
+/// Bytes in their order, neighbours of the same secrecy together.
 #[derive(Default)]
 pub(super) struct Pieces(Vec<Piece>);
 
@@ -160,7 +162,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What is left of these chunks. After an empty one the line falls silent.
+    /// What comes out for these chunks, with stars for what is secret. At an empty one the line falls silent.
     fn redacted(secret: &[u8], chunks: &[&[u8]]) -> Vec<u8> {
         let mut redactor = Redactor::default();
         redactor.look_for(secret);
@@ -188,6 +190,8 @@ mod tests {
         assert_eq!(said(&["wrong: aBab", "c!", "ab"]), "wrong: *****!ab");
         assert_eq!(said(&["abABabc", "aBaBd"]), "ab*****aBaBd", "what is not the secret comes as it came");
         assert_eq!(String::from_utf8(redacted(b"AB", &[b"CAB"])), Ok("CAB".into()), "too short to be looked for");
+        // What has come to nothing is no beginning of what follows.
+        assert_eq!(String::from_utf8(redacted(b"AABB", &[b"AABABB"])), Ok("AABABB".into()));
     }
 
     #[test]
@@ -254,6 +258,11 @@ mod tests {
         let mut text = "\u{e4}\u{f6} axio-2010: AXIO-2010AXIO-201".to_owned();
         redactor.scrub(&mut text);
         assert_eq!(text, "\u{e4}\u{f6} *********: *********AXIO-201");
+        // A password of stars looks like what replaces it.
+        redactor.look_for(b"****");
+        let mut text = "***** ****".to_owned();
+        redactor.scrub(&mut text);
+        assert_eq!(text, "***** ****");
         redactor.look_for("Gr\u{fc}n4".as_bytes());
         let mut text = "GR\u{fc}N4".to_owned();
         redactor.scrub(&mut text);

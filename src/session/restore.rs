@@ -1,9 +1,9 @@
 //! Restoring the default object dictionary (D): the unit asks, takes a Yes, and resets itself (AXTC4CO manual, section
 //! 4.1.2).
 //!
-//! Only the banner shows that the unit has reset itself. Many a menu names product and version as a banner does, and a
-//! unit that restores nothing may print its menu after the Yes; so the menu is requested afterwards, and only what it does
-//! not show is a banner.
+//! Only the banner shows that the unit has reset itself. Many menus name product and version as a banner does, and a
+//! unit that restores nothing may print its menu after the Yes. So the menu is requested afterwards, and only lines
+//! that it does not have count as a banner.
 
 use std::collections::BTreeSet;
 
@@ -15,38 +15,39 @@ use crate::record::Span;
 use crate::time::{Duration, Instant};
 use crate::wire::{Message, Prompt, Text, is_question, visible};
 
-/// A reset with banner and menu: 5 s until the AXRTD8CO has values, doubled.
+/// How long a reset with banner and menu may take: twice the 5 s until the AXRTD8CO has values.
 const RESET: Duration = Duration::from_secs(10);
 /// Silence that ends a banner, a menu or a refusal: a unit that starts may pause between its lines.
 const QUIET: Duration = Duration::from_millis(1000);
 /// How long a banner or a menu may go on: other text may come without end.
 const LONGEST: Duration = Duration::from_secs(5);
-/// Different lines of a banner and of a menu that are looked at.
+/// Most different lines that are kept of a banner, and of a menu.
 const MOST_LINES: usize = 500;
 /// How often Yes is given: a unit may ask whether the user is sure.
 const MOST_YES: u32 = 2;
-/// What leaves a question. A bare Enter is a Yes to many of them: `[Y/n]`.
+/// What leaves a question. Many take a bare Enter for a Yes: `[Y/n]`.
 const NO: &[u8] = b"No\r";
 
 /// The job.
 #[derive(Debug, Default)]
 pub(super) struct RestoreDefaults {
     stage: Stage,
-    /// A question is not answered with Yes.
+    /// Set once the outcome is known and an open question is left, unanswered.
     leaving: Option<Leaving>,
     deadline: Option<Instant>,
-    /// When the text that is being heard has to have ended.
+    /// When the text that is being heard, a banner or a menu, has to have ended.
     ends: Instant,
     heard: Option<Span>,
     /// How often Yes has been given.
     confirmed: u32,
     is_cancelled: bool,
-    /// Where in the record the answer to the last Yes begins.
+    /// Where the answer to the last Yes begins, in bytes received.
     from: u64,
-    /// What the unit says before its banner that sounds like a failure.
+    /// What the unit has said before its banner that sounds like a failure.
     failure: Option<(String, Span)>,
-    /// The letters of the lines since the last Yes, and of those of the menu after them.
+    /// The letters of each line since the last Yes.
     since: BTreeSet<String>,
+    /// The letters of each line of the menu that was requested afterwards.
     menu: BTreeSet<String>,
 }
 
@@ -57,9 +58,9 @@ enum Stage {
     Asked,
     /// Yes has been sent.
     Confirmed,
-    /// A product has been named: the banner goes on, or a menu does.
+    /// A product has been named: more of the banner, or of a menu, may come.
     Banner,
-    /// M has been sent, to know what is not a banner.
+    /// M has been sent, to learn which of the lines belong to the menu.
     Menu,
 }
 
@@ -89,7 +90,7 @@ impl RestoreDefaults {
                 self.failed(&text.text, text.span, desk);
             }
             (Stage::Confirmed, _) => {
-                // The question may come before it, unless a row of the stream has parted them.
+                // The text may begin with the question that was answered, unless a row of the stream has come between.
                 let question = self.from.saturating_sub(text.span.start) as usize;
                 let said = text.text.get(question..).filter(|said| !said.is_empty()).unwrap_or(&text.text);
                 match message {
@@ -115,13 +116,13 @@ impl RestoreDefaults {
         }
     }
 
-    /// Whether this asks for another Yes that the user would give. The echo of the first one, or a sentence with a yes in
-    /// it, is not a question, and the letters of a Yes are keys of the menu.
+    /// Whether this asks for another Yes that the user would give. The echo of the first one, or a sentence with a yes
+    /// in it, is not a question: a Yes sent then would act as keys of the menu.
     fn asks_again(&self, said: &str) -> bool {
         is_question(said) && self.confirmed < MOST_YES && self.failure.is_none() && !self.is_cancelled
     }
 
-    /// The unit says no, and may have something to ask after that.
+    /// The unit says no, and may ask something after that.
     fn failed(&mut self, said: &str, span: Span, desk: &Desk<'_>) {
         self.failure.get_or_insert((visible::quoted(said), span));
         let soon = desk.now + QUIET;
@@ -141,7 +142,7 @@ impl RestoreDefaults {
                     let reason = format!("the unit does not ask for the Yes, but says \"{said}\"");
                     self.end_without_question(refused(reason, span), desk)
                 }
-                // The line of a question may have an end.
+                // The last line may have been a question, though it had a line end.
                 None => {
                     let no_answer = self.no_answer(Awaited::DefaultsQuestion, desk);
                     self.leave(desk, no_answer);
@@ -175,7 +176,7 @@ impl RestoreDefaults {
         Outcome::NoAnswer { job: Job::RestoreDefaults, awaited, heard }
     }
 
-    /// Ends the job so once no question is open.
+    /// Ends the job with this outcome once no question is open.
     fn end_without_question(&mut self, outcome: Outcome, desk: &mut Desk<'_>) -> Option<Outcome> {
         if desk.pending.is_none() {
             return Some(outcome);
@@ -191,7 +192,7 @@ impl RestoreDefaults {
     fn cancel(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         match &self.stage {
             Stage::Asked => self.leave(desk, CANCELLED),
-            // Whether the unit asks once more shows within a moment.
+            // Within a moment it shows whether the unit asks once more.
             Stage::Confirmed => {
                 self.is_cancelled = true;
                 let soon = desk.now + ANSWER;
@@ -222,9 +223,9 @@ fn is_about_the_start(line: &str) -> bool {
     line.to_lowercase().contains("default") && !tells_of_failure(line)
 }
 
-/// Whether a line after the Yes tells that nothing has come of it: "Not done", "Restoring failed", "EEPROM write error".
-/// That errors have been cleared is not a failure, and neither is what a unit says as it starts: "Watchdog timeout 1 s",
-/// "Parameters invalid, defaults loaded".
+/// Whether a line after the Yes tells that nothing has come of it: "Not done", "Restoring failed", "EEPROM write
+/// error". That errors have been cleared is not a failure, and neither is what a unit says as it starts: "Watchdog
+/// timeout 1 s", "Parameters invalid, defaults loaded".
 fn tells_of_failure(line: &str) -> bool {
     let lower = line.to_lowercase();
     let words: Vec<&str> =

@@ -1,16 +1,16 @@
 //! A file that goes to the unit as it is, as a terminal program sends it.
 //!
-//! Its bytes go out as if typed, a little ahead of the line, under the same flow control and into the same record. Nobody
-//! knows what the unit makes of them: what is reported is how much has left, and that is true at any moment.
+//! Its bytes go out as if typed, a little ahead of the line, under the same flow control and into the same record. What
+//! the unit makes of them is unknown: only how much has left is reported.
 
 use super::event::{Event, FileEnd, Outcome};
 use super::job::{Desk, Signal, Work};
 use crate::time::{Duration, Instant};
 
-/// How long the unit may hold the file before the user is told what is being waited for: writing a page of flash takes it
-/// some 30 ms, and a number that does not move for some seconds makes anybody wonder.
+/// How long the unit may hold the file before the user is told what is being waited for. Writing a page of flash takes
+/// it some 30 ms; a count that stands still for seconds has to be explained.
 const LONG_HOLD: Duration = Duration::from_secs(3);
-/// Bytes that wait for the line at most: some pieces, so that it never runs dry, and little to call back.
+/// Most bytes that wait for the line: enough pieces that it never runs dry, and few enough to be withdrawn.
 const AHEAD: usize = 256;
 
 /// A file on its way.
@@ -30,7 +30,7 @@ impl SendFile {
         SendFile { bytes, handed: 0, told: 0, hold_told: false, deadline: None }
     }
 
-    /// Bytes that have left. What waits in the queue is the file's last part: what was typed before goes first.
+    /// Bytes that have left. What waits in the queue is the last part of the file: keys typed before it leave first.
     fn sent(&self, desk: &Desk<'_>) -> usize {
         self.handed.saturating_sub(desk.transmitter.waiting())
     }
@@ -42,7 +42,7 @@ impl SendFile {
             desk.events.push_back(Event::FileProgress { sent, total: self.bytes.len() });
         }
         if sent == self.bytes.len() {
-            // The last piece is let go; it needs its time on the line.
+            // The last piece has been let go, and still needs its time on the line.
             let free_at = desk.transmitter.free_at();
             if free_at <= desk.now {
                 return Some(self.ended(FileEnd::Whole, sent));
@@ -55,7 +55,7 @@ impl SendFile {
         desk.typed.extend_from_slice(&self.bytes[self.handed..end]);
         self.handed = end;
         self.deadline = match desk.transmitter.held_since() {
-            // The line asks for more as long as something waits, but does not say when the last piece has left.
+            // The transmitter causes ticks only while something waits, and none when the last piece has left.
             None => {
                 self.hold_told = false;
                 let waiting = desk.transmitter.waiting() + desk.typed.len();

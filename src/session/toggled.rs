@@ -1,16 +1,16 @@
 //! Whether a stream that was on still is: after a T, typed, sent by a job or in a recording, and after a restart.
 //!
-//! The key only toggles (AXTC4CO manual, section 4.1.3), and nothing a unit prints is known to say which way. After it a
-//! question says that the stream was off and is being set; rows that go on, that the key was lost; neither of them, that
-//! the stream has stopped. A unit that restarts goes on with a stream that is stored, so rows that do not come back say
-//! the same.
+//! The key only toggles (AXTC4CO manual, section 4.1.3), and nothing a unit prints is known to say which way. A
+//! question after it shows that the stream was off and is being set; rows that go on show that the key was lost; if
+//! neither comes, the stream has stopped. A unit that restarts goes on with a stream that is stored, so rows that do
+//! not come back show the same.
 
 use super::console::{ANSWER, FIRST_VALUES, NO_QUESTION, ROWS_ON_THEIR_WAY};
 use super::keys::{Key, Typed};
 use crate::time::{Duration, Instant};
 use crate::wire::{MenuKey, Message, Prompt};
 
-/// The longest repetition time (errata E-105): rows that lie farther apart are of two streams.
+/// The longest repetition time (errata E-105): rows that are farther apart belong to two streams.
 const LONGEST_PERIOD: Duration = Duration::from_secs(60);
 
 /// Waits for what shows whether the stream is still on.
@@ -26,7 +26,7 @@ pub(super) struct Toggled {
 struct Wait {
     after: After,
     since: Instant,
-    /// When the stream counts as stopped, should nothing show otherwise.
+    /// When the stream counts as stopped, unless something shows otherwise.
     due: Instant,
 }
 
@@ -51,7 +51,7 @@ impl Toggled {
         self.wait = Some(Wait { after: After::Restart, since: now, due });
     }
 
-    /// The unit has printed something. Says whether that shows that the stream has stopped.
+    /// The unit has printed something. Returns whether that shows that the stream has stopped.
     pub(super) fn heard(&mut self, at: Instant, message: &Message) -> bool {
         if let Message::Row(_) = message {
             let apart = self.last_row.map_or(Duration::ZERO, |last| at.since(last));
@@ -67,18 +67,18 @@ impl Toggled {
                 return true;
             }
             (After::Key, _) => wait.due = wait.due.min(at + NO_QUESTION),
-            // A banner and a menu say nothing of the stream.
+            // A banner or a menu says nothing about the stream.
             (After::Restart, _) => {}
         }
         false
     }
 
-    /// When [`is_over`](Toggled::is_over) is wanted.
+    /// When to call [`is_over`](Toggled::is_over).
     pub(super) fn due(&self) -> Option<Instant> {
         self.wait.map(|wait| wait.due)
     }
 
-    /// Whether the time for a sign of the stream is over: it has stopped.
+    /// Whether the time for a sign of the stream is over, so that it has stopped. `true` only once.
     pub(super) fn is_over(&mut self, now: Instant) -> bool {
         self.wait.take_if(|wait| wait.due <= now).is_some()
     }
@@ -97,7 +97,7 @@ mod tests {
     }
 
     fn row() -> Message {
-        Message::Row(Row { source: Source::FieldValue, readings: Vec::new() })
+        Message::Row(Row { source: Source::FieldValue, decimals: 3, readings: Vec::new() })
     }
 
     /// A stream with a row each second, the last one at 1000 ms, and T at 1500 ms.
@@ -163,5 +163,9 @@ mod tests {
         toggled.heard(at(60_001), &row());
         toggled.sent(at(61_000), &Typed::Keys(vec![Key::Menu(MenuKey::Stream)]));
         assert_eq!(toggled.due(), Some(at(61_000) + ANSWER));
+        // The longest repetition time is one of a single stream.
+        toggled.heard(at(120_001), &row());
+        toggled.sent(at(121_000), &Typed::Keys(vec![Key::Menu(MenuKey::Stream)]));
+        assert_eq!(toggled.due(), Some(at(121_000) + LONGEST_PERIOD * 2));
     }
 }

@@ -1,15 +1,16 @@
 //! What leaves for the unit, and when: our half of Xon/Xoff, and what is still on its way.
 //!
-//! The operating system cannot be asked what it has sent (a pseudo-terminal says "all of it" while it is stopped, a
-//! USB adapter keeps some hundred bytes), so the line is reckoned here: pieces are let go one at a time, each when the
-//! one before must have left. Whatever happens, no more than one piece is out of our hands and not yet on the wire.
+//! The operating system cannot be asked what it has sent (a pseudo-terminal says "all of it" while it is stopped, a USB
+//! adapter keeps some hundred bytes), so what is on the line is calculated here: pieces are let go one at a time, each
+//! when the one before must have left. There is never more than one piece that can no longer be withdrawn and is not
+//! yet on the wire.
 
 use std::collections::VecDeque;
 
 use crate::endpoint::{Secrecy, Transmit};
 use crate::time::{Duration, Instant};
 
-/// How long before the line runs dry the next piece is let go: several times what a wake-up is late.
+/// How long before the line runs dry the next piece is let go: several times as long as a wake-up comes late.
 const LEAD: Duration = Duration::from_millis(2);
 
 /// Bytes of typed text in one piece: 5.6 ms at 115,200 baud.
@@ -35,7 +36,7 @@ struct Waiting {
     number: u64,
 }
 
-/// The way out.
+/// What waits to be sent, and the state of the line.
 #[derive(Debug)]
 pub(super) struct Transmitter {
     waiting: VecDeque<Waiting>,
@@ -69,7 +70,7 @@ impl Transmitter {
         self.waiting_bytes + bytes <= LIMIT
     }
 
-    /// Queues text. Gives `false`, and takes nothing, if too much waits already.
+    /// Queues text. Returns `false`, and takes nothing, if too much waits already.
     pub(super) fn push_text(&mut self, bytes: &[u8], secrecy: Secrecy, sender: Sender) -> bool {
         if !self.has_room(bytes.len()) {
             return false;
@@ -96,9 +97,9 @@ impl Transmitter {
         self.next
     }
 
-    /// A job has ended whose first piece was `begun` and whose last words begin with piece `last`. If earlier pieces of it
-    /// still wait, their answers are of no use any more, so they are withdrawn; and if none has left, there is nothing
-    /// its last words could end.
+    /// A job has ended. Its first piece has the number `begun`; what it has queued while ending begins with `last`. If
+    /// earlier pieces of it still wait, they are withdrawn, since their answers are of no use any more. If none of its
+    /// pieces has left, those from `last` on are withdrawn as well: there is nothing they could end.
     pub(super) fn withdraw_job(&mut self, begun: u64, last: u64) {
         let is_late = |waiting: &Waiting| waiting.sender == Sender::Job && waiting.number < last;
         if !self.waiting.iter().any(is_late) {
@@ -138,7 +139,7 @@ impl Transmitter {
         Some(piece)
     }
 
-    /// When [`poll`](Transmitter::poll) has something, should nothing change until then.
+    /// When [`poll`](Transmitter::poll) has something, if nothing changes until then.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         (self.held_since.is_none() && !self.waiting.is_empty()).then(|| self.ready_at())
     }
@@ -219,7 +220,7 @@ mod tests {
         assert!(!line.push_text(b"y", Secrecy::Open, Sender::User));
     }
 
-    /// What leaves, should the unit let it.
+    /// What leaves once the unit lets it.
     fn rest(line: &mut Transmitter) -> String {
         line.hold(Instant::ZERO, false);
         let mut rest = Vec::new();
@@ -232,7 +233,7 @@ mod tests {
 
     #[test]
     fn what_a_job_could_not_send_in_its_time_is_withdrawn_and_what_was_typed_is_not() {
-        // Nothing of it has left, so nothing is to be ended either.
+        // Nothing of the job has left, so there is nothing to end either.
         let mut line = line();
         line.hold(Instant::ZERO, true);
         line.push_text(b"x", Secrecy::Open, Sender::User);
@@ -243,7 +244,7 @@ mod tests {
         line.withdraw_job(begun, last);
         assert_eq!(line.waiting(), 1);
         assert_eq!(rest(&mut line), "x");
-        // The question after its first key is open: the answer is withdrawn, and the question left.
+        // The question after the first key is open: the answer is withdrawn, and the question is left.
         let begun = line.next_number();
         line.push_text(b"t", Secrecy::Open, Sender::Job);
         assert!(line.poll(Instant::from_millis(1_000_000)).is_some());
@@ -253,7 +254,7 @@ mod tests {
         line.push_text(b"\r", Secrecy::Open, Sender::Job);
         line.withdraw_job(begun, last);
         assert_eq!(rest(&mut line), "\r");
-        // On a line that takes everything the last words leave.
+        // On a line that is not held, what the job queues while ending leaves.
         let begun = line.next_number();
         line.push_text(b"\r", Secrecy::Open, Sender::Job);
         line.withdraw_job(begun, begun);

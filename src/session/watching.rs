@@ -1,9 +1,9 @@
-//! Pages of diagnostics that no job has asked for, in a live session: somebody has pressed S by hand, or had before we
-//! came. What is known of them holds for the job as well.
+//! Pages of diagnostics that no job has asked for, in a live session: S was pressed by hand, or before the session
+//! began. They are watched while the job for diagnostics runs as well, but then the job reports them.
 
-use super::Session;
 use super::event::{Event, Job};
 use super::keys::Typed;
+use super::{Mode, Session};
 use crate::time::Instant;
 use crate::wire::{Message, Text};
 
@@ -16,28 +16,32 @@ pub(super) enum Saw<'a> {
     Heard(&'a Text, &'a Message),
     /// Time has passed.
     Tick,
-    /// The link is gone.
-    LinkLost,
 }
 
 impl Session {
     /// Whether pages are listened for: in a recording its jobs do that, and what a loader says is not a page.
     fn watches(&self) -> bool {
-        !self.passive && self.recognises && !matches!(self.job(), Some(Job::Load | Job::SendFile))
+        self.mode == Mode::Live && !matches!(self.job(), Some(Job::Load | Job::SendFile))
     }
 
-    /// When [`Session::watch`] is wanted.
+    /// When to call [`Session::watch`] next.
     pub(super) fn watching_due(&self) -> Option<Instant> {
         self.pages.due().filter(|_| self.watches())
     }
 
+    /// Pages are not listened for, or the link is gone: nobody knows whether the unit still shows them. In a recording
+    /// the job knows.
+    pub(super) fn forget_pages(&mut self) {
+        if self.mode != Mode::Recording && self.facts.diagnostics.take().is_some() {
+            self.events.push_back(Event::FactsChanged);
+        }
+        self.pages.interrupt();
+    }
+
     /// Looks for pages in what has happened.
     pub(super) fn watch(&mut self, saw: Saw<'_>) {
-        if !self.watches() || matches!(saw, Saw::LinkLost) {
-            if !self.passive && self.facts.diagnostics.take().is_some() {
-                self.events.push_back(Event::FactsChanged);
-            }
-            return self.pages.interrupt();
+        if !self.watches() {
+            return self.forget_pages();
         }
         let is_due = self.watching_due().is_some_and(|due| due <= self.now);
         match saw {
@@ -57,14 +61,13 @@ impl Session {
             Saw::Typed(typed) => pages.typed(typed, &mut desk),
             Saw::Heard(text, message) => pages.heard(text, message, &mut desk),
             Saw::Tick => given = pages.tick(&mut desk),
-            Saw::LinkLost => pages.interrupt(),
         }
         let cut = desk.cut;
         self.pages = pages;
         if (self.facts.diagnostics, self.facts.unrecognised_lines) != before {
             self.events.push_back(Event::FactsChanged);
         }
-        // The job assembles pages of its own.
+        // The job reports the pages itself.
         if self.job() == Some(Job::Diagnostics) {
             return;
         }

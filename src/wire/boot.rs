@@ -12,7 +12,7 @@ use super::words::{Words, number};
 /// What the bootloader says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoaderText {
-    /// Who it is: copyright line or header.
+    /// Its copyright line or header.
     Header,
     /// It wants the file.
     Waiting,
@@ -30,7 +30,7 @@ pub enum LoaderText {
     Started,
 }
 
-/// What a loader has against a file. Shown as the loader prints it, with what it means.
+/// An error that a loader reports. Displayed as the loader prints it, with its meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoaderError {
     /// A number (generations g1 and g2).
@@ -44,7 +44,7 @@ const NUMBERS: [(u32, &str); 7] = [
     (1, "characters lost or damaged on the line"),
     (2, "a character that belongs to no record"),
     (3, "a record it does not take"),
-    (4, "wrong check sum"),
+    (4, "wrong checksum"),
     (5, "records came faster than it takes them"),
     (6, "the flash could not be written"),
     (7, "internal error"),
@@ -52,7 +52,7 @@ const NUMBERS: [(u32, &str); 7] = [
 
 /// What the bits of the status word mean.
 const BITS: [(u16, &str); 8] = [
-    (0x0001, "wrong check sum"),
+    (0x0001, "wrong checksum"),
     (0x0002, "no record, or one it does not take"),
     (0x0004, "the flash could not be accessed"),
     (0x0008, "the flash is protected"),
@@ -121,7 +121,7 @@ fn error(line: &str, words: &Words) -> Option<LoaderError> {
     let code = words.iter().nth(1)?;
     let digits = code.strip_prefix("0x").unwrap_or(code);
     if line.contains(':') {
-        // Four digits, no less: "Error: bad" is a word.
+        // Exactly four digits: in "Error: bad" it is a word.
         let status = u16::from_str_radix(digits, 16).ok().filter(|_| digits.len() == STATUS_DIGITS);
         status.map(LoaderError::Status)
     } else {
@@ -132,7 +132,7 @@ fn error(line: &str, words: &Words) -> Option<LoaderError> {
 /// Whether a loader says in words of its own that something is wrong.
 pub fn complains(text: &str) -> bool {
     let words = Words::of(text);
-    // "No errors", "0 errors", "Errors: 0" is what a loader says that counts them. "Error 0" is a number like any other.
+    // "No errors", "0 errors" and "Errors: 0" come from a loader that counts errors. "Error 0" is an error number.
     let counts_none = |at: usize, word: &str| {
         let before = at.checked_sub(1).and_then(|at| words.get(at));
         let beside = before.into_iter().chain(words.get(at + 1));
@@ -220,7 +220,7 @@ mod tests {
             "FAILED",
             "programming failure",
             "Invalid S-record",
-            "wrong check sum",
+            "wrong checksum",
             "Error # 00\u{fffd}4",
             "Error 0",
         ] {
@@ -249,9 +249,9 @@ mod tests {
     #[test]
     fn errors_are_told_in_words_number_by_number_and_bit_by_bit() {
         let table = [
-            (LoaderError::Number(4), "4 (wrong check sum)"),
+            (LoaderError::Number(4), "4 (wrong checksum)"),
             (LoaderError::Number(9), "9"),
-            (LoaderError::Status(0x0001), "0001 (wrong check sum)"),
+            (LoaderError::Status(0x0001), "0001 (wrong checksum)"),
             (LoaderError::Status(0x0012), "0012 (no record, or one it does not take; the flash could not be written)"),
             (LoaderError::Status(0x0100), "0100"),
         ];

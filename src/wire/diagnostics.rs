@@ -9,9 +9,10 @@ use super::words::Words;
 /// A number on a page, and what the page calls it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quantity {
-    /// The words before it. A further quantity with one word or none, `raw`, is one of what was named before it.
+    /// The words before it. A further quantity with one word or none, such as `raw`, is about what was named before,
+    /// and its label begins with that: `TC1 raw`.
     pub label: String,
-    /// The number; `None` where it is not certain: `24,061` may be 24 and a bit, or many thousands.
+    /// The number; `None` where it is not certain: `24,061` may be 24.061 or 24061.
     pub value: Option<f64>,
     /// Digits after its point, as printed: `70.0` says more than `70`.
     pub decimals: usize,
@@ -19,10 +20,10 @@ pub struct Quantity {
     pub unit: Option<String>,
 }
 
-/// Digits after the point that are shown again at most: no unit measures more, and an exponent may say anything.
+/// Most digits after the point that are reported: no unit measures more, and an exponent may be any number.
 const MOST_DECIMALS: usize = 12;
 
-/// Quantities of one line a page may have; a line is not longer than the framer lets it be.
+/// Most quantities that are read from one line.
 const MOST_QUANTITIES: usize = 64;
 
 /// The quantities a line shows, in its order. A time like `0:01:02` and an address are not quantities.
@@ -39,11 +40,11 @@ pub fn quantities(line: &str) -> Vec<Quantity> {
     found
 }
 
-/// What further numbers of a line are of.
+/// What further numbers of a line are about.
 #[derive(Default)]
 struct Name {
     words: String,
-    /// It was in a cell of its own, or such a number has come: what the next cell begins with is about the same.
+    /// It was in a cell of its own: what the next cells begin with is about the same.
     is_for_all: bool,
 }
 
@@ -123,13 +124,13 @@ fn words(cell: &str) -> Vec<(&str, bool)> {
     words
 }
 
-/// Whether a line says that the pages have been switched on or off, as a unit may answer the key before its first page. A
-/// heading that tells of both has something else to say.
+/// Whether a line says that the pages have been switched on or off, as a unit may answer the key before its first page.
+/// A heading that names both is not such a line.
 pub fn is_switch(line: &str) -> bool {
     switch(line).is_some()
 }
 
-/// Which of the two such a line says: that they are on, or off.
+/// What such a line says: `true` that pages are on, `false` that they are off.
 pub fn switch(line: &str) -> Option<bool> {
     let words = Words::of(line);
     let on = ["on", "started", "enabled", "active", "running"];
@@ -143,7 +144,7 @@ pub fn switch(line: &str) -> Option<bool> {
 /// A word without the signs around it.
 fn bare(word: &str) -> &str {
     let word = word.trim_matches(['(', ')', '[', ']', '<', '>', '*', '"', '\'']);
-    // `RTD 5:` names something; a number alone does not end with a colon.
+    // In `RTD 5:` the number is part of a name: it keeps its colon, so that it is not read as a number.
     let is_ordinal = word.strip_suffix(':').is_some_and(|digits| digits.bytes().all(|digit| digit.is_ascii_digit()));
     let word = if is_ordinal { word } else { word.trim_end_matches([':', '.']) };
     let inner = word.trim_start_matches([':', '.']);
@@ -154,7 +155,7 @@ fn bare(word: &str) -> &str {
 }
 
 /// A decimal number, the digits after its point, and a unit that is glued to it: `24.1V`. With a comma it has a value
-/// only if the comma can be nothing but a decimal one, as before an exponent.
+/// only if the comma can only be a decimal one, as before an exponent.
 fn number(word: &str) -> Option<(Option<f64>, usize, Option<&str>)> {
     let end = word.find(|c: char| !matches!(c, '0'..='9' | '.' | ',' | '+' | '-')).unwrap_or(word.len());
     let end = end + exponent(&word[..end], &word[end..]);
@@ -168,7 +169,7 @@ fn number(word: &str) -> Option<(Option<f64>, usize, Option<&str>)> {
     let value: Option<f64> = match commas {
         0 => finite(digits)?,
         _ if is_decimal_comma => finite(&point)?,
-        // Signs within it, as in a range, are no number at all.
+        // With a sign in the middle, as in a range, it is no number at all.
         _ if digits[1..].contains(['+', '-']) => return None,
         _ => None,
     };

@@ -1,20 +1,20 @@
 //! Chunks of bytes to lines.
 //!
 //! A chunk may end anywhere. Lines end with CR, LF, CR LF or LF CR, or where the cursor is moved; Xon and Xoff are
-//! lifted out, since they are about the line and not in it; colours and other escape sequences are left out of the
-//! text, unless a line end cuts them off. Every byte belongs to the span of what it is part of: the framer copies, it
-//! never takes away.
+//! lifted out, since they control the line and are not part of its text; colours and other escape sequences are left
+//! out of the text, unless a line end cuts them off. Every byte belongs to the span of what it is part of: the framer
+//! copies, it never takes away.
 //!
-//! What has no line end yet is the [`Framer::pending`] text. Whether that is a prompt is a question of time, and the
-//! session's.
+//! What has no line end yet is the [`Framer::pending`] text. Whether that is a prompt depends on time, and is decided
+//! by the session.
 
 use crate::record::{Span, XOFF, XON};
 
-/// Characters of a line at most. Longer ones are cut into pieces, so that a device without line ends cannot make us
-/// keep everything; the longest row of any product has 55.
+/// Most bytes of a line. Longer ones are cut into pieces, so that a device without line ends cannot make us keep
+/// everything; the longest row of any product has 55.
 pub const LONGEST_LINE: usize = 1024;
 
-/// Bytes of an escape sequence at most; what goes on longer is taken as text.
+/// Most bytes of an escape sequence; what goes on longer is taken as text.
 const LONGEST_ESCAPE: usize = 64;
 
 const ESC: u8 = 0x1B;
@@ -40,8 +40,8 @@ pub struct Text {
 /// Makes lines of chunks.
 #[derive(Debug, Default)]
 pub struct Framer {
-    /// Bytes of the current line that are text, and at its end those of a string in an escape sequence: text as well,
-    /// should its end not come.
+    /// Bytes of the current line. Those of a string in an escape sequence are at its end until the string is complete:
+    /// if it never is, they are text.
     line: Vec<u8>,
     /// Where the current line began.
     start: u64,
@@ -124,8 +124,8 @@ impl Framer {
         }
     }
 
-    /// Whether a byte is one of an escape sequence. A line end never is: an ESC may be what noise has made of another byte,
-    /// and would take the end of the line with it.
+    /// Whether a byte is part of an escape sequence. A line end never is: noise may have turned another byte into an
+    /// ESC, which would swallow the line end.
     fn in_escape(&self, byte: u8) -> bool {
         byte == ESC || (self.escape != Escape::None && !matches!(byte, b'\r' | b'\n'))
     }
@@ -146,7 +146,7 @@ impl Framer {
                 }
                 self.line.push(byte);
             }
-            // It goes on for too long.
+            // The string goes on for too long.
             (Escape::String(_), Escape::None) => self.text_byte(at, byte, out),
             _ => {}
         }
@@ -197,7 +197,7 @@ impl Escape {
             (Escape::String(_), 0x07) => Escape::None,
             (Escape::String(length), ESC) => Escape::StringEnd(length),
             (Escape::String(length), _) if length < LONGEST_ESCAPE => Escape::String(length + 1),
-            // Another sequence begins in the middle of it.
+            // Another sequence begins in the middle of the string.
             (Escape::StringEnd(_), byte) if byte != b'\\' => Escape::Begun.after(byte),
             (Escape::String(_) | Escape::StringEnd(_), _) => Escape::None,
         }
@@ -225,8 +225,8 @@ fn moves_cursor(escape: Escape, byte: u8) -> bool {
     )
 }
 
-/// Bytes as text: tabs as two blanks, since more than one part columns; NUL and BEL, which old devices send between words,
-/// left out; any other control character is damage, and shows as what is not UTF-8 does.
+/// Bytes as text: tabs as two blanks, since two separate columns; NUL and BEL, which old devices send between words,
+/// left out; any other control character is damage, and shows as U+FFFD like what is not UTF-8.
 fn clean(bytes: &[u8]) -> String {
     if bytes.iter().all(|byte| matches!(byte, b' '..=b'~')) {
         return String::from_utf8_lossy(bytes).into_owned();

@@ -1,7 +1,7 @@
 //! Banner and main menu (AXTC4CO manual, section 4.1).
 //!
-//! Stable are the keys, the subjects after them, the product name and a version of three numbers. Wording and layout
-//! are unknown, so a line is taken for what its words and numbers say, in any order.
+//! The keys, the subjects after them, the product name and a version of three numbers are fixed. Wording and layout are
+//! unknown, so a line is taken for what its words and numbers say, in any order.
 
 use super::words::Words;
 use crate::version::Version;
@@ -44,18 +44,18 @@ pub struct SoftwareName {
     pub product: Option<String>,
     /// Version of three numbers.
     pub version: Option<Version>,
-    /// How surely the version is that of the application: a line may speak of hardware or of a protocol instead.
+    /// How sure it is that the version is the application's: a line may speak of hardware or of a protocol instead.
     pub confidence: Confidence,
 }
 
-/// How surely a version is that of the application.
+/// How sure it is that a version is the application's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Confidence {
-    /// It is alone.
+    /// The version stands alone.
     Bare,
     /// The line calls it software, firmware or application.
     Named,
-    /// It is beside the product name.
+    /// The line has the product name as well.
     WithProduct,
 }
 
@@ -69,9 +69,11 @@ pub(super) fn key(line: &str, words: &Words) -> Option<MenuKey> {
         ('l', &["load", "software"], MenuKey::Load),
         ('m', &["menu"], MenuKey::Menu),
     ];
-    let first = words.iter().take(3).find(|word| word.len() == 1)?.chars().next()?;
+    // Entries may be numbered: `1. [V]iew`.
+    let letter = |word: &str| word.chars().next().filter(|first| word.len() == 1 && first.is_alphabetic());
+    let first = words.iter().take(3).find_map(letter)?;
     // A sentence about the subject is not an entry: the key leads the line, or is the last of a short one.
-    let leads = line.trim_start().trim_start_matches(|c: char| !c.is_alphanumeric()).to_lowercase();
+    let leads = line.trim_start().trim_start_matches(|c: char| !c.is_alphabetic()).to_lowercase();
     let alone = |c: char| leads.strip_prefix(c).is_some_and(|rest| !rest.starts_with(char::is_alphanumeric));
     let subject_words = Words::joined(line);
     let pressed = words.get(0) == Some("press") || words.get(0) == Some("hit") || words.get(0) == Some("key");
@@ -136,7 +138,7 @@ fn subject(words: &Words, version_at: usize, product: Option<&str>) -> Option<Su
             Some(Subject::Product)
         } else if any(&own) {
             Some(Subject::Own)
-        // Beside a product's name it says what kind of product that is.
+        // Next to a product's name "CANopen" says what kind of product that is.
         } else if any(&other) || (product.is_none() && word.starts_with("canopen")) {
             Some(Subject::Other)
         } else {
@@ -152,7 +154,7 @@ fn subject(words: &Words, version_at: usize, product: Option<&str>) -> Option<Su
     if leads == Some(true) { after().or_else(before) } else { before().or_else(after) }
 }
 
-/// Whether the unit says no to what was typed.
+/// Whether the unit refuses what was typed.
 pub(super) fn is_refusal(words: &Words) -> bool {
     if words.has_any(&["wrong", "invalid", "incorrect", "denied", "refused", "illegal", "rejected"]) {
         return true;
@@ -160,11 +162,11 @@ pub(super) fn is_refusal(words: &Words) -> bool {
     if words.iter().any(|word| matches!(word, "cancelled" | "canceled" | "aborted" | "unchanged")) {
         return true;
     }
-    // "Not in pre-operational state", "only available in ...": close by, or it is said of something else ("Do not switch
-    // off, preparing to restart").
+    // "Not in pre-operational state", "only available in ...": the two words have to be close to each other, or "not"
+    // is about something else ("Do not switch off, preparing to restart").
     let list: Vec<&str> = words.iter().collect();
     let denies = |word: &str| {
-        matches!(word, "allowed" | "accepted" | "available" | "possible" | "permitted" | "pre")
+        matches!(word, "allowed" | "accepted" | "available" | "possible" | "permitted" | "valid" | "correct" | "pre")
             || word.starts_with("preop")
     };
     list.iter().enumerate().any(|(at, word)| {
@@ -195,6 +197,9 @@ mod tests {
             ("(L)oad new software", Some(MenuKey::Load)),
             ("Press M for the menu", Some(MenuKey::Menu)),
             ("L: LOAD NEW SOFTWARE", Some(MenuKey::Load)),
+            ("1. [V]iew Object Dictionary", Some(MenuKey::View)),
+            ("5) (L)oad new software", Some(MenuKey::Load)),
+            ("2. D - Defaults", Some(MenuKey::Default)),
             ("V1.2.3", None),
             ("Supply voltage V 24.1", None),
             ("T 23.5", None),
@@ -244,6 +249,8 @@ mod tests {
     fn a_refusal_says_close_by_what_is_not_so() {
         for line in [
             "Wrong password",
+            "Not correct.",
+            "This code is not valid",
             "Not in pre-operational state",
             "Only in Pre-Operational state!",
             "This is not allowed now",

@@ -1,8 +1,8 @@
 //! The text of the service port.
 //!
-//! What a unit prints, as messages where we understand it and as plain text where we do not. Nothing here fails:
-//! unknown is text. The manuals quote a few strings and fix the keys and the stream; the rest of a real unit's wording
-//! is unknown, so recognition goes by words and numbers, never by position or layout.
+//! What a unit prints, as messages where we understand it and as plain text where we do not. Nothing here fails: what
+//! is not recognised is text. The manuals quote a few strings and fix the keys and the stream; the rest of a real
+//! unit's wording is unknown, so recognition goes by words and numbers, never by position or layout.
 
 mod boot;
 pub mod diagnostics;
@@ -28,7 +28,7 @@ use stream::{Layout, Row, Source};
 /// What a line means.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
-    /// Nothing we know: it stays what it is.
+    /// Nothing that is known: it stays text.
     Text,
     /// A row of the data stream.
     Row(Row),
@@ -81,7 +81,7 @@ impl Vocabulary<'_> {
             return Message::Software(name);
         }
         let network = network::network(&words);
-        // "Only in pre-operational state" names a state, and says no.
+        // "Only in pre-operational state" names a state, but is a refusal.
         let names_numbers = network.as_ref().is_some_and(|found| found.node_id.is_some() || found.can_kbps.is_some());
         if menu::is_refusal(&words) && !names_numbers {
             return Message::Refusal;
@@ -92,7 +92,8 @@ impl Vocabulary<'_> {
         Message::Text
     }
 
-    /// A row without a number that looks the same from either source, as one of `source`.
+    /// A row without a number looks the same from either source: reads it as one of `source`. `None` if it is one
+    /// already, has a number, or cannot be read so.
     pub fn row_as(&self, line: &str, row: &Row, source: Source) -> Option<Row> {
         if row.source == source || row.readings.iter().any(|reading| reading.value().is_some()) {
             return None;
@@ -105,26 +106,28 @@ impl Vocabulary<'_> {
         self.layouts.iter().any(|layout| layout.parse(line).is_some())
     }
 
-    /// A question on whose line a row of the stream has come before the unit fell silent, and where that row begins.
-    pub fn question_before_row(&self, line: &str) -> Option<(Prompt, usize)> {
+    /// Where a row of the stream begins in a line that begins with something else, and the question that comes before
+    /// it, if it is one we know.
+    pub fn before_row(&self, line: &str) -> Option<(Option<Prompt>, usize)> {
         let first_end = line.find(';')?;
         let formats = self.layouts.iter().flat_map(|layout| [&layout.field_value, &layout.process_value]);
         formats.flat_map(|format| &format.widths).find_map(|width| {
             let at = first_end.checked_sub(*width).filter(|&at| at > 0)?;
-            let (question, row) = line.split_at_checked(at)?;
-            self.is_row(row).then(|| self.prompt(question)).flatten().map(|prompt| (prompt, at))
+            let (before, row) = line.split_at_checked(at)?;
+            let is_part = !self.is_row(line) && before.contains(char::is_alphanumeric) && self.is_row(row);
+            is_part.then(|| (self.prompt(before), at))
         })
     }
 
-    /// Whether a text without a line end asks for the password; `behind_load` if it answers an L, after which more words
-    /// can mean nothing else. Asked with every byte that comes, so cheap where it does not.
-    pub fn asks_password(&self, text: &str, behind_load: bool) -> bool {
+    /// Whether a text without a line end asks for the password. `after_load`: it answers an L, after which more words
+    /// can mean nothing else. Called for every byte that comes, so it has to be cheap for other texts.
+    pub fn asks_password(&self, text: &str, after_load: bool) -> bool {
         let speaks_of_it = text
             .as_bytes()
             .windows(3)
             .any(|letters| letters.eq_ignore_ascii_case(b"pas") || letters.eq_ignore_ascii_case(b"pwd"));
         (speaks_of_it && self.prompt(text) == Some(Prompt::Password))
-            || (behind_load && prompt::asks_password_behind_load(text))
+            || (after_load && prompt::asks_password_after_load(text))
     }
 
     /// What a text without a line end asks for, once the unit has fallen silent after it.

@@ -23,7 +23,7 @@ pub enum NmtState {
     PreOperational,
     /// In normal service.
     Operational,
-    /// Neither.
+    /// No SDO, no PDOs.
     Stopped,
 }
 
@@ -40,7 +40,7 @@ impl NmtState {
 
 /// Bit rates of CANopen in kbit/s (CiA 301).
 const RATES: [u64; 9] = [10, 20, 50, 100, 125, 250, 500, 800, 1000];
-/// From here on a number is one of bit/s: none of [`RATES`] is as large in kbit/s.
+/// From this value on a number is in bit/s: none of [`RATES`] is as large in kbit/s.
 const BITS: u64 = 10_000;
 
 /// Network variables a line names.
@@ -105,8 +105,8 @@ fn rate_unit(words: &[&str], at: usize) -> Option<(u64, u64)> {
     Some((value, thousandths))
 }
 
-/// The bit rate: the number with such a unit, or the one directly after a name for it. If there are several, only one with
-/// a name counts: the others may be limits.
+/// The bit rate: the number with such a unit, or the one directly after a name for it. If there are several, only one
+/// with a name counts: the others may be limits.
 fn can_kbps(words: &[&str]) -> Option<u16> {
     if has(words, &["rs", "serial", "uart", "115200"]) {
         return None;
@@ -137,7 +137,8 @@ fn can_kbps(words: &[&str]) -> Option<u16> {
     rate.and_then(|kbps| u16::try_from(kbps).ok())
 }
 
-/// Whether these words end with a name of a bit rate, which is not one of several names before several numbers.
+/// Whether these words end with a name of a bit rate. One of several names before several numbers does not count, as in
+/// `Node-ID, baud rate: 10, 125`.
 fn is_called_rate(before: &[&str]) -> bool {
     let fillers = ["is", "can", "in", "rate", "kbit", "kbits", "kbps", "kbaud", "s", "sec"];
     let fillers = before.iter().rev().take_while(|word| fillers.contains(word)).count();
@@ -152,7 +153,7 @@ fn is_called_rate(before: &[&str]) -> bool {
 
 /// The state: what is called so, or is the only one on the line. What a unit is set to do later is not its state.
 fn nmt_state(words: &[&str]) -> Option<NmtState> {
-    // Object 5555h is called so; it says nothing of the present state.
+    // `Start in Operational Mode` is object 5555h; it says nothing about the present state.
     if words.windows(2).any(|pair| pair[0].ends_with("start") && pair[1] == "in")
         || words.windows(2).any(|pair| pair[0].ends_with("starting") && pair[1] == "in")
     {

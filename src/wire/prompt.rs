@@ -1,7 +1,8 @@
 //! What a unit asks for.
 //!
 //! Prompts are known by what they offer, never by their place in a dialogue (their wording is lost with the manual's
-//! figures). What cannot be told is not a prompt: the session then leaves the dialogue instead of guessing.
+//! figures). A question that is not recognised is not a prompt: the session then leaves the dialogue instead of
+//! guessing.
 
 use super::words::Words;
 
@@ -10,13 +11,13 @@ use super::words::Words;
 pub enum Prompt {
     /// The password of L.
     Password,
-    /// Field value or process value, and which key says what.
+    /// Field value or process value, and which key stands for which.
     Source(SourceKeys),
     /// The repetition time in milliseconds.
     Period,
     /// Whether the defaults shall be restored; `Yes` does it (AXTC4CO manual, section 4.1.2).
     ConfirmDefaults,
-    /// Any key goes on.
+    /// Any key, to continue.
     AnyKey,
     /// The bootloader wants the file; its text may come without a line end.
     WaitingForFile,
@@ -59,16 +60,16 @@ pub(super) fn recognise(text: &str, words: &Words) -> Option<Prompt> {
     None
 }
 
-/// Whether a text is worded as a question, and not as a sentence about its subject: it ends with a sign that something is
-/// to come, or tells the user to give it ("Enter the password", "Type Yes to confirm.").
+/// Whether a text is worded as a question, and not as a sentence about its subject: it ends with a sign that something
+/// is to come, or tells the user to give it ("Enter the password", "Type Yes to confirm.").
 pub fn is_question(text: &str) -> bool {
     text.trim_end().ends_with(['?', ':', '>', ')', ']', '='])
         || Words::of(text).iter().any(|word| matches!(word, "enter" | "type" | "input"))
 }
 
-/// Whether a question after an L asks for the password in other words: `Code:`, `PW>`. It has to look like a question, and
-/// to be about nothing else: a key to be pressed, an error's code.
-pub(super) fn asks_password_behind_load(text: &str) -> bool {
+/// Whether a question after an L asks for the password in other words: `Code:`, `PW>`. It has to look like a question,
+/// and to be about nothing else: a key to be pressed, an error's code.
+pub(super) fn asks_password_after_load(text: &str) -> bool {
     if !text.trim_end().ends_with([':', '>']) {
         return false;
     }
@@ -84,7 +85,7 @@ pub(super) fn asks_password_behind_load(text: &str) -> bool {
 const SECRETS: [&str; 11] =
     ["password", "passcode", "passphrase", "passwd", "passwort", "kennwort", "pass", "code", "pin", "pw", "key"];
 
-/// Words that make another question of it, or none.
+/// Words that show that a text asks for something else, or is not a question.
 const ABOUT_SOMETHING_ELSE: [&str; 12] =
     ["any", "press", "hit", "strike", "error", "product", "vendor", "order", "wrong", "invalid", "yes", "sure"];
 
@@ -215,7 +216,7 @@ mod tests {
             "Access key> ",
             "Passwort:",
         ] {
-            assert!(asks_password_behind_load(text), "{text:?}");
+            assert!(asks_password_after_load(text), "{text:?}");
         }
         for text in [
             "Code",
@@ -230,7 +231,7 @@ mod tests {
             "Waiting for application S-Record, code:",
             ":",
         ] {
-            assert!(!asks_password_behind_load(text), "{text:?}");
+            assert!(!asks_password_after_load(text), "{text:?}");
         }
     }
 }

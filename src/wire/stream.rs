@@ -64,14 +64,21 @@ pub enum Reading {
 pub struct Row {
     /// Which value the readings are.
     pub source: Source,
+    /// Digits after the point of its numbers, as printed.
+    pub decimals: usize,
     /// One reading for each channel of the layout, in its order.
     pub readings: Vec<Reading>,
 }
 
 impl Layout {
+    /// An empty row of this source, for one reading after the other.
+    pub fn row(&self, source: Source) -> Row {
+        Row { source, decimals: self.format(source).decimals, readings: Vec::with_capacity(self.channels.len()) }
+    }
+
     /// The row as the unit prints it, without a line end. A number wider than its field is printed whole.
     pub fn emit(&self, row: &Row) -> String {
-        let format = self.format(row.source);
+        let (format, decimals) = (self.format(row.source), row.decimals);
         let width = format.widths.first().copied().unwrap_or_default();
         let mut text = String::new();
         for (position, reading) in row.readings.iter().enumerate() {
@@ -81,9 +88,9 @@ impl Layout {
             match reading {
                 Reading::Value(value) => {
                     // Rounded first: nothing is "-0.0".
-                    let scale = 10f64.powi(format.decimals as i32);
+                    let scale = 10f64.powi(decimals as i32);
                     let value = (value * scale).round() / scale + 0.0;
-                    text.push_str(&format!("{value:>width$.*}", format.decimals));
+                    text.push_str(&format!("{value:>width$.decimals$}"));
                 }
                 Reading::Disabled => text.push_str(&format!("{:<width$}", format.disabled)),
                 Reading::Open => text.push_str(&format!("{:<width$}", format.open)),
@@ -134,7 +141,7 @@ impl Layout {
             let fields = line.split(';').enumerate();
             fields.map(|(position, field)| format.reading(field, width, position == last)).collect::<Option<Vec<_>>>()
         })?;
-        Some(Row { source, readings })
+        Some(Row { source, decimals: format.decimals, readings })
     }
 }
 
@@ -191,14 +198,14 @@ impl Row {
         format!("time,source,{}\n", channels.join(","))
     }
 
-    /// The row as a line of CSV: `2026-01-31T12:00:00.123Z,fv,23.500,open`.
+    /// The row as a line of CSV, its numbers as printed: `2026-01-31T12:00:00.123Z,fv,23.500,open`.
     pub fn csv(&self, time: &str) -> String {
         let mut line = format!("{time},{}", self.source.short());
+        let decimals = self.decimals;
         for &reading in &self.readings {
             line.push(',');
-            match (reading, self.source) {
-                (Reading::Value(value), Source::FieldValue) => line.push_str(&format!("{value:.3}")),
-                (Reading::Value(value), Source::ProcessValue) => line.push_str(&format!("{value:.0}")),
+            match reading {
+                Reading::Value(value) => line.push_str(&format!("{value:.decimals$}")),
                 _ => line.push_str(reading.state()),
             }
         }
@@ -316,7 +323,7 @@ mod tests {
             ),
         ];
         for (source, readings, text) in cases {
-            let row = Row { source, readings };
+            let row = Row { readings, ..layout.row(source) };
             assert_eq!(layout.emit(&row), text);
             assert_eq!(layout.parse(text), Some(row.clone()), "{text:?}");
             assert_eq!(layout.parse(text.trim_end()), Some(row), "{text:?} without its last blanks");
@@ -354,5 +361,22 @@ mod tests {
         let narrow = layout.parse(" 21.5;Open ").expect("five characters a field");
         assert_eq!(narrow.readings, [Reading::Value(21.5), Reading::Open]);
         assert_eq!(layout.parse(" 21.5;Short "), None, "two widths in one row are noise");
+    }
+
+    #[test]
+    fn a_line_of_csv_has_the_digits_that_the_unit_printed() {
+        for (layout, text, csv) in [
+            (
+                thermocouples(),
+                "  23.500;-273.000;Disabled;OpenCct ;1735.000",
+                "t,fv,23.500,-273.000,disabled,open,1735.000\n",
+            ),
+            (thermocouples(), " 4768;    0;Null ;Open ;32128", "t,pv,4768,0,disabled,open,32128\n"),
+            (rtds(), "  56.0;  63.9", "t,fv,56.0,63.9\n"),
+            (rtds(), "  -0.0;Short ", "t,fv,-0.0,short\n"),
+            (rtds(), "   560;  -384", "t,pv,560,-384\n"),
+        ] {
+            assert_eq!(layout.parse(text).map(|row| row.csv("t")).as_deref(), Some(csv), "{text:?}");
+        }
     }
 }

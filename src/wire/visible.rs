@@ -16,7 +16,7 @@ pub enum Controls {
     Layout,
 }
 
-/// Characters of what a unit has said that are quoted.
+/// Most characters that are quoted of what a unit has said.
 const QUOTED: usize = 160;
 
 /// What a unit has said, for a sentence: on one line, every control character shown, and no longer than can be read.
@@ -116,7 +116,7 @@ impl Visible {
     }
 }
 
-/// Made by hand, since a flood on a wrong line rate goes through here.
+/// Bytes as `‹9b›`. Formatted by hand for speed, since a flood on a wrong line rate goes through here.
 fn show_bytes(bytes: &[u8], text: &mut String) {
     const DIGITS: &[u8; 16] = b"0123456789abcdef";
     for &byte in bytes {

@@ -1,15 +1,19 @@
 //! The session's jobs with nobody at the other end but a script: what is sent, when, and how the job ends. Nothing wakes
 //! the session but its own deadlines, so a wait that does not end by itself shows here and nowhere else.
 
+mod edges;
 mod typed;
 mod uploads;
+mod walks;
 
+use axcon::device::Product;
 use axcon::endpoint::Endpoint;
 use axcon::session::{Awaited, Command, Event, FileEnd, Job, LoadReport, Outcome, Refusal, Session, Verdict, WalkEnd};
 use axcon::time::{Duration, Instant};
 use axcon::wire::stream::Source;
 
 use crate::support::bench::{order, small_image};
+use crate::support::words::{ROW, millis, on};
 
 /// A session, what it has sent, and what the other end says to that.
 struct Alone {
@@ -18,6 +22,8 @@ struct Alone {
     /// Each piece that was sent, with the milliseconds since the command.
     sent: Vec<(u64, String)>,
     pages: usize,
+    /// The lines of all pages.
+    lines: Vec<String>,
     /// What is said when a piece that begins so has been sent, and how many milliseconds later; the last one is the next.
     /// Without a piece it belongs to the one before.
     script: Vec<(&'static str, u64, &'static str)>,
@@ -29,7 +35,7 @@ impl Alone {
     fn with(script: &[(&'static str, u64, &'static str)]) -> Self {
         let script = script.iter().rev().copied().collect();
         let session = Session::new(115_200);
-        Alone { session, now: Instant::ZERO, sent: Vec::new(), pages: 0, script, says: Vec::new() }
+        Alone { session, now: Instant::ZERO, sent: Vec::new(), pages: 0, lines: Vec::new(), script, says: Vec::new() }
     }
 
     /// Gives a command and lets its job come to its end: how, and behind how many milliseconds.
@@ -45,7 +51,10 @@ impl Alone {
             while let Some(event) = self.session.poll_event() {
                 match event {
                     Event::Finished(outcome) => return (outcome, millis(self.now.since(begun))),
-                    Event::Page { .. } => self.pages += 1,
+                    Event::Page { lines, .. } => {
+                        self.pages += 1;
+                        self.lines.extend(lines.into_iter().map(|line| line.text));
+                    }
                     _ => {}
                 }
             }
@@ -94,14 +103,6 @@ fn at(moment: Instant) -> u64 {
     millis(moment.since(Instant::ZERO))
 }
 
-fn millis(span: Duration) -> u64 {
-    u64::try_from(span.as_nanos() / 1_000_000).expect("a short story")
-}
-
-fn on() -> Command {
-    Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(200) }
-}
-
 /// What becomes of an upload to a unit that says this behind L, and behind the password.
 fn upload_behind(script: &[(&'static str, u64, &'static str)]) -> (LoadReport, Alone) {
     let mut alone = Alone::with(&[&[("\u{11}m", 3, MENU)][..], script].concat());
@@ -123,10 +124,11 @@ fn recorded(session: &Session) -> String {
     String::from_utf8(bytes).expect("text")
 }
 
-/// A row of field values, as a transcript has it.
-const ROW: &str = "  23.500;  24.125;Disabled;OpenCct ; -12.750\r\n";
 const MENU: &str = "AXRTD8CO V1.0.0\r\nV - View Object Dictionary\r\nD - Default Object Dictionary\r\n\
                     T - Toggle Stream\r\nS - Diagnostics\r\nL - Load New Software\r\n";
+
+const TC_MENU: &str = "AXTC4CO V1.1.0\r\nV - View Object Dictionary\r\nD - Default Object Dictionary\r\n\
+                       T - Toggle Stream\r\nS - Diagnostics\r\nL - Load New Software\r\n";
 
 #[test]
 fn a_silent_line_ends_every_job_by_its_own_deadlines() {
@@ -280,6 +282,7 @@ fn a_unit_that_takes_the_enter_for_values_of_its_own_does_not_stream_on() {
     let (outcome, _) = alone.ask(on());
     assert!(matches!(outcome, Outcome::NoAnswer { awaited: Awaited::SourceQuestion, .. }), "{outcome:?}");
     assert_eq!(alone.log(), "0:t 1500:~ 4000:~ 4005:t");
+    assert_eq!(alone.session.facts().stream, None);
     // One that asks for ever is left to itself.
     let mut alone = Alone::with(&[("t", 5, "Which? "), ("~", 5, "Which? "), ("~", 5, "Which? "), ("~", 5, "Which? ")]);
     let (outcome, time) = alone.ask(on());
@@ -494,6 +497,60 @@ fn a_question_on_a_line_of_its_own_is_answered_when_nothing_follows() {
     // A statement is not a question.
     let (report, alone) = upload_behind(&[("l", 5, "Password needed\r\n")]);
     assert!(!report.password_sent, "{}", alone.log());
+}
+
+#[test]
+fn a_question_after_t_that_is_not_understood_is_left_and_rows_tell_whether_that_was_right() {
+    const SOURCE: (&str, u64, &str) = ("t", 5, "Source: field or process?\r\n> ");
+    let mut alone = Alone::with(&[SOURCE]);
+    let awaited = Awaited::SourceQuestion;
+    assert!(matches!(alone.ask(on()).0, Outcome::NoAnswer { awaited: is, .. } if is == awaited), "{}", alone.log());
+    assert_eq!(alone.log(), "0:t 405:~");
+    let mut alone = Alone::with(&[SOURCE]);
+    assert_eq!((alone.ask(Command::StreamOff).0, alone.log().as_str()), (Outcome::Done(Job::StreamOff), "0:t 405:~"));
+    // The question was whether to stop, and the rows go on.
+    const STOP: [(&str, u64, &str); 2] = [("t", 5, "Stop the stream (Y/N)?\r\n"), ("~", 300, ROW)];
+    let mut alone = Alone::with(&[STOP, STOP, STOP].concat());
+    let awaited = Awaited::StreamOff;
+    let (outcome, _) = alone.ask(Command::StreamOff);
+    assert!(matches!(outcome, Outcome::NoAnswer { awaited: is, .. } if is == awaited), "{outcome:?}: {}", alone.log());
+    assert_eq!(alone.log(), "0:t 405:~ 705:t 1110:~ 1410:t 1815:~");
+    // A row comes on the question's own line.
+    let on_its_line =
+        [("t", 5, "Turn off (Y/N)?  23.500;  24.125;Disabled;OpenCct ; -12.750\r\n"), ("~", 300, "off\r\n")];
+    let mut alone = Alone::with(&on_its_line);
+    assert_eq!(alone.ask(Command::StreamOff).0, Outcome::Done(Job::StreamOff));
+    assert!(alone.log().starts_with("0:t 405:~"), "{}", alone.log());
+}
+
+#[test]
+fn pages_that_nobody_understands_are_switched_off_among_rows_as_well() {
+    let pages = [1_000, 2_000, 3_000, 4_000, 5_000, 6_000].map(|late| ("", late, "Housing\r\n99.9 C\r\n"));
+    let rows = [700, 1_700, 2_700, 3_700, 4_700, 5_700].map(|late| ("", late, ROW));
+    let mut alone = Alone::with(&[&[("s", 0, "")][..], &pages, &rows].concat());
+    alone.session.handle_bytes(alone.now, ROW.as_bytes());
+    let (outcome, _) = alone.ask(Command::Diagnostics { pages: Some(1) });
+    assert!(matches!(outcome, Outcome::NoAnswer { job: Job::Diagnostics, .. }), "{outcome:?}");
+    assert_eq!(alone.sent.iter().filter(|(_, text)| text == "s").count(), 2, "{}", alone.log());
+}
+
+#[test]
+fn a_view_that_ends_without_a_word_has_ended_if_nothing_is_missing_and_the_unit_still_answers() {
+    let entries = Product::named("AXTC4CO").expect("built in").dictionary.entries();
+    let view: String = entries.map(|(at, ..)| format!("{:04X}h:{:02X} x = 0\r\n", at.index, at.sub)).collect();
+    let (whole, first) = (&*view.clone().leak(), &*view[..view.len() / 2].to_owned().leak());
+    for (view, menu, end) in [
+        (whole, ("m", 5, TC_MENU), WalkEnd::Whole),
+        (whole, ("m", 5, ""), WalkEnd::Stopped),
+        (first, ("m", 5, TC_MENU), WalkEnd::Stopped),
+    ] {
+        let mut alone = Alone::with(&[("v", 5, view), menu]);
+        alone.session.handle_bytes(alone.now, TC_MENU.as_bytes());
+        let (Outcome::DictionaryRead(reading), _) = alone.ask(Command::ReadDictionary) else {
+            panic!("{}", alone.log())
+        };
+        assert_eq!(reading.end, end, "{} entries: {}", reading.entries.len(), alone.log());
+    }
 }
 
 #[test]

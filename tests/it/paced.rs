@@ -159,6 +159,15 @@ fn with_ring(number: usize, text: &str) -> Says {
     }
 }
 
+/// A loader whose pages are half as large as assumed.
+fn with_half_pages(number: usize, text: &str) -> Says {
+    match number {
+        _ if text.starts_with("S7") => started("AXTC4CO"),
+        9.. if number % 8 == 1 => vec![(200, OFF), (30_000, ON)],
+        _ => Vec::new(),
+    }
+}
+
 /// A loader with pages, as it should be.
 fn with_pages(number: usize, text: &str) -> Says {
     match number {
@@ -306,6 +315,132 @@ fn a_page_is_awaited_where_it_is_full_and_only_there() {
     assert_eq!(upload.report.verdict, Verdict::Done, "{:?}", upload.report);
     let gap = millis(upload.piece(18).let_go.since(upload.piece(17).gone));
     assert!((290..=300).contains(&gap), "{gap}");
+    // It is believed, and what has left counts as taken.
+    assert_eq!(upload.report.remark, None);
+    let told = upload.progress.iter().rfind(|(at, _)| *at == upload.piece(18).let_go).expect("progress").1;
+    assert_eq!(told.records, 18, "{told:?}");
+}
+
+#[test]
+fn pages_of_another_size_are_known_after_two_holds_and_told() {
+    let remark = "the loader keeps pages of 128 words, and not of 256 as assumed";
+    // It has a place for the record that comes too early.
+    let upload = Upload::entered("AXTC4CO", 768, &[(50_000, WAITS)], &[], with_half_pages);
+    assert_eq!((upload.report.verdict, upload.counts()), (Verdict::Done, [1, 48, 1]), "{:?}", upload.report);
+    assert_eq!(upload.report.remark.as_deref(), Some(remark));
+    let gaps: Vec<u64> = upload.sent.windows(2).map(|two| millis(two[1].1.gone.since(two[0].1.gone))).collect();
+    let waits: Vec<usize> = (0..gaps.len()).filter(|at| gaps[*at] > 10).collect();
+    // The ninth record is held, and so is every record up to the second hold that one size alone explains.
+    let expected: Vec<usize> = [0].into_iter().chain(10..=25).chain([33, 41, 48]).collect();
+    assert_eq!(waits, expected, "{gaps:?}");
+    // It has none, and says so in one of two ways.
+    for error in ["Error # 0005\r\nRestarting.\r\n", "Error # 0001\r\nRestarting.\r\n"] {
+        let mut round = 0;
+        let upload = Upload::to("AXTC4CO", move |number, text| {
+            round += usize::from(number == 0);
+            match (round, number) {
+                (1, 9) => vec![(200, OFF)],
+                (1, 10) => vec![(500, error), (300_000, WAITS)],
+                _ => with_half_pages(number, text),
+            }
+        });
+        assert_eq!((upload.report.verdict, upload.counts()), (Verdict::Done, [2, 30, 1]), "{:?}", upload.report);
+        assert_eq!(upload.report.remark, Some(format!("{remark}; everything was sent twice")), "{error:?}");
+    }
+}
+
+#[test]
+fn a_loader_of_which_nothing_is_heard_gets_1280_words_and_no_more() {
+    let upload = Upload::entered("AXTC4CO", 2048, &[(50_000, WAITS)], &[], |_, _| Vec::new());
+    let report = &upload.report;
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Unknown), "{report:?}");
+    assert!(report.what.contains("fallen silent"), "{report:?}");
+    assert_eq!(upload.counts(), [1, 1280 / 16, 0]);
+}
+
+#[test]
+fn an_xon_that_the_line_doubles_acknowledges_one_record() {
+    // Counted twice, it would stand for the eighth record, which is lost.
+    let mut round = 0;
+    let upload = Upload::to("AXRTD8CO", move |number, text| {
+        round += usize::from(number == 0);
+        match (round, number) {
+            (1, 5) => vec![(200, OFF), (1_500, ON), (1_600, ON)],
+            (1, 8) => vec![(300, "*")],
+            _ => with_ring(number, text),
+        }
+    });
+    assert_eq!((upload.report.verdict, upload.counts()), (Verdict::Done, [2, 40, 1]), "{:?}", upload.report);
+}
+
+#[test]
+fn a_hold_after_the_header_that_does_not_come_again_leaves_nothing_of_the_first_pass_in_the_report() {
+    let mut round = 0;
+    let upload = Upload::to("AXTC4CO", move |number, text| {
+        round += usize::from(number == 0);
+        match (round, number) {
+            (1, 0) => vec![(1_000, OFF), (5_000, ON)],
+            _ if text.starts_with("S7") => started("AXTC4CO"),
+            _ => Vec::new(),
+        }
+    });
+    let report = &upload.report;
+    assert_eq!((report.verdict, upload.counts()), (Verdict::Done, [2, 21, 1]), "{report:?}");
+    let told = upload.progress.last().expect("progress").1;
+    assert_eq!((report.records, told.records, told.again), (22, 22, true), "{report:?}, {told:?}");
+}
+
+#[test]
+fn what_a_loader_has_begun_to_say_before_a_stage_is_not_said_in_it() {
+    // Before the first record: it names itself.
+    let says = [(50_000, WAITS), (120_000, "Bootloa"), (140_000, "der V2.0.0\r\n")];
+    let upload = Upload::entered("AXTC4CO", WORDS, &says, &[], with_pages);
+    assert_eq!(upload.report.verdict, Verdict::Done, "{:?}", upload.report);
+    // Before the end record: half a version.
+    let upload = Upload::to("AXTC4CO", |number, text| match number {
+        20 => vec![(100_000, "V1.")],
+        _ if text.starts_with("S7") => vec![(1_000, "2.0 AXTC4CO\r\n")],
+        _ => with_pages(number, text),
+    });
+    let report = &upload.report;
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Unknown), "{report:?}");
+    assert_eq!(report.what, "the file was sent, but the unit has not come back");
+    // A mark for the last record has no line end, and the banner is on its line.
+    let upload = Upload::to("AXTC4CO", |number, text| match number {
+        20 => vec![(500, ".")],
+        _ if text.starts_with("S7") => vec![(40_000, "AXTC4CO V1.2.0\r\n")],
+        _ => with_pages(number, text),
+    });
+    assert_eq!(upload.report.verdict, Verdict::Done, "{:?}", upload.report);
+    // Before a failure: the rest of the complaint that has ended the upload is not what runs now.
+    let upload = Upload::to("AXTC4CO", |number, text| match number {
+        5 => vec![(0, "\r\nErr 6, version"), (150_000, " 1.2.0\r\n")],
+        _ => with_pages(number, text),
+    });
+    let report = &upload.report;
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Unknown), "{report:?}");
+    assert_eq!(report.what, "the loader complains: \"Err 6, version\"");
+}
+
+#[test]
+fn a_hold_before_the_header_does_not_show_which_loader_it_is() {
+    let says = [(50_000, WAITS), (60_000, OFF), (300_000, "\u{11}\u{13}"), (320_000, ON)];
+    let upload = Upload::entered("AXTC4CO", WORDS, &says, &[], with_pages);
+    assert_eq!((upload.report.verdict, upload.counts()), (Verdict::Done, [1, 20, 1]), "{:?}", upload.report);
+    let gap = millis(upload.piece(1).let_go.since(upload.piece(0).gone));
+    assert!((115..130).contains(&gap), "data waits for a ring's acknowledgement: {gap}");
+}
+
+#[test]
+fn a_silent_loader_that_speaks_while_it_is_brought_out_of_a_record_gets_no_more_enters() {
+    let upload = Upload::to("AXRTD8CO", |number, text| match number {
+        _ if text.starts_with("S7") => Vec::new(),
+        _ if text.starts_with('\r') => vec![(1_000, "\r\nAXRTD8CO V1.2.0\r\n")],
+        _ => with_ring(number, text),
+    });
+    assert_eq!(upload.report.verdict, Verdict::Done, "{:?}", upload.report);
+    // Two pieces of 64 have left when the first one is answered.
+    assert_eq!(upload.others(), "\\r".repeat(128));
 }
 
 #[test]
@@ -379,6 +514,13 @@ fn words_among_the_records_are_heard_out_and_many_of_them_are_no_loaders() {
     assert_eq!((report.what.as_str(), upload.counts()), ("what answers does not talk as a loader does", [1, 4, 0]));
     assert_eq!(upload.others(), "\\r", "whatever it has opened is left");
     assert_eq!(lines(5).report.verdict, Verdict::Done);
+    // Records that left before the first of them do not count for it.
+    let upload = Upload::entered("AXTC4CO", 768, &[(50_000, WAITS)], &[], |number, text| match number {
+        20.. if text.starts_with("S3") => vec![(100, "Unbekannter Befehl\r\n")],
+        _ => with_pages(number, text),
+    });
+    let report = &upload.report;
+    assert_eq!((report.verdict, upload.counts()), (Verdict::Failed, [1, 23, 0]), "{report:?}");
     // Those of a pass that was too fast do not count in the next one.
     let mut round = 0;
     let upload = Upload::to("AXTC4CO", move |number, text| {

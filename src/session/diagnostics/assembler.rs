@@ -1,4 +1,4 @@
-//! Pages from lines: what comes in one go and has numbers in it.
+//! Assembles pages from lines: a page is what comes in one go and has numbers in it.
 
 use crate::session::job::Desk;
 use crate::time::{Duration, Instant};
@@ -8,10 +8,10 @@ use crate::wire::{Text, diagnostics};
 const QUIET: Duration = Duration::from_millis(400);
 /// How long a page may take: the next one begins a second after it.
 const LONGEST: Duration = Duration::from_millis(900);
-/// How long a text without a line end must stay as it is to count as a page's last line, and neither as a row of the
-/// stream under way nor as the half of a line that a busy computer has got to.
+/// How long a text without a line end must stay as it is to count as the last line of a page. Before that, it may be a
+/// row of the stream under way, or half a line on a busy computer.
 const STILL: Duration = Duration::from_millis(300);
-/// Lines of a page at most; more than a screen at 200x60 shows.
+/// Most lines of a page; more than a screen at 200x60 shows.
 const MOST_LINES: usize = 200;
 
 /// A page.
@@ -38,8 +38,9 @@ pub(in crate::session) enum PageEnd {
 #[derive(Debug, Default)]
 pub(in crate::session) struct Assembler {
     lines: Vec<Text>,
-    /// When its first line came, and its last.
+    /// When its first line came.
     begun: Instant,
+    /// When its last line came.
     at: Instant,
     /// When the page counts as complete.
     due: Option<Instant>,
@@ -73,7 +74,7 @@ impl Assembler {
         self.due
     }
 
-    /// Nothing has followed for a while: what has come is a page if it shows numbers.
+    /// The page is due: returns it if it shows numbers. `None` also while a text without a line end may still grow.
     pub(in crate::session) fn complete(&mut self, desk: &mut Desk<'_>) -> Option<Page> {
         let end = if desk.now < self.at + QUIET { PageEnd::Time } else { PageEnd::Silence };
         let unended = desk.pending.map(|text| text.span.end);

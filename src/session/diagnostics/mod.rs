@@ -1,8 +1,8 @@
 //! Reading diagnostics: S switches pages on that come every second, and off again (AXTC4CO manual, section 4.1.4).
 //!
-//! The key only toggles, and no text of a unit is known to say which way. So the pages themselves are the evidence: what
-//! comes in one go, has numbers in it and comes again. Pages that come already are simply read; once there are enough, S
-//! is pressed until they have stopped.
+//! The key only toggles, and no text of a unit is known to say which way. So the pages themselves are the evidence:
+//! what comes in one go, has numbers in it and comes again. Pages that come already are simply read; once there are
+//! enough, S is pressed until they have stopped.
 
 mod assembler;
 
@@ -20,7 +20,8 @@ const WATCH: Duration = Duration::from_millis(1300);
 /// How long the first page may take: a unit has no values for up to 5 s after its power-up (AXRTD8CO manual,
 /// section 1.1).
 pub(super) const FIRST_PAGE: Duration = Duration::from_millis(6500);
-/// How long after the key it is noted how much has come: a unit that has said something more each time goes on talking.
+/// Times after the key at which the number of received bytes is noted. A unit that has sent more by each of them, and
+/// by the end, goes on talking.
 const LOOKS: [Duration; 2] = [Duration::from_millis(1500), Duration::from_millis(4000)];
 /// How long the next page may take.
 const NEXT_PAGE: Duration = Duration::from_millis(2500);
@@ -49,10 +50,14 @@ pub(super) struct Diagnostics {
     heard: Option<Span>,
     /// Something has come since the key was last pressed.
     answered: bool,
-    /// When the key was pressed, whether rows of a stream came already, and the bytes that had been received at each look.
+    /// When the key was pressed.
     asked_at: Instant,
+    /// Whether rows of a stream were coming then.
     streamed: bool,
+    /// Bytes that had been received at each of the [`LOOKS`].
     looks: Vec<u64>,
+    /// Lines that are no rows.
+    lines: u64,
     /// Pages come that no job has asked for, and all that is wanted is that they stop.
     only_stops: bool,
 }
@@ -67,9 +72,9 @@ enum Stage {
     NotUnderstood,
     /// Pages come.
     Reading,
-    /// The key that stops them has been pressed, this often and then last.
+    /// The key that stops pages has been pressed: how often, and when last.
     Stopping { presses: u32, at: Instant, then: Outcome },
-    /// They have stopped, and nothing else has come: the menu is asked for, to see whether a unit is there.
+    /// Pages have stopped, and nothing else has come: the menu is asked for, to see whether a unit is there.
     AskingForMenu { then: Outcome },
 }
 
@@ -87,6 +92,7 @@ impl Diagnostics {
             asked_at: Instant::ZERO,
             streamed: false,
             looks: Vec::new(),
+            lines: 0,
             only_stops: false,
         }
     }
@@ -129,13 +135,18 @@ impl Diagnostics {
         self.deadline = Some(desk.now + LOOKS[0]);
     }
 
-    /// Whether the unit has been talking ever since the key was pressed, as it did not before.
-    fn goes_on(&self, desk: &Desk<'_>) -> bool {
-        let all: Vec<u64> = self.looks.iter().copied().chain([desk.received]).collect();
-        !self.streamed && all.windows(2).all(|pair| pair[0] < pair[1])
+    /// How much the unit has said so far. Among rows of a stream only other lines count.
+    fn said(&self, desk: &Desk<'_>) -> u64 {
+        if self.streamed { self.lines } else { desk.received }
     }
 
-    /// Stops the pages, and ends the job so once they have stopped.
+    /// Whether the unit has been talking ever since the key was pressed, as it did not before.
+    fn goes_on(&self, desk: &Desk<'_>) -> bool {
+        let all: Vec<u64> = self.looks.iter().copied().chain([self.said(desk)]).collect();
+        all.windows(2).all(|pair| pair[0] < pair[1])
+    }
+
+    /// Stops the pages, and ends the job with this outcome once they have stopped.
     fn stop(&mut self, desk: &mut Desk<'_>, presses: u32, then: Outcome) {
         desk.send(b"s");
         self.stage = Stage::Stopping { presses, at: desk.now, then };
@@ -156,11 +167,12 @@ impl Diagnostics {
 
     fn time_is_up(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         match &self.stage {
-            // What looked like a page before the key was not one, or somebody has stopped them.
+            // What looked like a page before the key was not one, or pages have been stopped meanwhile.
             Stage::Reading if self.taken == 1 => self.switch_on(desk),
             Stage::Watching => self.switch_on(desk),
             Stage::Asked if self.looks.len() < LOOKS.len() => {
-                self.looks.push(desk.received);
+                let said = self.said(desk);
+                self.looks.push(said);
                 self.deadline = Some(self.asked_at + LOOKS.get(self.looks.len()).copied().unwrap_or(FIRST_PAGE));
             }
             Stage::Asked if self.goes_on(desk) => {
@@ -176,7 +188,7 @@ impl Diagnostics {
                 }
                 self.leave(desk, no_answer);
             }
-            // They may only be late.
+            // Pages may only be late, so they are stopped.
             Stage::Reading => {
                 let late = self.no_answer(Awaited::NextPage);
                 self.stop(desk, 1, late);
@@ -221,6 +233,7 @@ impl Work for Diagnostics {
             return leaving.handle(signal, CANCELLED, desk);
         }
         self.answered |= matches!(signal, Signal::Heard(..));
+        self.lines += u64::from(matches!(signal, Signal::Heard(_, message) if !matches!(message, Message::Row(_))));
         if matches!((&self.stage, &signal), (Stage::AskingForMenu { .. }, Signal::Heard(..))) {
             // Rows may go on for ever after the menu.
             let soon = desk.now + MENU;
@@ -236,7 +249,7 @@ impl Work for Diagnostics {
                 self.deadline = Some(desk.now + WATCH);
                 None
             }
-            // Somebody has left a question open. While pages come it is a line that ends like one.
+            // A question had been left open. While pages come, it is a line that only ends like a question.
             Signal::Heard(_, Message::Prompt(Prompt::Password | Prompt::ConfirmDefaults))
                 if matches!(self.stage, Stage::Watching | Stage::Asked) =>
             {
@@ -245,7 +258,7 @@ impl Work for Diagnostics {
                 None
             }
             Signal::Heard(_, Message::Row(_) | Message::Prompt(_)) => None,
-            // The end of a row that the unit has had no room for.
+            // Numbers alone: the end of a row of the stream for which the unit had no room as a whole.
             Signal::Heard(text, _) if !has_words(&text.text) => {
                 self.heard = Some(text.span);
                 None
@@ -253,7 +266,8 @@ impl Work for Diagnostics {
             Signal::Heard(text, _) => {
                 self.heard = Some(text.span);
                 self.page.line(text, desk.now);
-                // Pages that came before anybody has pressed a key belong to no key.
+                // Pages that came before any key was sent answer none, so without the job their lines count as not
+                // understood.
                 desk.understood = matches!(self.stage, Stage::Reading);
                 None
             }

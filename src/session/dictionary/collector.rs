@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::notation;
-use crate::canopen::ObjectAddress;
+use crate::canopen::{ObjectAddress, Value};
 use crate::device::Product;
 use crate::device::dictionary::{Entry, Object};
 use crate::record::Span;
@@ -11,13 +11,13 @@ use crate::session::event::{DictionaryReading, ReadEntry, WalkEnd};
 use crate::wire::dictionary::{Expected, Reading, Shown, ViewLine};
 use crate::wire::{Message, Text, dictionary};
 
-/// Entries that are kept at most; and lines, as long as nobody knows whose objects they are.
+/// Most entries that are kept; and most lines, as long as the product is not known.
 const MOST_ENTRIES: usize = 20_000;
 
-/// Different lines that nobody understands, as far as they are kept: the largest product has 326 entries.
+/// Most different lines that were not understood and are kept: the largest product has 326 entries.
 const MOST_UNREAD: usize = 2_000;
 
-/// This many different lines that nobody understands are not titles.
+/// This many different lines that were not understood are more than just titles.
 const MANY_UNREAD: usize = 10;
 
 /// Where an object dictionary says which product it is: its code (manuals, object 1018h).
@@ -41,21 +41,21 @@ pub(in crate::session) struct Collector {
     pub(in crate::session) product: Option<&'static Product>,
     entries: BTreeMap<ObjectAddress, ReadEntry>,
     unrecognised_lines: u64,
-    /// The same, each once: what a unit repeats hides no entry. And which of them came first.
+    /// The same without repeats: a line that a unit prints again and again can be no missing entry.
     unread: BTreeSet<String>,
+    /// The first of them.
     first_unread: Option<String>,
     /// Entries whose lines were among them.
     unread_entries: BTreeSet<ObjectAddress>,
     /// Lines that were taken for the heading of an object, and have a number.
     headings: BTreeMap<u16, String>,
-    /// All lines, as long as the product is not known: with it they say more. And whether they mean something else.
+    /// All lines, as long as the product is not known, to be read again once it is; each with whether it means
+    /// something other than an entry.
     lines: Vec<(Text, bool)>,
     /// The object whose entries follow.
     heading: Option<u16>,
     /// The last entry that was read: its sub-index tells how the next one is written.
     last: Option<ObjectAddress>,
-    /// Entries whose value rests on decimal digits that may be hexadecimal ones.
-    plain: BTreeSet<ObjectAddress>,
 }
 
 impl Collector {
@@ -86,13 +86,13 @@ impl Collector {
         }
     }
 
-    /// How many different lines nobody understood.
+    /// How many different lines were not understood.
     pub(in crate::session) fn unread_lines(&self) -> usize {
         self.unread.len()
     }
 
-    /// The first line that nobody understood, if there are enough of them to be what is missing. A unit whose software lacks
-    /// objects has titles and hints of its own, but few of them.
+    /// The first line that was not understood, if there are enough such lines to be the missing entries. A unit whose
+    /// software lacks objects has titles and hints of its own, but few of them.
     fn hidden(&self) -> Option<&String> {
         let missing = match self.product {
             Some(_) => self.missing(),
@@ -103,7 +103,7 @@ impl Collector {
         self.first_unread.as_ref().filter(|_| hides)
     }
 
-    /// Headings without entries below them were not headings: they held the entries.
+    /// Counts headings without entries below them as lines that were not understood: they held the entries themselves.
     fn count_headings(&mut self) {
         for (index, heading) in std::mem::take(&mut self.headings) {
             let entries = ObjectAddress::new(index, 0)..=ObjectAddress::new(index, u8::MAX);
@@ -120,7 +120,7 @@ impl Collector {
         for lines in dictionary::several(&text.text, knows) {
             if let Some(entries) = self.read_all(&lines, text) {
                 self.heading = lines.first().and_then(|line| line.index).or(self.heading);
-                entries.into_iter().for_each(|(entry, reading)| self.keep(entry, reading.as_ref()));
+                entries.into_iter().for_each(|entry| self.keep(entry));
                 return Read::Understood;
             }
         }
@@ -147,12 +147,12 @@ impl Collector {
         };
         match (reading, entry) {
             (Some(reading), _) => {
-                self.keep(read_entry(at, line.rest, text, Some(&reading)), Some(&reading));
+                self.keep(ReadEntry { at, text: line.rest, span: text.span, reading: Some(reading) });
                 Read::Understood
             }
             // An object that the manual does not have is kept as it is printed.
             (None, None) if line.sub.is_some() => {
-                self.keep(read_entry(at, line.rest, text, None), None);
+                self.keep(ReadEntry { at, text: line.rest, span: text.span, reading: None });
                 Read::Understood
             }
             // The heading of a variable whose value is below it.
@@ -172,8 +172,9 @@ impl Collector {
         ObjectAddress::new(index, line.sub.map_or(0, |sub| sub.behind(before)))
     }
 
-    /// Entries in columns, if all of them are such: what looks like one may be something else.
-    fn read_all(&self, lines: &[ViewLine], text: &Text) -> Option<Vec<(ReadEntry, Option<Reading>)>> {
+    /// The entries that are in the columns of a line, if all of them are entries: what looks like one may be something
+    /// else.
+    fn read_all(&self, lines: &[ViewLine], text: &Text) -> Option<Vec<ReadEntry>> {
         let mut last = self.last;
         let mut entries = Vec::new();
         for line in lines {
@@ -181,14 +182,14 @@ impl Collector {
             let at = self.address(index, line, last);
             last = Some(at);
             let reading = match self.product {
-                // They say more once it is known whose they are.
+                // Their values can be read once the product is known.
                 None => None,
                 Some(product) => {
                     let object = product.dictionary.object(index)?;
                     Some(value(&line.rest, object, object.entry(at.sub)?)?)
                 }
             };
-            entries.push((read_entry(at, line.rest.clone(), text, reading.as_ref()), reading));
+            entries.push(ReadEntry { at, text: line.rest.clone(), span: text.span, reading });
         }
         Some(entries)
     }
@@ -202,18 +203,16 @@ impl Collector {
         }
         let read = |(entry, word): (&Entry, &&str)| {
             let expected = Expected { data_type: entry.data_type, names: &[], unit: entry.unit.as_deref() };
-            let reading = dictionary::value(word, &expected)?;
-            Some((
-                read_entry(ObjectAddress::new(object.index, entry.sub), (*word).to_owned(), text, Some(&reading)),
-                reading,
-            ))
+            let reading = Some(dictionary::value(word, &expected)?);
+            let at = ObjectAddress::new(object.index, entry.sub);
+            Some(ReadEntry { at, text: (*word).to_owned(), span: text.span, reading })
         };
         let entries: Option<Vec<_>> = object.entries.iter().zip(&words).map(read).collect();
         let Some(entries) = entries else { return };
-        let count = entries.first().and_then(|(first, _)| first.value).and_then(|value| value.as_integer());
-        let highest = entries.last().map(|(last, _)| i64::from(last.at.sub));
+        let count = entries.first().and_then(ReadEntry::value).and_then(Value::as_integer);
+        let highest = entries.last().map(|last| i64::from(last.at.sub));
         if count.is_some() && count == highest {
-            entries.into_iter().for_each(|(entry, reading)| self.keep(entry, Some(&reading)));
+            entries.into_iter().for_each(|entry| self.keep(entry));
         }
     }
 
@@ -230,7 +229,7 @@ impl Collector {
         self.entries.retain(|_, entry| entry.span != span);
     }
 
-    /// What a unit that has not said its name is, by the product code it has shown; and where it has.
+    /// Which product the unit is by the product code in its object dictionary, and where that was read.
     pub(in crate::session) fn product_shown(&self) -> Option<(&'static Product, Span)> {
         let shown = self.entries.get(&PRODUCT_CODE)?;
         let is_it = |product: &&Product| {
@@ -243,7 +242,7 @@ impl Collector {
         Product::all().iter().find(is_it).map(|product| (product, shown.span))
     }
 
-    /// Reads what came before it was known whose objects these are once more.
+    /// Once the product is known, reads the lines that came before once more.
     fn read_again(&mut self) {
         let product = self.product.or_else(|| self.product_shown().map(|(product, _)| product));
         let lines = std::mem::take(&mut self.lines);
@@ -255,9 +254,8 @@ impl Collector {
             again.take_line(line, *otherwise);
         }
         for (at, entry) in &self.entries {
-            if entry.known || !again.entries.contains_key(at) {
+            if entry.reading.is_some() || !again.entries.contains_key(at) {
                 again.entries.insert(*at, entry.clone());
-                again.plain.extend(self.plain.get(at));
             }
         }
         *self = again;
@@ -285,15 +283,14 @@ impl Collector {
         })
     }
 
-    /// Gives what was read, in the order of the addresses, of a walk that came so far.
+    /// Returns what was read, in the order of the addresses. `end` says how far the walk came.
     pub(in crate::session) fn take(&mut self, end: WalkEnd) -> DictionaryReading {
         self.read_again();
         self.count_headings();
         if let Some(product) = self.product {
-            notation::settle(&mut self.entries, &self.plain, product);
+            notation::settle(&mut self.entries, product);
         }
-        self.plain.clear();
-        let doubtful = self.entries.values().filter(|entry| entry.doubtful).count();
+        let doubtful = self.entries.values().filter(|entry| entry.is_doubtful()).count();
         self.unrecognised_lines += doubtful as u64;
         let end = match (end, self.hidden()) {
             (WalkEnd::Whole, Some(first)) => WalkEnd::NotUnderstood { first: first.clone() },
@@ -306,13 +303,8 @@ impl Collector {
         }
     }
 
-    fn keep(&mut self, entry: ReadEntry, reading: Option<&Reading>) {
+    fn keep(&mut self, entry: ReadEntry) {
         self.last = Some(entry.at);
-        if reading.is_some_and(|reading| reading.plain) {
-            self.plain.insert(entry.at);
-        } else {
-            self.plain.remove(&entry.at);
-        }
         if self.entries.len() < MOST_ENTRIES || self.entries.contains_key(&entry.at) {
             self.entries.insert(entry.at, entry);
         }
@@ -326,23 +318,6 @@ fn value(rest: &str, object: &Object, entry: &Entry) -> Option<Reading> {
     let plain = unit.replace('°', "").replace('µ', "u").replace('Ω', "Ohm");
     let names = [object.name.as_str(), entry.name.as_str(), unit, plain.as_str()];
     dictionary::value(rest, &Expected { data_type: entry.data_type, names: &names, unit: entry.unit.as_deref() })
-}
-
-/// An entry as it was printed, and what has been made of it: nothing of one that is not known.
-fn read_entry(at: ObjectAddress, rest: String, text: &Text, reading: Option<&Reading>) -> ReadEntry {
-    let value = match reading.map(|reading| reading.shown) {
-        Some(Shown::Value(value)) => Some(value),
-        Some(Shown::Nothing | Shown::Hexadecimal) | None => None,
-    };
-    ReadEntry {
-        at,
-        value,
-        text: rest,
-        span: text.span,
-        numeral: reading.map(|reading| reading.numeral.clone()),
-        doubtful: reading.is_some_and(|reading| reading.shown == Shown::Hexadecimal),
-        known: reading.is_some(),
-    }
 }
 
 /// Whether a line in which nothing was recognised may be an entry all the same: it has a number. Titles and hints have
@@ -373,10 +348,10 @@ mod tests {
         Collector { product: Product::named(product), ..Collector::default() }
     }
 
-    /// Addresses and values of what has been read, and the lines that nobody understands.
+    /// Addresses and values of what has been read, and how many lines were not understood.
     fn taken(mut collector: Collector) -> (String, u64) {
         let reading = collector.take(WalkEnd::Whole);
-        let shown = |entry: &ReadEntry| match &entry.value {
+        let shown = |entry: &ReadEntry| match entry.value() {
             Some(value) => format!("{}={value:?}", entry.at),
             None => format!("{}?{}", entry.at, entry.text),
         };
@@ -449,18 +424,25 @@ mod tests {
     fn where_numbers_are_hexadecimal_without_a_mark_plain_digits_are_not_decimal() {
         let cob_id = "1400h:01 COB-ID C000027F";
         let mut collector = of("AXTC4CO");
-        take(&mut collector, &["1017h Producer Heartbeat Time = 500", "1400h:02 255", "1400h:05 5", "6126h:01 16.000"]);
-        let certain = "1017:00=Unsigned16(500) 1400:02=Unsigned8(255) 1400:05=Unsigned16(5) 6126:01=Real32(16.0)";
+        let plain = ["1017h Producer Heartbeat Time = 500", "1400h:02 255", "1400h:05 5"];
+        take(&mut collector, &plain);
+        take(&mut collector, &["6126h:01 16.000", "6126h:02 0", "6126h:03 20"]);
+        let certain = "1017:00=Unsigned16(500) 1400:02=Unsigned8(255) 1400:05=Unsigned16(5) 6126:01=Real32(16.0) \
+                       6126:02=Real32(0.0) 6126:03=Real32(20.0)";
         assert_eq!(taken(collector.clone()), (certain.into(), 0), "nothing says otherwise");
         take(&mut collector, &[cob_id]);
-        let doubtful = "1017:00?= 500 1400:01?COB-ID C000027F 1400:02?255 1400:05=Unsigned16(5) 6126:01=Real32(16.0)";
+        let doubtful = "1017:00?= 500 1400:01?COB-ID C000027F 1400:02?255 1400:05=Unsigned16(5) 6126:01=Real32(16.0) \
+                        6126:02=Real32(0.0) 6126:03?20";
         let (read, unrecognised) = taken(collector.clone());
-        assert_eq!((read.replace("Producer Heartbeat Time ", "").as_str(), unrecognised), (doubtful, 3));
+        assert_eq!((read.replace("Producer Heartbeat Time ", "").as_str(), unrecognised), (doubtful, 4));
         take(&mut collector, &["1018h:01 Vendor ID 00000055", "1018h:02 Product Code 00010114"]);
+        take(&mut collector, &["1002h Manufacturer Status Register 00000010"]);
         let (read, _) = taken(collector);
         assert!(read.contains("1400:01=Unsigned32(3221226111)"), "{read}");
         assert!(read.contains("1018:01=Unsigned32(85) 1018:02=Unsigned32(65812)"), "{read}");
-        assert!(read.contains("1400:02?255"), "what may be either stays so: {read}");
+        assert!(read.contains("1002:00=Unsigned32(16)"), "nobody writes eight decimal digits: {read}");
+        let either = read.contains("1400:02?255") && read.contains("1017:00?Producer Heartbeat Time = 500");
+        assert!(either, "what may be either stays so: {read}");
     }
 
     #[test]
@@ -513,6 +495,28 @@ mod tests {
         collector.forget(at(half).span);
         assert!(collector.reads(&at(half)) && !collector.reads(&at("press Enter 5")));
         assert_eq!(taken(collector), ("6126:01=Real32(16.0)".into(), 0));
+        // Nor does it come back once it is known whose objects these are.
+        let mut collector = Collector::default();
+        take(&mut collector, &[whole, half]);
+        collector.forget(at(half).span);
+        take(&mut collector, &["1018h:02 Product Code = 0x00010114"]);
+        assert_eq!(taken(collector), ("1018:02=Unsigned32(65812) 6126:01=Real32(16.0)".into(), 0));
+    }
+
+    #[test]
+    fn an_entry_that_is_shown_again_has_its_last_value_whenever_it_was_known_whose_it_is() {
+        let mut collector = Collector::default();
+        take(&mut collector, &["6126h:01 TC1 = 16.000", "6126h:02 TC2 = 17.000"]);
+        collector.product = Product::named("AXTC4CO");
+        take(&mut collector, &["6126h:01 TC1 = 18.000"]);
+        assert_eq!(taken(collector), ("6126:01=Real32(18.0) 6126:02=Real32(17.0)".into(), 0));
+    }
+
+    #[test]
+    fn sub_indices_of_a_list_in_decimal_digits_go_on_where_the_one_before_ended() {
+        let mut collector = Collector::default();
+        take(&mut collector, &["1A00h map: 8=1 9=2 10=3"]);
+        assert_eq!(taken(collector), ("1A00:08?1 1A00:09?2 1A00:0A?3".into(), 0));
     }
 
     #[test]
@@ -520,16 +524,13 @@ mod tests {
         let mut collector = of("AXTC4CO");
         let entry = |number: usize| ReadEntry {
             at: ObjectAddress::new((0x2000 + number / 256) as u16, (number % 256) as u8),
-            value: None,
             text: number.to_string(),
             span: Span::default(),
-            numeral: None,
-            doubtful: false,
-            known: false,
+            reading: None,
         };
-        (0..=MOST_ENTRIES).for_each(|number| collector.keep(entry(number), None));
+        (0..=MOST_ENTRIES).for_each(|number| collector.keep(entry(number)));
         assert_eq!(collector.count(), MOST_ENTRIES);
-        collector.keep(ReadEntry { text: "again".into(), ..entry(7) }, None);
+        collector.keep(ReadEntry { text: "again".into(), ..entry(7) });
         assert_eq!(collector.entries[&entry(7).at].text, "again");
         assert_eq!(collector.count(), MOST_ENTRIES);
     }

@@ -1,8 +1,8 @@
 //! Reading the object dictionary through V (manuals, section 4.1.1).
 //!
-//! The view shows the PDO parameters first and then an object for each Enter, without saying how many there are. So Enter
-//! is pressed until the menu comes back or nothing new comes any more. While the view is open, scanning and CAN may be
-//! halted: every way out of this job leaves it, and checks that the menu is there.
+//! The view shows the PDO parameters first and then an object for each Enter, without saying how many there are. So
+//! Enter is pressed until the menu comes back or nothing new comes any more. While the view is open, scanning and CAN
+//! may be halted: every way out of this job leaves it, and checks that the menu is there.
 
 mod collector;
 mod notation;
@@ -18,27 +18,27 @@ use crate::wire::{Message, Prompt, Text};
 
 /// How long the unit may take to begin an answer.
 const ANSWER: Duration = Duration::from_millis(1200);
-/// Silence after lines that ends an answer: longer than an adapter's latency and a prompt's.
+/// Silence after lines that ends an answer: longer than an adapter's latency, and than the silence that makes a prompt.
 const QUIET: Duration = Duration::from_millis(120);
-/// How long an entry without a line end has to stay as it is before it counts, where it is not known whether the unit ends
-/// its lines: half of one looks like another entry, and a busy computer may keep the other half back for longer than
-/// [`QUIET`].
+/// How long an entry without a line end has to stay as it is before it counts, where it is not known whether the unit
+/// ends its lines: half of one looks like another entry, and a busy computer may keep the other half back for longer
+/// than [`QUIET`].
 const STANDS_STILL: Duration = Duration::from_millis(400);
 /// How long an answer may go on: other text may come without end.
 const LONGEST_ANSWER: Duration = Duration::from_millis(4000);
 /// Answers without an entry after which the walk counts as over: a unit may print a title or a last sentence.
 const IDLE_ANSWERS: u32 = 3;
-/// Keys that are pressed at most; the largest product has 40 objects after its first block.
+/// Most keys that are pressed; the largest product has 40 objects after its first block.
 const MOST_STEPS: u32 = 4_000;
 /// Entries of the menu that show that it is there.
 const MENU_ENTRIES: u32 = 3;
-/// Entries in a hundred that may be missing after a walk for a second one to be worth its time: noise costs single lines,
+/// Up to this many missing entries per hundred read, a second walk is worth its time: noise costs single lines, but
 /// other software may lack whole objects.
 const LOST_ON_THE_LINE: usize = 10;
-/// Answers in a row that are only lines which nobody understands, before the walk is given up: they may be entries in a
-/// layout of their own, of which others can be read. The largest product has 56 objects.
+/// Answers in a row with only lines that are not understood, after which the walk is given up. Such lines may be
+/// entries in a layout of their own, while others can be read. The largest product has 56 objects.
 const UNREAD_ANSWERS: u32 = 400;
-/// Letters of a prompt at least: fewer are in any half of a line.
+/// Fewest letters of a prompt: fewer are in any half of a line.
 const PROMPT_LETTERS: usize = 3;
 /// How often leaving is tried.
 const MOST_EXITS: u32 = 3;
@@ -49,7 +49,7 @@ pub(super) struct ReadDictionary {
     stage: Stage,
     answer: Answer,
     line_ends: LineEnds,
-    /// Answers in a row that were nothing but new lines that nobody understands.
+    /// Answers in a row with nothing but new lines that were not understood.
     unread: u32,
     /// Answers in a row without anything new.
     idle: u32,
@@ -59,6 +59,8 @@ pub(super) struct ReadDictionary {
     steps_of_first_walk: Option<u32>,
     /// Entries of the menu that have been seen, each a bit.
     menu: u32,
+    /// The walk has ended in silence, with nothing missing.
+    may_be_whole: bool,
     deadline: Option<Instant>,
     heard: Option<Span>,
 }
@@ -71,9 +73,9 @@ struct Answer {
     is_fresh: bool,
     /// It has shown any text.
     has_text: bool,
-    /// It has named a product and its version, as a banner does and many a menu.
+    /// It has named a product and its version, as banners and many menus do.
     is_named: bool,
-    /// Lines before it that nobody understood.
+    /// Different lines before it that were not understood.
     unread_before: usize,
 }
 
@@ -85,7 +87,7 @@ struct LineEnds {
     not_ended: u32,
     /// Where an entry without a line end ended when it was first looked at.
     unended: Option<u64>,
-    /// Entries without a line end that have been taken: halves, should it turn out that this unit ends its lines.
+    /// Entries without a line end that have been taken: only halves, if it turns out that this unit ends its lines.
     doubtful: Vec<Span>,
     /// The letters of what followed the last answer without a line end.
     prompt: String,
@@ -113,24 +115,26 @@ impl ReadDictionary {
             most_steps: MOST_STEPS,
             steps_of_first_walk: None,
             menu: 0,
+            may_be_whole: false,
             deadline: None,
             heard: None,
         }
     }
 
-    /// A key is sent now, and what comes from here on answers it.
+    /// Sends keys; what comes from here on is their answer.
     fn ask(&mut self, keys: &[u8], within: Duration, desk: &mut Desk<'_>) {
         desk.send(keys);
         self.answer = Answer { asked_at: desk.now, unread_before: self.collector.unread_lines(), ..Answer::default() };
         self.deadline = Some(desk.now + within);
     }
 
-    /// Takes a line of an answer. What has been read before is not progress: a unit may repaint for ever.
+    /// Takes a line of an answer, and returns whether it was understood. What has been read before is not progress: a
+    /// unit may repaint for ever.
     fn take(&mut self, text: &Text, message: &Message) -> bool {
         self.answer.has_text = true;
         let before = self.collector.count();
         let understood = self.collector.line(text, message);
-        // The second time round everything has been read before.
+        // In a second walk everything has been read before.
         self.answer.is_fresh |= self.collector.count() > before || (self.steps_of_first_walk.is_some() && understood);
         understood
     }
@@ -153,8 +157,8 @@ impl ReadDictionary {
         self.stage = Stage::Leaving { exits, asked: false, then };
     }
 
-    /// Opens the view once more if the line has lost some of it, or if it may have been a banner that ended it: a unit
-    /// that restarts does not do so in the same place twice.
+    /// Opens the view once more, and returns `true`, if the line has lost some entries, or if the walk may have been
+    /// ended by a banner: a unit that restarts does not do so in the same place twice.
     fn walks_again(&mut self, desk: &mut Desk<'_>) -> bool {
         let (missing, count) = (self.collector.missing(), self.collector.count());
         let is_little = missing * 100 <= count * LOST_ON_THE_LINE;
@@ -165,7 +169,6 @@ impl ReadDictionary {
         self.most_steps = if self.answer.is_named { MOST_STEPS } else { self.steps + IDLE_ANSWERS };
         self.collector.interrupt();
         (self.idle, self.steps, self.menu, self.unread) = (0, 0, 0, 0);
-        self.line_ends.unended = None;
         self.ask(b"v", ANSWER, desk);
         self.stage = Stage::Opening;
         true
@@ -194,8 +197,9 @@ impl ReadDictionary {
         Outcome::NoAnswer { job: Job::ReadDictionary, awaited, heard: self.heard }
     }
 
-    /// The last line of an answer may have no end: there are units of either kind, and half an entry looks like another
-    /// one. So it is taken once it stays as it is, from a unit that does not usually end its lines. True if more may come.
+    /// The last line of an answer may have no line end: there are units of either kind, and half an entry looks like
+    /// another one. So it is taken only once it has stopped growing, and only from a unit that does not usually end its
+    /// lines. Returns `true` if more of it may come.
     fn waits_for_the_rest(&mut self, desk: &Desk<'_>) -> bool {
         let Some(text) = desk.pending.filter(|text| self.collector.reads(text)) else {
             if self.answer.is_fresh && matches!(self.stage, Stage::Walking) {
@@ -219,7 +223,7 @@ impl ReadDictionary {
         }
         self.line_ends.not_ended += 1;
         if ends_lines {
-            // Lost with the rest of it: the second walk reads it.
+            // The rest of the line has been lost, and with it the entry: a second walk reads it.
             self.leave_behind(text);
         } else {
             self.line_ends.doubtful.push(text.span);
@@ -232,8 +236,8 @@ impl ReadDictionary {
         self.line_ends.ended > self.line_ends.not_ended
     }
 
-    /// Text without a line end that is not an entry is a prompt, or half of something. That may have been a heading: the
-    /// entries that follow would then belong to another object. A prompt is the same each time.
+    /// Text without a line end that is not an entry is a prompt, or half a line. Half a line may be a new heading, so
+    /// the entries that follow are not taken to belong to the old one. A prompt is the same each time.
     fn leave_behind(&mut self, text: &Text) {
         let letters: String = text.text.chars().filter(|character| character.is_alphabetic()).collect();
         if letters.len() < PROMPT_LETTERS || letters != self.line_ends.prompt {
@@ -269,11 +273,14 @@ impl ReadDictionary {
                 if self.idle >= IDLE_ANSWERS || self.steps >= self.most_steps {
                     let is_whole =
                         self.steps_of_first_walk.is_some() || self.answer.has_text && self.steps < self.most_steps;
+                    let has_all = self.collector.missing() == 0;
                     let outcome = if self.collector.count() == 0 {
                         self.no_answer(Awaited::Entry)
                     } else {
                         self.finished(if is_whole { WalkEnd::Whole } else { WalkEnd::Stopped }, desk)
                     };
+                    // A view may end without a word. If the unit still answers then, that was its end.
+                    self.may_be_whole = has_all && desk.facts.product.is_some() && self.steps < self.most_steps;
                     self.leave(desk, outcome);
                     return None;
                 }
@@ -283,7 +290,15 @@ impl ReadDictionary {
                 self.step(desk);
                 None
             }
-            Stage::Leaving { then, .. } if menu_is_back => Some(then.clone()),
+            Stage::Leaving { then, .. } if menu_is_back => {
+                let mut then = then.clone();
+                if let Outcome::DictionaryRead(reading) = &mut then
+                    && self.may_be_whole
+                {
+                    reading.end = WalkEnd::Whole;
+                }
+                Some(then)
+            }
             Stage::Leaving { asked: asked @ false, .. } => {
                 *asked = true;
                 self.ask(b"m", ANSWER, desk);

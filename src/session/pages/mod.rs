@@ -1,10 +1,9 @@
-//! Which of the lines that come are pages of diagnostics, whoever has asked for them: a user at the keys, another console,
-//! somebody in a recording.
+//! Which of the lines that come are pages of diagnostics, whoever has asked for them: a user at the keys, another
+//! console, somebody in a recording.
 //!
-//! What tells them is what a page is: it comes in one go, has numbers in it, and comes again every second without
-//! anybody having pressed a key (AXTC4CO manual, section 4.1.4). After an S the first one counts at once. Once a
-//! page is known, what looks like it is one as well, and what does not is something else, for instance the answers of a
-//! dialogue that somebody has meanwhile.
+//! A page is known by how it comes: in one go, with numbers in it, and again every second without a key before it
+//! (AXTC4CO manual, section 4.1.4). After an S the first one counts at once. Once a page is known, what looks like it
+//! is a page as well, and what does not is something else, for instance the answers to keys that are pressed meanwhile.
 
 #[cfg(test)]
 mod tests;
@@ -20,9 +19,10 @@ use crate::wire::{LoaderText, MenuKey, Message, Text, diagnostics};
 
 /// How long after a key other than S a line may be its answer.
 const ANSWER: Duration = Duration::from_millis(1000);
-/// How far apart two pages come, one every second: a busy computer moves them, and a unit whose line is full.
+/// Shortest and longest time between the beginnings of two pages. One comes every second, but a busy computer or a full
+/// line shifts them.
 const APART: (Duration, Duration) = (Duration::from_millis(500), Duration::from_millis(1900));
-/// Time without a page after which they have ceased.
+/// Time without a page after which pages count as stopped.
 const CEASED: Duration = Duration::from_secs(3);
 
 /// Listens for pages.
@@ -35,9 +35,9 @@ pub(in crate::session) struct Pages {
     other_key_at: Option<Instant>,
     /// What a page looks like.
     known: Option<Looks>,
-    /// The block before, should it turn out to have been a page.
+    /// The block before the current one, which may turn out to have been a page.
     before: Option<Before>,
-    /// Pages come, and have ceased when none has come by then.
+    /// Set while pages come: when they count as stopped, unless another has come.
     runs_until: Option<Instant>,
 }
 
@@ -46,10 +46,10 @@ pub(in crate::session) struct Pages {
 struct Block {
     lines: Assembler,
     begun: Instant,
-    /// What had been asked for when it began: the key that stops pages may come in its middle.
+    /// What S had been typed for when the block began: the S that stops pages may come in the middle of one.
     begun_with: Switch,
     beside: Beside,
-    /// Lines of it that were counted as such that nobody understands.
+    /// How many of its lines were counted as not understood.
     counted: u64,
 }
 
@@ -94,6 +94,7 @@ impl Switch {
     }
 }
 
+/// The block before the current one.
 #[derive(Debug)]
 struct Before {
     page: Page,
@@ -103,7 +104,7 @@ struct Before {
     counted: u64,
 }
 
-/// What the lines of a page begin with. The rest of them changes: a channel may be open, and have no number.
+/// What the lines of a page begin with. The rest of a line changes: the channel may be open, and have no number.
 #[derive(Debug, Default)]
 struct Looks {
     words: BTreeSet<String>,
@@ -119,8 +120,8 @@ impl Looks {
         first_word(line).is_none_or(|word| self.words.contains(&word))
     }
 
-    /// Whether these lines are mostly of such a page. Where everything else has been left out of them (`is_picked`), most
-    /// of a page has to be left: single lines of a menu or of the view may begin like one of its.
+    /// Whether these lines are mostly of such a page. If lines that do not fit have been removed before (`is_picked`),
+    /// most of the page has to remain: single lines of a menu or of the view may begin like a line of the page.
     fn matches(&self, lines: &[Text], is_picked: bool) -> bool {
         let words: Vec<String> = lines.iter().filter_map(|line| first_word(&line.text)).collect();
         let known: Vec<&String> = words.iter().filter(|word| self.words.contains(*word)).collect();
@@ -147,13 +148,13 @@ impl Pages {
     pub(in crate::session) fn typed(&mut self, typed: &Typed, desk: &mut Desk<'_>) {
         self.key_at = Some(desk.now);
         if *typed == Typed::File {
-            // Anything may answer it.
+            // Anything may answer a file.
             self.other_key(desk.now);
         }
         for key in typed.keys() {
             match key {
                 Key::Menu(MenuKey::Diagnostics) => {
-                    // They may have been on before anybody here has pressed a key.
+                    // Pages may have been on before the first key that is known here.
                     let stops = self.switch.is_on() || desk.facts.diagnostics.is_some();
                     self.switch = if stops { Switch::Off(desk.now) } else { Switch::On(desk.now) };
                     self.block.beside = self.block.beside.max(Beside::SwitchAnswer);
@@ -191,11 +192,11 @@ impl Pages {
             Message::Row(_) => return,
             Message::MenuKey(_) | Message::Prompt(_) => {
                 self.interlude();
-                // The titles of a menu are taken back where it is known that it has come.
+                // Titles of a menu that were counted as not understood are uncounted elsewhere (`Dialogue::menu`).
                 self.block.counted = 0;
                 return;
             }
-            // No page says the name: the unit has restarted, and shows no pages any more.
+            // No page names the product: the unit has restarted, and shows no pages any more.
             Message::Software(name) if name.product.is_some() => {
                 let asked = self.other_key_at.is_some_and(|at| desk.now <= at + ANSWER);
                 self.interlude();
@@ -211,7 +212,7 @@ impl Pages {
                 }
                 return;
             }
-            // The end of a row that the unit has had no room for.
+            // Numbers alone: the end of a row of the stream for which the unit had no room as a whole.
             _ if !has_words(&text.text) => return,
             Message::Software(_) | Message::FirstStart | Message::Network(_) | Message::Refusal | Message::Text => {}
         }
@@ -220,7 +221,7 @@ impl Pages {
             let lines = std::mem::take(&mut self.block.lines);
             self.block = Block { lines, begun: desk.now, begun_with: self.switch, beside, counted: 0 };
         }
-        // By the time the S is answered, keys before it have been.
+        // Keys before the S have been answered by the time the S is.
         let is_newer = |at: Instant| self.switch.at().is_none_or(|switched| switched < at);
         if self.other_key_at.is_some_and(|at| desk.now <= at + ANSWER && is_newer(at)) {
             self.block.beside = Beside::Other;
@@ -238,23 +239,19 @@ impl Pages {
         self.switch.at().is_some_and(|at| now <= at + ANSWER)
     }
 
-    /// The link is gone, or nothing is listened for: the rest of what came last will not come, and what the unit does
-    /// meanwhile nobody knows. What a page looks like stays known.
+    /// The link is gone, or pages are not listened for any more: the rest of the current block will not come, and what
+    /// the unit does meanwhile is unknown. What a page looks like stays known.
     pub(in crate::session) fn interrupt(&mut self) {
-        let has_keys = self.switch != Switch::NotTyped || self.other_key_at.is_some();
-        if self.block.lines.due().is_some() || self.before.is_some() || has_keys {
-            *self = Pages { known: self.known.take(), key_at: self.key_at, ..Pages::default() };
-        }
+        *self = Pages { known: self.known.take(), key_at: self.key_at, ..Pages::default() };
     }
 
     fn restarted(&mut self, desk: &mut Desk<'_>) {
         self.switch.end();
-        self.block.begun_with.end();
         (self.known, self.before) = (None, None);
         self.stopped(desk);
     }
 
-    /// The unit shows its diagnostics, as long as something shows that before `until`.
+    /// Pages come. They count as stopped at `until`, unless something shows before that they still come.
     fn come(&mut self, until: Instant, span: Span, desk: &mut Desk<'_>) {
         self.runs_until = Some(until);
         desk.facts.diagnostics.get_or_insert(span);
@@ -266,13 +263,13 @@ impl Pages {
         self.switch.end();
     }
 
-    /// When it wants to be looked after.
+    /// When to call [`tick`](Pages::tick) next.
     pub(in crate::session) fn due(&self) -> Option<Instant> {
-        // A page that may still be going on says more than the time.
+        // While a page may still be coming, the page decides and not the time.
         self.block.lines.due().or(self.runs_until)
     }
 
-    /// Time has passed: the pages that are complete now.
+    /// Time has passed: returns the pages that are complete now.
     pub(in crate::session) fn tick(&mut self, desk: &mut Desk<'_>) -> Vec<Page> {
         let mut pages = Vec::new();
         if self.block.lines.due().is_some_and(|due| due <= desk.now) {
@@ -284,16 +281,15 @@ impl Pages {
         pages
     }
 
-    /// Nothing more comes of the block under construction: the pages it makes.
+    /// Nothing more comes of the current block: returns the pages that are complete with it.
     pub(in crate::session) fn complete(&mut self, desk: &mut Desk<'_>) -> Vec<Page> {
-        let cut = std::mem::take(&mut desk.cut);
         let page = self.block.lines.complete(desk);
-        let rest = desk.pending.filter(|_| std::mem::replace(&mut desk.cut, cut));
+        let rest = desk.pending.filter(|_| std::mem::take(&mut desk.cut));
         let Some(page) = page else { return Vec::new() };
         let pages = self.judge(page, desk);
-        // The text without a line end has been read as the last line of a page. What may be a question stays one.
+        // The text without a line end has been read as the last line of a page, unless it may be a question.
         let fits = |rest: &Text| self.known.as_ref().is_some_and(|known| known.fits(&rest.text));
-        desk.cut |= rest.is_some_and(|rest| self.block.beside != Beside::Other || fits(rest));
+        desk.cut = rest.is_some_and(|rest| self.block.beside != Beside::Other || fits(rest));
         pages
     }
 
@@ -334,7 +330,7 @@ impl Pages {
             pages.push(page.clone());
             let unrecognised = desk.facts.unrecognised_lines.saturating_sub(counted);
             desk.facts.unrecognised_lines = unrecognised;
-            // A page that was under way before the key that stops them says nothing of what the key has done.
+            // A page that was under way before the S that stops pages does not show what the S has done.
             let is_late = self.switch.at().is_none_or(|at| page.at >= at + UNDER_WAY);
             if is_late || self.switch.is_on() {
                 let span = page.lines.first().map_or(Span::default(), |line| line.span);
@@ -345,12 +341,12 @@ impl Pages {
         pages
     }
 
-    /// Whether a line is one of a page while pages come.
+    /// Whether a line that comes while pages come may be part of one.
     pub(in crate::session) fn owns(&self, line: &str) -> bool {
         self.known.as_ref().is_some_and(|known| known.fits(line))
     }
 
-    /// Whether this block has come after the one before as pages do: nobody has asked for either, and there was silence
+    /// Whether this block has come after the one before as pages do: neither answers a key, and there was silence
     /// between them.
     fn comes_by_itself(&self, before: &Before, end: PageEnd) -> bool {
         let apart = self.block.begun.since(before.begun);

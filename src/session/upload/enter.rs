@@ -1,4 +1,5 @@
-//! The way into the loader: who is there and may have this image, L, the password, a key where one is wanted, the prompt.
+//! The way into the loader: which unit is there, whether the image fits it, L, the password, a key if the loader wants
+//! one, and the loader's prompt.
 
 use super::super::event::{Facts, Outcome, UnitState};
 use super::super::identify::Identify;
@@ -8,42 +9,45 @@ use super::{Answer, Attempt, FILLER, Stage, Transfer, Unheard, UnitNow, Upload, 
 use crate::device::{Product, longest_erase};
 use crate::image::Software;
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderText, Message, Prompt, Text, visible};
+use crate::wire::{LoaderText, Message, Prompt, Text, is_question, visible};
 
 /// How long the unit may take to ask for the password.
 const PASSWORD_PROMPT: Duration = Duration::from_millis(2500);
-/// How long the rest of a question may take that has no sign at its end: a slow unit prints it in pieces, and what is typed
-/// among them may be lost.
+/// How long the rest of a question may take if what has come of it does not end in a sign such as `:`. A slow unit
+/// prints it in pieces, and keys sent between them may be lost.
 const REST_OF_THE_QUESTION: Duration = Duration::from_millis(500);
-/// How long the question may take after something that sounds like a refusal: "A wrong password is refused."
+/// How long the question may take after something that sounds like a refusal, but may be a note before the question: "A
+/// wrong password is refused."
 const QUESTION_AFTER_A_NOTE: Duration = Duration::from_millis(500);
-/// How long a reset into the loader may take, or the refusal of a password.
+/// How long after the password the loader's prompt, or a refusal, may take.
 const LOADER_PROMPT: Duration = Duration::from_secs(8);
 /// How long after a question has been left the unit may ask another one.
 const LEFT: Duration = Duration::from_millis(600);
-/// Silence after the loader's prompt before the first record: whatever else it prints should be out.
+/// Letters that are enough to recognise a question when it comes again.
+const SHORTEST_QUESTION: usize = 3;
+/// Silence after the loader's prompt before the first record: by then whatever else it prints should have come.
 const SETTLE: Duration = Duration::from_millis(80);
-/// How long it may go on printing after its prompt before it is taken for something else.
+/// How long a loader may go on printing after its prompt. Whatever prints longer is not taken for a loader.
 const LONGEST_SETTLE: Duration = Duration::from_secs(3);
-/// How long a loader that was found waiting may take to call what we asked it an error.
+/// How long a loader that was found waiting may take to report the keys sent to identify it as an error.
 const CLEAR_LINE: Duration = Duration::from_millis(300);
-/// How long after the password a loader that wants a key may take to ask for it, before it gets one unasked. Less than
-/// the 10 s for which it wants one (errata E-I12).
+/// How long after the password a loader that wants a key may take to ask for it, before the key is sent unasked. Less
+/// than the 10 s for which the loader waits for a key (errata E-I12).
 const UNASKED_KEY: Duration = Duration::from_millis(3000);
-/// The same after its header.
+/// The same after the loader's header, or after a key that had no effect.
 const UNASKED_KEY_AFTER_HEADER: Duration = Duration::from_millis(1000);
-/// Keys it gets at most: the reset may take longer than expected, and the line may lose one.
+/// How many keys are sent to a loader at most: its reset may take longer than expected, and the line may lose one.
 const MOST_KEYS: u32 = 3;
-/// How long a loader may take after the longest erasing until it says something.
+/// How long a loader may take, after the longest time for erasing, to say something.
 const AFTER_THE_ERASE: Duration = Duration::from_secs(4);
 
 impl Upload {
-    /// Decides, once it is known who is there, whether the image may be sent.
+    /// The unit has been identified, or is silent: decides whether the image may be sent, and asks for the loader.
     pub(super) fn checked(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let facts: Facts = desk.facts.clone();
         self.version_before = facts.version.as_ref().map(|known| known.value);
-        // What an application said before may be true of another unit, since nothing shows that a plug was moved. A loader
-        // does not name its product: it is still the one that was known when it was entered.
+        // What an application said before this job may be true of another unit: nothing shows that the cable was moved.
+        // A loader does not name its product, which is still the one that was known when the loader was entered.
         let is_loader = facts.state == UnitState::Loader;
         let said = facts.product.as_ref().filter(|known| is_loader || known.span.start >= self.asked_from);
         let said = said.map(|known| known.value.clone());
@@ -51,7 +55,6 @@ impl Upload {
             UnitState::Silent if self.may_come_back(desk) => {
                 let mut identify = Identify::default();
                 let outcome = identify.handle(Signal::Begin, desk);
-                self.deadline = identify.deadline();
                 self.stage = Stage::Check(identify);
                 return outcome.and_then(|_| self.checked(desk));
             }
@@ -97,14 +100,14 @@ impl Upload {
         self.transfer = Some(Transfer::new(self.order.image.image(), &known.flash, loader.pacing(), packed, flaw));
         self.mark = desk.received;
         if self.found_in_loader {
-            // The question who is there may still lie in its line buffer: Enter makes an error of it, which is over
-            // before the first record.
+            // The keys sent to identify the loader may still be in its line buffer. Enter makes an error of them now,
+            // and not together with the first record.
             desk.send(b"\r");
             self.stage = Stage::Settle { until: desk.now + LONGEST_SETTLE };
             self.deadline = Some(desk.now + CLEAR_LINE);
         } else {
             desk.send(b"l");
-            // What was heard before is not an answer to it.
+            // What was heard before is not an answer to L.
             self.heard.clear();
             self.stage = Stage::AskedForLoader(Answer::None);
             self.deadline = Some(desk.now + PASSWORD_PROMPT);
@@ -113,7 +116,7 @@ impl Upload {
         None
     }
 
-    /// Something was heard while a loader is being asked for.
+    /// Something was heard after L, or after the password.
     pub(super) fn entering(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
         let password_sent = matches!(self.stage, Stage::PasswordSent);
         match message {
@@ -123,7 +126,7 @@ impl Upload {
             }
             Message::Prompt(Prompt::Password) if !password_sent => {
                 if text.text.trim_end().ends_with(|end: char| !end.is_alphanumeric()) {
-                    self.send_password(desk);
+                    self.send_password(&text.text, desk);
                 } else {
                     self.stage = Stage::AskedForLoader(Answer::Question);
                     self.deadline = Some(desk.now + REST_OF_THE_QUESTION);
@@ -138,7 +141,7 @@ impl Upload {
                 if matches!(message, Message::MenuKey(_)) {
                     return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
                 }
-                // It may ask once more.
+                // The unit may ask for the password once more.
                 self.turn_back(desk, Verdict::UnitRefused, what);
             }
             Message::Prompt(_) if !password_sent => {
@@ -154,19 +157,20 @@ impl Upload {
         None
     }
 
-    /// The unit asks for the password.
-    pub(super) fn send_password(&mut self, desk: &mut Desk<'_>) {
+    /// The unit asks for the password: sends it, or gives up if there is none.
+    pub(super) fn send_password(&mut self, question: &str, desk: &mut Desk<'_>) {
         let Some(password) = &self.order.password else {
             return self.turn_back(desk, Verdict::UnitRefused, "the unit asks for its password, and none was given");
         };
         desk.send_secret(password.reveal());
+        self.question = letters(question);
         self.password_sent = true;
         self.stage = Stage::PasswordSent;
         self.deadline = Some(desk.now + LOADER_PROMPT);
         self.unheard = self.asks_for_key().then_some((desk.now + UNASKED_KEY, Unheard::Key));
     }
 
-    /// The upload ends so, with the application as it was, once the unit asks nothing any more.
+    /// Gives up, with the application as it was: leaves the question at hand, and ends the job once none is open.
     pub(super) fn turn_back(&mut self, desk: &mut Desk<'_>, verdict: Verdict, what: &str) {
         let outcome = self.outcome(desk, verdict, UnitNow::Application, what);
         self.leaving = Some(Leaving::begin(ENTER, LEFT, desk, outcome));
@@ -177,7 +181,7 @@ impl Upload {
         self.turn_back(desk, Verdict::UnitRefused, "the unit refuses to load new software");
     }
 
-    /// The unit has not asked for the password in its time, or in unknown words.
+    /// The unit has not asked for the password in time, or has done so in unknown words.
     pub(super) fn not_asked(&mut self, desk: &mut Desk<'_>) {
         if let Some(question) = desk.pending {
             self.heard = visible::quoted(&question.text);
@@ -192,7 +196,7 @@ impl Upload {
         self.turn_back(desk, verdict, what);
     }
 
-    /// The loader asks for a file.
+    /// The loader has prompted for the file.
     pub(super) fn entered(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.unheard = None;
         if self.cancelled {
@@ -204,7 +208,7 @@ impl Upload {
         None
     }
 
-    /// More is printed after the prompt: the silence starts over.
+    /// The loader has printed more after its prompt: the wait for silence starts over.
     pub(super) fn settling(&mut self, message: &Message, until: Instant, desk: &mut Desk<'_>) -> Option<Outcome> {
         if shows_application(message) || matches!(message, Message::Prompt(Prompt::Password)) {
             let what = "the unit left its loader before the file was sent";
@@ -219,7 +223,7 @@ impl Upload {
         None
     }
 
-    /// A loader that wants a key gets it, and another one should it be lost or come too early.
+    /// Sends a key to a loader that wants one, and later another, in case this one is lost or comes too early.
     pub(super) fn send_key(&mut self, desk: &mut Desk<'_>) {
         if self.keys_sent < MOST_KEYS {
             self.keys_sent += 1;
@@ -228,22 +232,21 @@ impl Upload {
         }
     }
 
-    /// The loader has not asked for the file in time: who is there is asked once more.
+    /// No loader has prompted for the file in time: identifies the unit once more.
     pub(super) fn ask_who(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         self.unheard = None;
         if desk.transmitter.keeps_secret() {
-            // Withdrawn as the job ends.
+            // The password that is still queued is withdrawn as the job ends.
             let what = "the unit asks for its password, but does not take it (held by XOFF)";
             return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
         }
         let mut identify = Identify::default();
         let outcome = identify.handle(Signal::Begin, desk);
-        self.deadline = identify.deadline();
         self.stage = Stage::AskWho(identify);
         outcome.and_then(|_| self.who_is_there(desk))
     }
 
-    /// What has become of a unit that took the password and did not show its loader.
+    /// Decides what has become of a unit that took the password and did not show its loader.
     pub(super) fn who_is_there(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let (unit, what) = match desk.facts.state {
             UnitState::Loader => return self.entered(desk),
@@ -257,9 +260,10 @@ impl Upload {
         self.end(desk, Verdict::UnitRefused, unit, what)
     }
 
-    /// Whether the silent unit may be a loader: one that has lost its place in a record of an upload before this one, and
-    /// takes every question for the rest of it, or one that erases its flash and does not listen. It is more likely if the
-    /// product is known.
+    /// Whether a silent unit is asked again, since it may be a loader: one that an earlier upload has left in the
+    /// middle of a record, and that takes every question for the rest of it, or one that erases its flash and does not
+    /// listen. Only if the order names the product, as it does after an interrupted upload. The first call sends
+    /// [`FILLER`].
     fn may_come_back(&mut self, desk: &mut Desk<'_>) -> bool {
         let Some(product) = self.order.product.as_deref().and_then(Product::named) else { return false };
         if self.patience.is_none() {
@@ -274,7 +278,22 @@ impl Upload {
         desk.send(&FILLER);
     }
 
+    /// The password is out, and the unit asks for it once more, in the words it has asked in before.
+    pub(super) fn is_asked_again(&self, desk: &Desk<'_>) -> bool {
+        desk.pending.filter(|text| is_question(&text.text)).is_some_and(|text| {
+            let asked = letters(&text.text);
+            // The echo of the key may have come before the first one.
+            let is_same = asked.contains(&self.question) || self.question.ends_with(&asked);
+            asked.len() >= SHORTEST_QUESTION && is_same
+        })
+    }
+
     fn asks_for_key(&self) -> bool {
         self.product.as_deref().and_then(Product::named).is_some_and(|product| product.loader.asks_for_key)
     }
+}
+
+/// The letters of a question: what stays of it when it is asked again, perhaps with the number of tries that are left.
+fn letters(question: &str) -> String {
+    question.chars().filter(char::is_ascii_alphabetic).map(|letter| letter.to_ascii_lowercase()).collect()
 }

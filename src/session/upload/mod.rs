@@ -1,11 +1,11 @@
-//! Uploading new software: find out who is there, enter the loader, send, and trust only the new banner.
+//! Uploading new software: identify the unit, enter its loader, send the records, and trust only the new banner.
 //!
-//! The rules, each of which has broken a real upload somewhere:
-//! - no record leaves before the loader's own prompt, and none after the first text that says otherwise: a record
-//!   begins with `S` and may contain `D`, which are keys of the menu;
-//! - text from before a reset proves nothing about after it: each stage reads what is newer than its mark;
-//! - "loaded" proves only that the end record arrived; product and version in the new banner have to be the image's;
-//! - every wait has an end, and every end says what the unit is now.
+//! The rules, each learnt from an upload that failed:
+//! - no record leaves before the loader has prompted for the file, and at most one more after the first text that does
+//!   not come from a loader taking records: a record begins with `S` and may contain `D`, which are keys of the menu;
+//! - text printed before a reset proves nothing about the time after it: each stage ignores text older than its mark;
+//! - "loaded" proves only that the end record arrived; the new banner has to name the image's product and version;
+//! - every wait has an end, and every report says what state the unit is in now.
 
 mod enter;
 mod pages;
@@ -24,15 +24,18 @@ use super::identify::Identify;
 use super::job::{Desk, Signal, Work};
 use super::leaving::Leaving;
 use crate::image::DefectId;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::version::Version;
-use crate::wire::{Message, Prompt};
+use crate::wire::{Message, Prompt, visible};
 use transfer::Transfer;
 use verify::After;
 
-/// What brings a loader out of a record it has lost its place in: as many digits as the longest record has (it takes
-/// anything for a digit), and a line end. At a menu Enter does nothing.
+/// Gets a g3 out of a record in which it has lost its place: enough characters to fill the longest record (the loader
+/// takes any character for a digit), and a line end. At a menu Enter does nothing.
 const FILLER: [u8; 516] = [b'\r'; 516];
+
+/// How long a question may go on that begins like the one for the password.
+const ASKED_AGAIN: Duration = Duration::from_millis(80);
 
 /// The job.
 pub(super) struct Upload {
@@ -42,32 +45,37 @@ pub(super) struct Upload {
     version_before: Option<Version>,
     transfer: Option<Transfer>,
     stage: Stage,
-    /// The unit is not asked for its loader any more, but may still ask something.
+    /// Set once the upload has been given up before the reset: the unit may still have a question open, which is left.
     leaving: Option<Leaving>,
+    /// When the stage is looked at again. One that asks who is there has a deadline of its own.
     deadline: Option<Instant>,
-    /// What is to be sent if nothing is heard until then.
+    /// What is sent at this time, unless what is heard until then makes it unnecessary.
     unheard: Option<(Instant, Unheard)>,
     /// The password has been queued.
     password_sent: bool,
-    /// Keys a loader that wants one has got.
+    /// The letters of the question that it answers.
+    question: String,
+    /// When that question counts as asked again.
+    asked_again: Option<Instant>,
+    /// How many keys have been sent to a loader that wants one.
     keys_sent: u32,
-    /// What speaks against the image for this unit.
+    /// Why the image does not fit this unit, if the upload was refused for that.
     misfit: Option<DefectId>,
-    /// When a loader that was found waiting was asked something that may still be answered.
+    /// When the last key before the first record was sent to a loader that was found waiting. It may answer late.
     asked_in_loader: Option<Instant>,
     /// The unit was waiting in its loader when it was found.
     found_in_loader: bool,
     attempt: Attempt,
-    /// How long a silent unit is asked again and again.
+    /// Until when a silent unit is asked again and again.
     patience: Option<Instant>,
-    /// What the unit says from this offset on answers the question who is there.
+    /// Bytes received before this job began. A product that was named earlier may be that of another unit.
     asked_from: u64,
-    /// Text that begins before this offset is history.
+    /// Text that begins before this offset, in bytes received, is too old for the current stage.
     mark: u64,
     /// The last text heard in this job that was not a row of the stream.
     heard: String,
     cancelled: bool,
-    /// When a hold is reported again.
+    /// When a hold that lasts is reported again.
     hold_due: Option<Instant>,
     after: After,
     progress: Option<Progress>,
@@ -75,45 +83,46 @@ pub(super) struct Upload {
     first_data: Option<(Instant, usize)>,
 }
 
-/// What is kept of one pass through the file; the next one starts from scratch.
+/// The state of one pass through the file, reset before the next one.
 #[derive(Debug, Default)]
 struct Attempt {
-    /// Lines of unknown words since the loader has acknowledged anything, and the records sent before the first.
+    /// Lines of unknown words since the loader last acknowledged anything.
     strange: usize,
+    /// Records that had been sent when the first of these lines came.
     strange_from: usize,
-    /// Letters of a text without a line end among the records, and until when something that may be talking is heard out
-    /// before the next record goes.
+    /// Letters of the text without a line end that was heard last.
     talk: String,
+    /// Before this time no record leaves: words that have come are heard out.
     talks_until: Option<Instant>,
-    /// The loader has been brought out of a record once.
+    /// [`FILLER`] has been queued, and all of it leaves unless the loader is heard first.
     filled: bool,
 }
 
 enum Stage {
     Check(Identify),
-    /// L is out.
+    /// L has been sent.
     AskedForLoader(Answer),
-    /// The password is out.
+    /// The password has been sent.
     PasswordSent,
-    /// No loader has asked for the file: who is there is asked.
+    /// No loader has prompted for the file in time: the unit is identified again.
     AskWho(Identify),
-    /// The loader's prompt has been seen; more of it may come, until then at most.
+    /// The loader has prompted for the file and may go on printing, until `until` at the latest.
     Settle {
         until: Instant,
     },
     Transfer,
-    /// The end record is out; the unit has to have come back by then.
+    /// The end record has been sent; the unit has to be back by `until`.
     Finish {
         until: Instant,
     },
-    /// The unit runs but has not said its version: it is asked.
+    /// The application runs but has not said its version: it is asked for it.
     AskVersion(Identify),
-    /// The loader, or something else, has said that it is over; whether the loader waits again decides what the unit is now.
+    /// The transfer has failed. What is heard next, such as the loader's prompt, decides what is reported of the unit.
     Failing {
         what: String,
         unit: UnitNow,
         phase: Phase,
-        /// What happens as soon as the loader waits for a file again, if anything does.
+        /// Whether and why everything is sent again as soon as the loader prompts.
         then: Option<Again>,
     },
 }
@@ -123,25 +132,25 @@ enum Stage {
 enum Answer {
     /// Nothing that is understood.
     None,
-    /// Something that sounds like a refusal, and may be a note before the question.
+    /// Something that sounds like a refusal, but may be a note before the question.
     Refusal,
-    /// The question for the password, which it may still be printing.
+    /// The question for the password, which the unit may still be printing.
     Question,
 }
 
 /// Why everything is sent once more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Again {
-    /// It was too fast for the loader.
+    /// The records came too fast for the loader.
     Slower,
-    /// The loader has answered late what was asked before the first record: the error is not that record's.
+    /// The error was the loader's late answer to a key sent before the first record; no record caused it.
     AsBefore,
 }
 
-/// What is to be sent to a loader that is not heard.
+/// What is sent to a loader from which nothing, or nothing that is understood, is heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Unheard {
-    /// The key it must be waiting for.
+    /// The key for which it is assumed to wait.
     Key,
     /// [`FILLER`].
     Filler,
@@ -159,6 +168,8 @@ impl Upload {
             deadline: None,
             unheard: None,
             password_sent: false,
+            question: String::new(),
+            asked_again: None,
             keys_sent: 0,
             misfit: None,
             found_in_loader: false,
@@ -186,7 +197,7 @@ impl Upload {
                 self.turn_back(desk, Verdict::Interrupted, "cancelled before anything was changed");
                 None
             }
-            // The reset cannot be called back; what the unit is afterwards is worth a few seconds.
+            // The reset cannot be called off. Within a few seconds it shows what state the unit is in.
             Stage::PasswordSent | Stage::AskWho(_) => {
                 self.cancelled = true;
                 None
@@ -209,7 +220,7 @@ impl Upload {
         }
     }
 
-    /// What the unit is, as long as nothing has been done to it.
+    /// The state in which the unit was found; it holds as long as nothing has changed the unit.
     fn as_found(&self, desk: &Desk<'_>) -> UnitNow {
         match desk.facts.state {
             UnitState::Application => UnitNow::Application,
@@ -218,7 +229,7 @@ impl Upload {
         }
     }
 
-    /// The port is gone. What the unit is now follows from how far it was seen to come.
+    /// The port is gone: the unit's state is inferred from the stage that was reached.
     fn link_lost(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let (unit, what) = match self.stage {
             Stage::Check(_) => (self.as_found(desk), "the connection was lost before anything was changed"),
@@ -246,27 +257,29 @@ impl Upload {
         if self.hold_due.take_if(|due| *due <= desk.now).is_some() {
             self.report_progress(desk);
         }
+        let is_asked_again = matches!(self.stage, Stage::PasswordSent) && self.is_asked_again(desk);
+        self.asked_again = is_asked_again.then(|| self.asked_again.unwrap_or(desk.now + ASKED_AGAIN));
+        if self.asked_again.is_some_and(|due| due <= desk.now) {
+            self.heard = desk.pending.map(|text| visible::quoted(&text.text)).unwrap_or_default();
+            self.turn_back(desk, Verdict::UnitRefused, "the unit did not accept the password");
+            return None;
+        }
         let due = self.deadline.is_some_and(|deadline| deadline <= desk.now);
         match &mut self.stage {
-            Stage::Check(identify) => {
-                let outcome = identify.handle(Signal::Tick, desk);
-                self.deadline = identify.deadline();
-                outcome.and_then(|_| self.checked(desk))
-            }
+            Stage::Check(identify) => identify.handle(Signal::Tick, desk).and_then(|_| self.checked(desk)),
             &mut Stage::AskedForLoader(answer) if due => {
                 match answer {
-                    Answer::Question => self.send_password(desk),
+                    Answer::Question => {
+                        let question = self.heard.clone();
+                        self.send_password(&question, desk);
+                    }
                     Answer::Refusal => self.refused(desk),
                     Answer::None => self.not_asked(desk),
                 }
                 None
             }
             Stage::PasswordSent if due => self.ask_who(desk),
-            Stage::AskWho(identify) => {
-                let outcome = identify.handle(Signal::Tick, desk);
-                self.deadline = identify.deadline();
-                outcome.and_then(|_| self.who_is_there(desk))
-            }
+            Stage::AskWho(identify) => identify.handle(Signal::Tick, desk).and_then(|_| self.who_is_there(desk)),
             Stage::Settle { .. } if due => {
                 desk.cut = true;
                 self.mark = desk.received;
@@ -275,18 +288,20 @@ impl Upload {
             }
             Stage::Transfer => self.transfer(desk),
             Stage::Finish { .. } if due => self.judge(desk),
-            Stage::AskVersion(identify) => {
-                let outcome = identify.handle(Signal::Tick, desk);
-                self.deadline = identify.deadline();
-                outcome.and_then(|_| self.judge(desk))
-            }
+            Stage::AskVersion(identify) => identify.handle(Signal::Tick, desk).and_then(|_| self.judge(desk)),
             Stage::Failing { .. } if due => self.failed(desk),
             _ => None,
         }
     }
 }
 
-/// Whether only an application says so.
+/// Whether a unit says that it takes no more passwords for now: "Locked for 20 s".
+fn tells_of_a_lock(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    lower.contains("lock") || lower.contains("too many")
+}
+
+/// Whether only an application prints such a message.
 fn shows_application(message: &Message) -> bool {
     match message {
         Message::MenuKey(_) | Message::FirstStart | Message::Row(_) => true,
@@ -298,15 +313,23 @@ fn shows_application(message: &Message) -> bool {
 impl Work for Upload {
     fn handle(&mut self, signal: Signal<'_>, desk: &mut Desk<'_>) -> Option<Outcome> {
         if let Some(leaving) = &mut self.leaving {
-            // Why nothing is uploaded has been decided.
-            return leaving.handle(signal, leaving.then(), desk);
+            // Why nothing is uploaded has been decided. The unit may still say what came of it.
+            if let Signal::Heard(text, _) = signal
+                && tells_of_a_lock(&text.text)
+            {
+                self.heard = visible::quoted(&text.text);
+            }
+            let mut outcome = leaving.handle(signal, leaving.then(), desk);
+            if let Some(Outcome::Loaded(report)) = &mut outcome {
+                report.heard.clone_from(&self.heard);
+            }
+            return outcome;
         }
         match signal {
             Signal::Begin => {
                 self.asked_from = desk.received;
                 if let Stage::Check(identify) = &mut self.stage {
                     identify.handle(Signal::Begin, desk);
-                    self.deadline = identify.deadline();
                 }
                 None
             }
@@ -331,12 +354,8 @@ impl Work for Upload {
                 match &mut self.stage {
                     Stage::Check(identify) | Stage::AskWho(identify) | Stage::AskVersion(identify) => {
                         identify.handle(Signal::Heard(text, message), desk);
-                        let asking = identify.deadline();
                         if matches!(self.stage, Stage::AskVersion(_)) {
                             self.finishing(message, text.span.end, desk);
-                        }
-                        if matches!(self.stage, Stage::Check(_) | Stage::AskWho(_) | Stage::AskVersion(_)) {
-                            self.deadline = asking;
                         }
                         None
                     }
@@ -361,7 +380,11 @@ impl Work for Upload {
         if let Some(leaving) = &self.leaving {
             return Some(leaving.due());
         }
-        [self.deadline, self.unheard.map(|(due, _)| due), self.hold_due].into_iter().flatten().min()
+        let stage = match &self.stage {
+            Stage::Check(identify) | Stage::AskWho(identify) | Stage::AskVersion(identify) => identify.deadline(),
+            _ => self.deadline,
+        };
+        [stage, self.unheard.map(|(due, _)| due), self.hold_due, self.asked_again].into_iter().flatten().min()
     }
 
     fn awaits(&self, prompt: Prompt) -> bool {
@@ -387,7 +410,7 @@ mod tests {
         assert!(shows_application(&Message::MenuKey(MenuKey::View)));
         assert!(shows_application(&Message::FirstStart));
         assert!(shows_application(&software(Some(Version::new(1, 2, 0)))));
-        // A loader names the product as well.
+        // A loader may name the product, too.
         assert!(!shows_application(&software(None)));
         assert!(!shows_application(&Message::Text) && !shows_application(&Message::Loader(LoaderText::Waiting)));
     }

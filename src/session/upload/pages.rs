@@ -1,26 +1,27 @@
 //! Where a loader that keeps one page stops its sender.
 //!
-//! The product's file says how many words a page has, which is a belief: no manual does, and the parts that may be in
-//! these units have pages of other sizes. As long as the loader stops us where it should, the assumption holds, and only
-//! records that cross are awaited. As soon as it does not, or does elsewhere, every record is awaited until one size of
-//! page explains all that was seen; if none does, that goes on to the end of the file, slow and safe.
+//! How many words a page has is assumed from the product's file: no manual says it, and the parts that may be in these
+//! units have pages of other sizes. As long as the loader stops us where it should, the assumption holds, and a hold is
+//! awaited only after records that cross into another page. As soon as the loader does not stop us there, or stops us
+//! elsewhere, a hold is awaited after every record until one page size explains all that was seen. If none does, that
+//! goes on to the end of the file, slowly but safely.
 
 use std::ops::RangeInclusive;
 
 /// Sizes a page may have, in words: those of the parts of this kind, and some to spare on either side.
 const SIZES: [u32; 6] = [64, 128, 256, 512, 1024, 2048];
 
-/// Holds that a size has to explain before it is assumed.
+/// Holds that a size has to explain before it counts as known.
 const PROOF: u32 = 2;
 
 /// What is known of the pages.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Pages {
-    /// So many words each.
+    /// This many words each.
     Words(u32),
-    /// Not known: any of these, by what was seen so far, and this many holds were seen.
+    /// Not known yet: the sizes that explain what was seen so far, and how many holds that was.
     Watched { possible: Vec<u32>, holds: u32 },
-    /// It never stops its sender, whatever its pages are.
+    /// The loader never stops its sender, so its page size does not show.
     Unheld,
 }
 
@@ -30,8 +31,8 @@ impl Pages {
         Pages::Watched { possible: SIZES.to_vec(), holds: 0 }
     }
 
-    /// Whether the loader may stop us after a record of these words, which follow those that end with `before`.
-    /// Pages are assumed to have `believed` words.
+    /// Whether the loader may stop us after a record of these words; `before` is the last word before them. `believed`:
+    /// words of a page as assumed, used for a loader that never stops us.
     pub(super) fn may_hold(&self, believed: u32, before: Option<u32>, words: &RangeInclusive<u32>) -> bool {
         match self {
             Pages::Words(size) => crosses(*size, before, words),
@@ -40,7 +41,7 @@ impl Pages {
         }
     }
 
-    /// The loader has stopped us after a record that was alone on its way, or has not.
+    /// Notes whether the loader has stopped us (`held`) after a record that was alone on its way.
     pub(super) fn seen(&mut self, before: Option<u32>, words: &RangeInclusive<u32>, held: bool) {
         let Pages::Watched { possible, holds } = self else { return };
         possible.retain(|&size| crosses(size, before, words) == held);
@@ -55,13 +56,14 @@ impl Pages {
     }
 }
 
-/// Whether, with pages of this many words, data goes on in another page than the data before it ended in.
+/// Whether, with pages of this many words, a record begins in another page than the data before it ended in, or goes on
+/// into another.
 fn crosses(size: u32, before: Option<u32>, words: &RangeInclusive<u32>) -> bool {
     let page = |word: u32| word / size.max(1);
     page(*words.start()) != page(*words.end()) || before.is_some_and(|before| page(before) != page(*words.start()))
 }
 
-/// Whether no page of any size begins among the words of these records, the first of which begins one.
+/// Whether these records stay within one page, whatever its size.
 pub(super) fn fit_any_page<'a>(records: impl Iterator<Item = &'a RangeInclusive<u32>>) -> bool {
     let mut before = None;
     for words in records {

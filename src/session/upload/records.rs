@@ -1,21 +1,22 @@
-//! The records of an upload, rebuilt from the image: upper case, CR after each (the newer loaders take nothing
-//! else), a four-byte header address, whole words, no count records.
+//! The records of an upload, rebuilt from the image: upper case, CR after each (a g3 takes nothing else), a four-byte
+//! header address, whole words, no count records.
 
 use std::ops::RangeInclusive;
 
 use crate::image::Image;
 use crate::image::srecord::{self, Kind, Record};
 
-/// Data bytes of a packed record: as many as an S3 record can have beside its address and its sum.
+/// Most data bytes of a packed record: as many as an S3 record can have besides its address and its checksum.
 pub(super) const LONGEST: usize = 250;
-/// Characters of a data record besides its data: type, count, address, sum, line end.
+/// Characters of a data record besides its data: type, count, address, checksum, line end.
 const AROUND: usize = 15;
-/// The shortest packed record: what compilers write.
+/// Fewest data bytes of a packed record: as many as compilers write.
 const SHORTEST: usize = 32;
 
-/// Data bytes of a packed record for a loader that acknowledges each, `late` characters of the line after it has come,
-/// and of which no more than `window` characters may be on their way. As long as can be without the line ever standing
-/// still: so many records fill the window that the first is acknowledged before the last has left.
+/// Data bytes of a packed record for a loader that acknowledges each record. `late` is how long after a record its
+/// acknowledgement comes, in characters of the line; `window` is how many characters may be on their way
+/// unacknowledged. The records are as long as they can be without the line ever standing still: enough of them fill the
+/// window that the first is acknowledged before the last has left.
 pub(super) fn longest_acknowledged(window: usize, late: usize) -> usize {
     let records = window.div_ceil(window.saturating_sub(late).max(1)).max(2);
     let data = (window / records).saturating_sub(AROUND) / 2;
@@ -27,7 +28,7 @@ pub(super) fn longest_acknowledged(window: usize, late: usize) -> usize {
 pub(super) struct Outgoing {
     /// The text with its line end.
     pub(super) text: Vec<u8>,
-    /// Addresses of the first and the last word of a data record.
+    /// Addresses of the first and the last word of a data record; `None` for header and end.
     pub(super) words: Option<RangeInclusive<u32>>,
 }
 
@@ -36,12 +37,12 @@ pub(super) struct Outgoing {
 pub(super) enum Size {
     /// As many as in the file.
     AsInFile,
-    /// So many, where the image goes on without a gap.
+    /// This many, as far as the image goes on without a gap.
     Packed(usize),
 }
 
-/// What ends a record. The newer loaders take nothing else: LF after it is an error, LF alone mutes them
-/// (docs/loaders.md).
+/// What ends a record. A g3 takes nothing else: an LF after the CR is an error, and with LF alone it waits for the CR
+/// for ever, without a word (docs/loaders.md).
 pub(super) const LINE_END: &[u8] = b"\r";
 
 /// All records: header, data, end.
@@ -59,7 +60,7 @@ pub(super) fn build(image: &Image, size: Size, line_end: &[u8]) -> Vec<Outgoing>
         let last = address.saturating_add((data.len().div_ceil(2) as u32).saturating_sub(1));
         let mut data = data.to_vec();
         if data.len() % 2 == 1 {
-            data.push(0xFF); // Half a word is filled up as erased flash reads.
+            data.push(0xFF); // Half a word is filled up with what erased flash reads as.
         }
         let record = Record { kind: Kind::Data32, address, data: &data };
         records.push(Outgoing { text: line(&|text| record.write(text)), words: Some(address..=last) });
@@ -79,12 +80,13 @@ pub(super) fn build(image: &Image, size: Size, line_end: &[u8]) -> Vec<Outgoing>
     records
 }
 
-/// Characters of these records.
+/// Characters of these records, line ends included.
 pub(super) fn characters(records: &[Outgoing]) -> usize {
     records.iter().map(|record| record.text.len()).sum()
 }
 
-/// The header's text: no more than fits a record, and nothing that would act on us when a loader echoes it.
+/// The header's text: no more than fits a record, with dots for characters that would act on us when a loader echoes
+/// them.
 pub(super) fn header(image: &Image) -> Vec<u8> {
     let printable = |&byte: &u8| if matches!(byte, b' '..=b'~') { byte } else { b'.' };
     image.header.iter().take(srecord::LONGEST_HEADER).map(printable).collect()

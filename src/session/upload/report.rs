@@ -1,7 +1,7 @@
-//! What an upload reports: how far it is, how it ended, and what to do next.
+//! What an upload reports: its progress, how it ended, and what to do next.
 //!
-//! The words of a report are for a user who has to act on it and cannot see the unit; the evidence for them is gathered in
-//! `telling.rs`. Nothing here decides anything.
+//! The words of a report are for a user who has to act on it and cannot see the unit; the evidence for them is gathered
+//! in `telling.rs`. Nothing here decides anything.
 
 use crate::image::DefectId;
 use crate::time::Duration;
@@ -24,20 +24,20 @@ pub struct Progress {
     pub address: u32,
     /// Time since the first record left.
     pub elapsed: Duration,
-    /// Time since the unit had taken the first data: after the header a loader may erase for ten seconds, which says
-    /// nothing of how fast it takes data.
+    /// Time since the unit had taken the first data. After the header a loader may erase for ten seconds, which says
+    /// nothing about the rate at which it takes data.
     pub moving: Duration,
     /// Characters it has taken since then.
     pub moved: usize,
     /// How long the unit has held us by XOFF, if it does.
     pub held: Option<Duration>,
-    /// Everything is being sent once more: the loader has shown that it had lost something. The counts are those of this
-    /// time, and begin at 0.
+    /// Everything is being sent once more: the loader has shown that it had lost something. The counts are those of the
+    /// second pass, and begin at 0.
     pub again: bool,
 }
 
 impl Progress {
-    /// Characters a second since the first data; 0 before.
+    /// Characters per second since the first data; 0 before.
     pub fn rate(&self) -> f64 {
         let seconds = self.moving.as_secs_f64();
         if seconds > 0.0 { self.moved as f64 / seconds } else { 0.0 }
@@ -47,7 +47,7 @@ impl Progress {
     pub fn eta(&self) -> Option<Duration> {
         let rest = self.bytes_total.saturating_sub(self.bytes) as f64;
         let rate = self.rate();
-        // Less than a character a second is a unit that holds us, for an unknown time.
+        // At less than a character per second the unit is holding us, for an unknown time.
         (rate >= 1.0).then(|| Duration::from_secs_f64(rest / rate))
     }
 }
@@ -59,13 +59,13 @@ pub enum Phase {
     Check,
     /// Asking for the loader: L, password, reset.
     EnterLoader,
-    /// The loader erases; only loaders that do so at once.
+    /// The loader erases all of its flash after the header; only g3 does so.
     Erase,
     /// Records are on their way.
     Transfer,
-    /// The terminator is out, the loader has to say how it went.
+    /// The terminator has been sent: the loader finishes, and the unit has to come back.
     Finish,
-    /// The unit restarts; its banner has to name the image's product and version.
+    /// The unit is back; it has to name the image's product and version.
     Verify,
 }
 
@@ -76,13 +76,13 @@ pub struct LoadReport {
     pub verdict: Verdict,
     /// What a success rests on.
     pub proof: Proof,
-    /// How far it came.
+    /// The step in which it ended.
     pub phase: Phase,
     /// What is at the other end now.
     pub unit: UnitNow,
-    /// It was waiting in its loader when it was found: what software it has was not known before either.
+    /// The unit was found waiting in its loader: which software it had was unknown from the beginning.
     pub found_in_loader: bool,
-    /// The password has been sent to it.
+    /// The password has been sent to the unit.
     pub password_sent: bool,
     /// Product, as far as known.
     pub product: Option<String>,
@@ -102,41 +102,41 @@ pub struct LoadReport {
     pub what: String,
     /// The text the verdict rests on, as printed (control characters made visible), shortened.
     pub heard: String,
-    /// What speaks against the image for this unit, if that is why it was refused; it can be allowed by this name.
+    /// Why the image does not fit this unit, if it was refused for that; `--allow` takes this name.
     pub misfit: Option<DefectId>,
-    /// Where the loader has shown an assumption to be wrong, in one sentence.
+    /// Which assumption about the loader has turned out to be wrong, in one sentence.
     pub remark: Option<String>,
 }
 
-/// How long a loader that is being sent a file says nothing at most: it stops its sender for each page, several times a
-/// second, and has two seconds for starting over.
+/// How long a loader can be silent at most while it is sent a file: it stops its sender for each page, several times a
+/// second, and may take two seconds to start over.
 pub const SILENT: Duration = Duration::from_millis(2500);
 
-/// What to do about a unit that has a part of the file and of which nothing is heard any more ([`LoadReport::doubt`]).
+/// What to do about a unit that has part of the file and is not heard any more ([`LoadReport::doubt`]).
 pub const SEE_POWER: &str = "see that it has power and that the cable is in, and send the file again: it has no complete \
                              software and comes back to its loader";
 
 impl LoadReport {
-    /// Whether the unit has a part of the file and was last known in its loader. Once it is [`SILENT`], it may as well be
-    /// without power.
+    /// Whether the unit has part of the file and was last known in its loader. If it has been silent for [`SILENT`], it
+    /// may just as well be without power.
     pub fn left_in_the_middle(&self) -> bool {
         self.verdict == Verdict::Failed && self.unit == UnitNow::Loader && self.records > 0
     }
 
-    /// What can be said of a unit that was left in the middle and of which nothing is heard any more, since its link is
-    /// lost or it is silent; to follow "the unit is". [`SEE_POWER`] is what to do then, in place of
+    /// What can be said of a unit that was left in the middle of the file and is not heard any more, because its link
+    /// is lost or it is silent; to follow "the unit is". The advice is then [`SEE_POWER`] instead of
     /// [`LoadReport::advice`]. `None` if what the report says of the unit still holds.
     pub fn doubt(&self, is_lost: bool, is_silent: bool) -> Option<&'static str> {
         match (is_lost, is_silent) {
             _ if !self.left_in_the_middle() => None,
-            // Behind a lost link nobody can say that it is silent.
+            // Without a link it cannot be known whether the unit is silent.
             (true, _) => Some("in its loader, or without power"),
             (false, true) => Some("silent: in its loader, or without power"),
             (false, false) => None,
         }
     }
 
-    /// What the user should do now, by what is true of the unit; to follow other words.
+    /// What the user should do now, depending on the state of the unit. It begins in lower case, to follow other words.
     pub fn advice(&self) -> &'static str {
         match (self.verdict, self.unit) {
             (Verdict::Done, _) if self.proof == Proof::Missing => {
@@ -200,15 +200,15 @@ impl LoadReport {
 pub enum Proof {
     /// Its new banner, which has to name product and version of the image.
     Banner,
-    /// Nothing can: the image has no identity that a banner could be compared with.
+    /// Nothing: the image has no identity that a banner could be compared with.
     Missing,
 }
 
 /// Verdict on an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The unit runs the image: its new banner says so. For an image that does not say what it is, the banner says what the
-    /// unit runs, and nothing more is known.
+    /// The unit runs the image: its new banner says so. For an image that does not say what it is, the banner says what
+    /// the unit runs, and nothing more is known.
     Done,
     /// Refused before anything was changed: wrong product, or product unknown.
     Refused,
@@ -224,14 +224,14 @@ pub enum Verdict {
     Interrupted,
 }
 
-/// What a unit is after an upload.
+/// The state of a unit after an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnitNow {
     /// The application runs.
     Application,
     /// It waits in its loader for a file.
     Loader,
-    /// It is not known.
+    /// Not known.
     Unknown,
 }
 

@@ -1,4 +1,4 @@
-//! What is reported of an upload: its size beforehand, how far it is, and how it ended.
+//! What is reported of an upload: its size beforehand, its progress, and how it ended.
 
 use super::super::event::{Event, LoadOrder, Outcome};
 use super::super::job::Desk;
@@ -11,8 +11,8 @@ use transfer::Transfer;
 /// How often a hold is reported while it lasts.
 const HOLD_TOLD: Duration = Duration::from_secs(1);
 
-/// Records and characters that an order sends to the loader it is expected to meet: the one the user has named, else that
-/// of the product, which is the image's unless another one is named.
+/// How many records and characters an order sends. That depends on the loader: the one the order names, else that of
+/// the product it names, else that of the image's product, else one that stops its sender for pages.
 pub(in crate::session) fn size(order: &LoadOrder) -> (usize, usize) {
     let image_for = || order.image.identity().map(|identity| identity.product.as_str());
     let product = order.product.as_deref().or_else(image_for).and_then(Product::named);
@@ -37,7 +37,7 @@ impl Upload {
         if records > 1 {
             self.first_data.get_or_insert((desk.now, bytes));
         } else {
-            self.first_data = None; // It begins, perhaps again.
+            self.first_data = None; // No data has been taken yet, perhaps in a second pass.
         }
         let (first, before) = self.first_data.unwrap_or((desk.now, bytes));
         let progress = Progress {
@@ -79,7 +79,7 @@ impl Upload {
         }
     }
 
-    /// The upload is over.
+    /// Ends the upload with this verdict.
     pub(super) fn end(
         &self,
         desk: &Desk<'_>,
@@ -90,7 +90,7 @@ impl Upload {
         Some(self.outcome(desk, verdict, unit, what))
     }
 
-    /// What is to be said of it if it ends so at this moment.
+    /// The report on an upload that ends now.
     pub(super) fn outcome(&self, desk: &Desk<'_>, verdict: Verdict, unit: UnitNow, what: impl Into<String>) -> Outcome {
         let transfer = self.transfer.as_ref();
         let records = transfer.map_or(0, |transfer| transfer.reached().sent);
@@ -103,7 +103,7 @@ impl Upload {
             found_in_loader: self.found_in_loader,
             password_sent: self.password_sent && !desk.transmitter.keeps_secret(),
             product: self.product.clone(),
-            // A loader does not say; a journal may know.
+            // A loader does not say what ran before; the journal of an earlier upload may know.
             version_before: self.version_before.or(self.order.ran),
             version_after: self.after.version.map(|(_, version)| version),
             records,
@@ -113,11 +113,12 @@ impl Upload {
             what: what.into(),
             heard: self.heard.clone(),
             misfit: self.misfit,
-            // Before a loader has taken everything, what it seems to be may have been a unit without power.
+            // If the upload failed, what looked like a loader of another kind may have been a unit without power.
             remark: transfer.and_then(Transfer::remark).filter(|_| verdict == Verdict::Done),
         }))
     }
 
+    /// Keeps the last text heard, other than a row of the stream, for the report.
     pub(super) fn quote(&mut self, text: &Text, message: &Message) {
         if !matches!(message, Message::Row(_)) {
             self.heard = visible::quoted(&text.text);

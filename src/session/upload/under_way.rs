@@ -1,4 +1,5 @@
-//! Records on their way: what is heard meanwhile, when the next ones wait for it, and what a failure makes of the unit.
+//! During the transfer: what the unit says, when the next record waits because of it, and in what state a failure
+//! leaves the unit.
 
 use super::super::event::Outcome;
 use super::super::flaw::Flaw;
@@ -9,36 +10,37 @@ use super::{Again, Stage, Unheard, UnitNow, Upload, Verdict, records, shows_appl
 use crate::time::{Duration, Instant};
 use crate::wire::{LoaderError, LoaderText, Message, Prompt, Text, complains, visible};
 
-/// How long the loader may take after an error to say that it waits again.
+/// How long after an error the loader may take to prompt for the file again.
 const RESTART: Duration = Duration::from_secs(2);
-/// Lines of unknown words that a loader may print between two acknowledgements: it may have something to say of its
-/// erasing. A menu that takes records for keys says one or two after each.
+/// Lines of unknown words that a loader may print between two acknowledgements: it may report that it erases. A menu
+/// that takes records for keys prints one or two lines after each record.
 const MOST_STRANGE: usize = 3;
-/// Records per such line from which on they are a loader's own way to show its progress: one for each page.
+/// From this many records per line of unknown words on, the lines are taken for a loader's progress, one for each page.
 const RECORDS_TO_A_PAGE: usize = 4;
-/// How long words are given to become something that is known: text whose line end was lost is looked at after 60 ms of
-/// silence, with an adapter of 20 ms on the way.
+/// How long no record leaves after words that are not (yet) understood: text whose line end was lost is looked at only
+/// after 60 ms of silence (`PROMPT_QUIET`), and an adapter adds 20 ms.
 const HEARD_OUT: Duration = Duration::from_millis(100);
-/// How long an application that shows itself there may take for the rest of its banner.
+/// How long an application that shows itself after a failure may take for the rest of its banner.
 const BANNER_REST: Duration = Duration::from_millis(300);
-/// How long a loader with a ring may be silent after the end record, before it is taken to wait for the rest of it.
+/// How long a loader with a ring may be silent after the end record before it is assumed to wait for the rest of it.
 const END_UNHEARD: Duration = Duration::from_millis(1500);
-/// How late a loader that was found waiting may answer what it was asked before the first record, on a busy computer.
+/// How late, on a busy computer, a loader that was found waiting may answer the keys sent before the first record.
 const LATE_ANSWER: Duration = Duration::from_secs(2);
-/// The loaders' number for a record that came while another was parked.
+/// Error number of g1 and g2 for a record that came while there was no place left to park it.
 const OVERRUN: u32 = 5;
-/// Their number for characters lost or damaged on the line, as those are that come while a page is written.
+/// Error number of g1 and g2 for characters that were lost or damaged on the line, or came while a page was written.
 const DAMAGED: u32 = 1;
 
 impl Upload {
-    /// Whether the text is the header's, which some loaders echo, whatever it says.
+    /// Whether the text is the header's, which some loaders echo. It may read like any message.
     pub(super) fn is_echo_of_header(&self, text: &Text) -> bool {
         let header = records::header(self.order.image.image());
         let header = String::from_utf8_lossy(&header);
         !header.trim().is_empty() && text.text.trim() == header.trim()
     }
 
-    /// Something was heard while records are on their way: anything but the loader's progress ends the transfer.
+    /// Something was heard during the transfer. Anything but the loader's progress ends it, except a few lines of
+    /// unknown words.
     pub(super) fn transferring(&mut self, text: &Text, message: &Message, desk: &mut Desk<'_>) {
         let failed = match message {
             _ if self.is_echo_of_header(text) => None,
@@ -90,7 +92,7 @@ impl Upload {
             Some((what, unit)) => {
                 desk.transmitter.clear();
                 if unit != UnitNow::Loader {
-                    // What was on its way may have been keys for a menu: leave whatever dialogue they opened.
+                    // The records on their way may have acted as keys of a menu: leave whatever question they opened.
                     desk.leave_dialogue();
                 }
                 let then = self.deserves_another(message, desk);
@@ -100,8 +102,8 @@ impl Upload {
         }
     }
 
-    /// Until when no record goes, because something talks. A loader that takes records makes marks; words may be the
-    /// first ones of a unit that has restarted, whose keys the records would be.
+    /// Until when no record leaves because words are coming. A loader that takes records prints only marks; words may
+    /// begin the banner of a unit that has restarted, which would take the records for keys.
     pub(super) fn hears_out(&mut self, desk: &Desk<'_>) -> Option<Instant> {
         let words = desk.pending.map_or("", |text| &text.text);
         let talks = has_a_word(words) || desk.pending.is_some_and(|text| self.is_complaint(text));
@@ -114,11 +116,12 @@ impl Upload {
         self.attempt.talks_until.filter(|&until| desk.now < until && self.order.flaw != Some(Flaw::SendsBehindErrors))
     }
 
-    /// Whether a text without a line end says that something is wrong. The line end may be lost, or a question follow.
+    /// Whether a text without a line end is a complaint. Its line end may be lost, or it may go on as a question.
     fn is_complaint(&self, text: &Text) -> bool {
         self.order.flaw != Some(Flaw::SendsBehindErrors) && !self.is_echo_of_header(text) && complains(&text.text)
     }
 
+    /// Lets the next records go, unless words are heard out, the loader complains, or the transfer has stalled.
     pub(super) fn transfer(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         if let Some(until) = self.hears_out(desk) {
             self.deadline = Some(until);
@@ -136,7 +139,8 @@ impl Upload {
             Ok(false) => self.deadline = transfer.deadline(),
             Ok(true) => {
                 self.mark = desk.received;
-                // What follows the dots of the records on their line is newer than the end record all the same.
+                // The dots for earlier records have no line end: what follows them is newer than the end record, though
+                // it is on the same line.
                 desk.cut = true;
                 self.stage = Stage::Finish { until: desk.now + LONGEST_RETURN };
                 self.deadline = Some(desk.now + NEW_BANNER);
@@ -162,12 +166,13 @@ impl Upload {
         None
     }
 
-    /// Whether the loader complains of something that would not be so the next time, and why.
+    /// Whether a second pass may succeed after this error, and for what reason.
     pub(super) fn deserves_another(&mut self, message: &Message, desk: &Desk<'_>) -> Option<Again> {
         let Message::Loader(LoaderText::Error(error)) = message else { return None };
         let transfer = self.transfer.as_ref()?;
         let is_too_fast = match error {
-            // Characters that came while it was deaf are not an overrun, and may have been damaged on the line as well.
+            // A loader that is sent characters while it is deaf reports DAMAGED, but so does one on a bad line. It
+            // counts only if the loader's holds have not come where they were expected.
             LoaderError::Number(number) => *number == OVERRUN || *number == DAMAGED && transfer.is_surprised(),
             LoaderError::Status(_) => false,
         };
@@ -178,14 +183,14 @@ impl Upload {
         (desk.now < asked_at + LATE_ANSWER && transfer.has_hardly_begun()).then_some(Again::AsBefore)
     }
 
-    /// Nothing is sent any more; what comes after `mark` says what the unit is now.
+    /// The transfer has failed: what is heard from offset `mark` on, in bytes received, decides what the unit is now.
     pub(super) fn fail(&mut self, desk: &Desk<'_>, mark: u64, what: String, unit: UnitNow, then: Option<Again>) {
         self.mark = mark;
         self.stage = Stage::Failing { what, unit, phase: self.phase(), then };
         self.deadline = Some(desk.now + RESTART);
     }
 
-    /// Nothing more will be heard that says what the unit is now.
+    /// The time in which the unit could show what it is now is over: ends the job.
     pub(super) fn failed(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let Stage::Failing { what, unit, .. } = &self.stage else { return None };
         let (mut what, unit) = (what.clone(), *unit);
@@ -197,7 +202,7 @@ impl Upload {
         self.end(desk, Verdict::Failed, unit, what)
     }
 
-    /// Something was heard after a failure: the loader may wait for a file again.
+    /// Something was heard after a failure: the loader may prompt again, or an application may show itself.
     pub(super) fn failing(&mut self, message: &Message, desk: &mut Desk<'_>) -> Option<Outcome> {
         let Stage::Failing { what, phase, then, .. } = &self.stage else { return None };
         match message {
@@ -209,7 +214,6 @@ impl Upload {
                         Again::Slower => transfer.start_over_slowly(),
                         Again::AsBefore => transfer.begin_again(),
                     }
-                    self.report_progress(desk);
                     return self.entered(desk);
                 }
                 self.end(desk, Verdict::Failed, UnitNow::Loader, what)
@@ -218,10 +222,7 @@ impl Upload {
                 let what = what.clone();
                 self.after.note(message);
                 self.stage = Stage::Failing { what, unit: UnitNow::Application, phase: *phase, then: None };
-                // Which software it runs is on a line of its own, before or after.
-                if self.after.is_complete() {
-                    return self.failed(desk);
-                }
+                // Product and version may be on another line, before this one or after it.
                 self.deadline = self.deadline.min(Some(desk.now + BANNER_REST));
                 None
             }
@@ -229,8 +230,9 @@ impl Upload {
         }
     }
 
-    /// Something is heard: what was to be sent to a loader that is not heard need not be, or not to its end. The marks
-    /// of records before are not it: without a line end they are heard late.
+    /// After the end record or a failure the unit is heard: what would be sent to a silent loader is not needed, and
+    /// the rest of a [`FILLER`](super::FILLER) is withdrawn. Progress marks do not count: having no line end, those of
+    /// earlier records are heard late.
     pub(super) fn listen(&mut self, message: &Message, desk: &mut Desk<'_>) {
         match self.stage {
             _ if matches!(message, Message::Loader(LoaderText::Progress)) => {}
@@ -251,7 +253,7 @@ impl Upload {
     }
 }
 
-/// Whether a text says something: damage and digits do not.
+/// Whether a text has a word in it, which damaged characters and digits of a record do not make.
 fn has_a_word(text: &str) -> bool {
     text.split(|c: char| !c.is_ascii_alphabetic())
         .any(|word| word.len() >= 4 && !word.bytes().all(|c| c.is_ascii_hexdigit()))
@@ -266,9 +268,23 @@ mod tests {
         for text in ["Erasing sector 5", "0x0400: done", "x1yz Vorg\u{e4}nge", "\u{1}\u{2}ready\u{3}"] {
             assert!(has_a_word(text), "{text:?}");
         }
-        // Four letters at least, and not all of them digits of a record.
+        // A word has at least four letters, not all of them hexadecimal digits.
         for text in ["", "ok 12 go", "S3150000", "DEADBEEF cafe", "a1b2c3d4", "0123456789", "...."] {
             assert!(!has_a_word(text), "{text:?}");
         }
+    }
+
+    #[test]
+    fn the_echo_of_the_header_is_no_complaint_whatever_it_says() {
+        use crate::image::{check, srecord};
+        use crate::record::Span;
+        use crate::session::LoadOrder;
+        let mut file = Vec::new();
+        srecord::write_header(b"FAILSAFE", &mut file);
+        file.extend_from_slice(b"\nS307000000001122C5\nS70500000000FA\n");
+        let report = check(file.as_slice(), None, &[], None, &[]).expect("a slice");
+        let upload = Upload::new(LoadOrder::new(report.image().expect("nothing is wrong with it"), None));
+        let complains = |text: &str| upload.is_complaint(&Text { span: Span::default(), text: text.to_owned() });
+        assert!(!complains("FAILSAFE") && !complains(" FAILSAFE ") && complains("FAILSAFE: off"));
     }
 }

@@ -1,4 +1,4 @@
-//! After the end record: what comes back has to say that it is what was sent.
+//! After the end record: the new banner has to name what was sent.
 
 use super::super::event::Outcome;
 use super::super::flaw::Flaw;
@@ -13,14 +13,14 @@ use crate::wire::{Confidence, LoaderText, Message, Prompt};
 pub(super) const NEW_BANNER: Duration = Duration::from_secs(20);
 /// A loader that prompts again after the end record may still hand over to the application after a start delay.
 const SECOND_PROMPT: Duration = Duration::from_secs(3);
-/// All of that at most, whatever is said meanwhile: a unit that restarts again and again is not waited for.
+/// Limit for all waits after the end record together, whatever the unit says: one that keeps restarting is given up.
 pub(super) const LONGEST_RETURN: Duration = Duration::from_secs(30);
 /// Silence after product and version that ends the banner.
 const BANNER_QUIET: Duration = Duration::from_millis(300);
-/// Silence after a menu, or rows, without a version before the unit is asked.
+/// How long after a menu, or after the first row, without a version the unit is asked for it.
 const ASK_VERSION: Duration = Duration::from_millis(1000);
 
-/// What has been heard since the end record.
+/// What the unit has said since the end record, or since a failure.
 #[derive(Default)]
 pub(super) struct After {
     pub(super) product: Option<String>,
@@ -30,7 +30,7 @@ pub(super) struct After {
 }
 
 impl After {
-    /// Notes what an application says of itself. Gives `false` for everything else.
+    /// Notes what an application says of itself. Returns `false` for every other message.
     pub(super) fn note(&mut self, message: &Message) -> bool {
         match message {
             Message::Software(name) => {
@@ -45,7 +45,7 @@ impl After {
                 }
                 true
             }
-            // A stream that was on comes back with the application, LSS and the network are reported by it alone.
+            // Only an application prints these: a stream that was on resumes with it; no loader reports network or LSS.
             Message::MenuKey(_) | Message::Row(_) | Message::Network(_) => {
                 self.application = true;
                 true
@@ -60,7 +60,7 @@ impl After {
 }
 
 impl Upload {
-    /// Something was heard after the end record. It ends at `end` in the record.
+    /// Something was heard after the end record. Its text ends at offset `end`, in bytes received.
     pub(super) fn finishing(&mut self, message: &Message, end: u64, desk: &mut Desk<'_>) {
         if self.order.flaw == Some(Flaw::BelievesTheLoader)
             && matches!(message, Message::Loader(LoaderText::Loaded | LoaderText::Started))
@@ -81,17 +81,12 @@ impl Upload {
                 self.after = After { loader_waits: true, ..After::default() };
                 self.wait_until(desk.now + SECOND_PROMPT);
             }
-            Message::Loader(LoaderText::Loaded) => {
-                if let Some(transfer) = &mut self.transfer {
-                    transfer.take_all_sent();
-                }
-            }
             _ if self.after.note(message) => {
                 let asked = desk.now + ASK_VERSION;
                 match (message, self.after.is_complete()) {
                     (Message::Software(_), true) => self.wait_until(desk.now + BANNER_QUIET),
                     (Message::MenuKey(_), false) => self.wait_until(asked),
-                    // Rows may come faster than that: the unit is asked between them.
+                    // Rows may come faster than that, so a later one does not put the question off.
                     (Message::Row(_) | Message::Network(_), false) => {
                         self.deadline = self.deadline.map(|deadline| deadline.min(asked));
                     }
@@ -102,14 +97,14 @@ impl Upload {
         }
     }
 
-    /// What comes back is judged then, or when the time for all of it is over.
+    /// What has come back is judged at `due`, or earlier if the time for the whole stage ends before.
     fn wait_until(&mut self, due: Instant) {
         if let Stage::Finish { until } = self.stage {
             self.deadline = Some(due.min(until));
         }
     }
 
-    /// The banner is complete, or its time is over.
+    /// The banner is complete, or the time for it is over: decides how the upload ended, or asks for the version.
     pub(super) fn judge(&mut self, desk: &mut Desk<'_>) -> Option<Outcome> {
         let image = self.order.image.identity().cloned();
         let version = self.after.version.map(|(_, version)| version);
@@ -149,7 +144,6 @@ impl Upload {
                 let mut identify = Identify::default();
                 let outcome = identify.handle(Signal::Begin, desk);
                 debug_assert!(outcome.is_none(), "a question has to wait for its answer");
-                self.deadline = identify.deadline();
                 self.stage = Stage::AskVersion(identify);
                 None
             }

@@ -1,7 +1,8 @@
 //! Lines in columns: of an entry, or with several entries side by side.
 //!
 //! A number of one or two digits is a sub-index only where the layout says so: in a column of its own after an index,
-//! before an equals sign in a list of such, or at the head of a column that goes on where the one before it ended.
+//! before an equals sign in a list like `1=16.000, 2=17.000`, or at the head of a column, if it follows the sub-index
+//! of the column before.
 
 use super::{COLUMNS, SubIndex, ViewLine, address, sub_at_head};
 
@@ -35,7 +36,7 @@ pub(super) fn join(words: &[(usize, &str)]) -> String {
 }
 
 /// Ways in which a line may be read as entries in columns, the likeliest first. Each counts only if all of its entries
-/// have a value; what a line says as a whole, [`super::line`] reads.
+/// have a value. What a line says as a whole is read by [`super::line`].
 pub fn several(text: &str, knows: impl Fn(u16) -> bool) -> Vec<Vec<ViewLine>> {
     let columns = of(text);
     [side_by_side(&columns, &knows), listed(&columns, &knows), one(&columns, &knows).map(|line| vec![line])]

@@ -1,8 +1,8 @@
 //! Lines of V, the view of the object dictionary (manuals, section 4.1.1).
 //!
 //! The manuals fix hexadecimal indices and nothing else. So a line is read by its tokens: an index in one of its usual
-//! spellings, a sub-index beside it or at the head of a line below, and the rest, out of which a caller who knows the entry
-//! picks its value ([`value()`]). A line that leaves a doubt stays text.
+//! spellings, a sub-index beside it or at the head of a line below, and the rest, out of which a caller who knows the
+//! entry picks its value ([`value()`]). A line that leaves a doubt stays text.
 
 mod columns;
 mod value;
@@ -17,11 +17,11 @@ pub struct ViewLine {
     pub index: Option<u16>,
     /// Sub-index, where the line names one.
     pub sub: Option<SubIndex>,
-    /// The line without the two.
+    /// The line without index and sub-index.
     pub rest: String,
 }
 
-/// A sub-index as printed. Units write it in hexadecimal or in decimal digits; only its neighbours tell which.
+/// A sub-index as printed. Units write it in hexadecimal or in decimal digits; only its neighbours show which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SubIndex {
     /// Its digits as hexadecimal ones.
@@ -31,7 +31,7 @@ pub struct SubIndex {
 }
 
 impl SubIndex {
-    /// The sub-index that is meant after the one before it.
+    /// The sub-index that is meant, if it follows `before`.
     pub fn behind(self, before: Option<u8>) -> u8 {
         let next = before.map_or(0, |before| before.saturating_add(1));
         match self.decimal {
@@ -115,8 +115,8 @@ fn address(token: &str) -> Option<(u16, Option<SubIndex>, bool)> {
     Some((index, Some(sub), marked || bracketed || matches!(separator, "sub" | ":")))
 }
 
-/// A sub-index in tokens of its own after an index, and how many tokens it takes: `sub 1`, `sub-index: 01`, `[1]`, `01h`;
-/// also within the brackets of the index: `(6126h, 1)`.
+/// A sub-index in tokens of its own after an index, and how many tokens it takes: `sub 1`, `sub-index: 01`, `[1]`,
+/// `01h`; also within the brackets of the index: `(6126h, 1)`.
 fn sub_behind(index: &str, tokens: &[&str]) -> (Option<SubIndex>, usize) {
     let Some((sub, taken)) = sub_at_head(tokens) else { return (None, 0) };
     let first = tokens[0];

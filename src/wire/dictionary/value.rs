@@ -1,7 +1,7 @@
 //! Which of the words after an entry's address is its value.
 //!
-//! The caller knows the entry's type, the names it may carry, and its unit. What can be read in two ways is not a value: a
-//! decimal comma, another unit of the same quantity, two numbers of which either could be meant.
+//! The caller knows the entry's type, the names it may carry, and its unit. What can be read in two ways is not a
+//! value: a decimal comma, another unit of the same quantity, two numbers of which either could be meant.
 
 use crate::canopen::{DataType, Value};
 use crate::wire::units::unit;
@@ -24,7 +24,7 @@ pub enum Shown {
     Value(Value),
     /// Nothing: the unit has no number for it at the moment.
     Nothing,
-    /// Digits that only a unit prints that writes hexadecimal numbers without a mark: `C000027F`, `FA 00 00 00`.
+    /// Digits as only a unit prints them that does not mark hexadecimal numbers: `C000027F`, `FA 00 00 00`.
     Hexadecimal,
 }
 
@@ -33,9 +33,9 @@ pub enum Shown {
 pub struct Reading {
     /// What it says.
     pub shown: Shown,
-    /// What of the line says it.
+    /// The part of the line that says it.
     pub numeral: String,
-    /// Nothing but decimal digits says it: where numbers are hexadecimal without a mark it is another one.
+    /// The numeral has only decimal digits: if the unit does not mark hexadecimal numbers, the value is another one.
     pub plain: bool,
 }
 
@@ -61,7 +61,7 @@ pub fn value(rest: &str, expected: &Expected<'_>) -> Option<Reading> {
     let mut tokens: Vec<Token<'_>> = columns
         .flat_map(|(column, cell)| cell.split_whitespace().map(move |text| Token { text: Some(text), column }))
         .collect();
-    // A name may begin another: `Heartbeat Time` and `Heartbeat Time 1`.
+    // A name may be the beginning of another: `Heartbeat Time` and `Heartbeat Time 1`.
     let mut names = expected.names.to_vec();
     names.sort_by_key(|name| std::cmp::Reverse(name.len()));
     for name in names {
@@ -79,7 +79,7 @@ pub fn value(rest: &str, expected: &Expected<'_>) -> Option<Reading> {
     let found = candidates(&tokens, expected)?;
     let hexadecimal = unmarked_hexadecimal(&tokens, expected.data_type);
     let Some(place) = found.iter().map(|(place, _)| *place).min() else {
-        // Nothing that could be read otherwise.
+        // No number that could be the value.
         return match hexadecimal[..] {
             [numeral] => Some(Reading { shown: Shown::Hexadecimal, numeral: numeral.to_owned(), plain: false }),
             [] => no_number(&tokens),
@@ -88,7 +88,7 @@ pub fn value(rest: &str, expected: &Expected<'_>) -> Option<Reading> {
     };
     let mut meant = found.iter().filter(|(at, _)| *at == place).map(|(_, reading)| reading);
     let one = meant.next()?.clone();
-    // Another number of the line that looks more like the value than this one does.
+    // An unmarked hexadecimal number on the same line may be the value instead.
     let is_same =
         |digits: &&str| i64::from_str_radix(digits, 16).ok().and_then(|number| expected.data_type.integer(number));
     let is_doubtful =
@@ -96,13 +96,13 @@ pub fn value(rest: &str, expected: &Expected<'_>) -> Option<Reading> {
     if is_doubtful || meant.any(|other| other.shown != one.shown) {
         return None;
     }
-    // `250 (0xFA)`: the other spelling says how this one is meant.
+    // `250 (0xFA)`: the other spelling shows how this one is meant.
     let plain = found.iter().filter(|(_, other)| other.shown == one.shown).all(|(_, other)| other.plain);
     Some(Reading { plain: plain && hexadecimal.is_empty(), ..one })
 }
 
-/// What stands for a value where the unit has no number: words without a digit after an equals sign, as in `= not set`, or
-/// signs alone at the end, as in `****`.
+/// What stands for a value where the unit has no number: words without a digit after an equals sign, as in `= not set`,
+/// or signs alone at the end, as in `****`.
 fn no_number(tokens: &[Token<'_>]) -> Option<Reading> {
     let nothing = |numeral: String| Some(Reading { shown: Shown::Nothing, numeral, plain: false });
     let texts: Vec<&str> = tokens.iter().filter_map(|token| token.text).collect();
@@ -212,7 +212,7 @@ fn is_alone(tokens: &[Token<'_>], at: usize) -> bool {
     })
 }
 
-/// The bytes of a value that is printed as such; a single one is a number.
+/// The bytes of a value that is printed byte by byte; a single one is a number.
 fn bytes<'a>(tokens: &[Token<'a>]) -> Option<Vec<&'a str>> {
     let is_byte = |token: &&Token<'a>| token.text.is_some_and(|text| text.len() == 2 && is_hexadecimal(text));
     (0..tokens.len()).find_map(|at| {
@@ -286,7 +286,7 @@ fn read(word: &str, expected: &Expected<'_>) -> Option<Reading> {
     if let Some(shown) = parse(word, expected.data_type) {
         return Some(reading(shown, word));
     }
-    // `16ms`, `24.1V`. Letters that are hexadecimal digits as well are units only after a point.
+    // `16ms`, `24.1V`. Letters that are also hexadecimal digits count as a unit only if the number has a point.
     let end = word.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '+' | '-')))?;
     let (numeral, behind) = word.split_at(end);
     let is_sure =
@@ -311,16 +311,25 @@ fn parse(word: &str, data_type: DataType) -> Option<Shown> {
     let motorola = lower.strip_prefix('$').map(|digits| format!("0x{digits}"));
     let word = motorola.as_deref().unwrap_or(word);
     if data_type == DataType::Real32 {
-        // The bits of a number are all of them, and `40490E10` is nobody's number.
+        // A number that is given as its bits has eight digits. `40490E10` is such bits, and not a number with an
+        // exponent.
         let marked = lower.strip_prefix(['$']).or(lower.strip_prefix("0x")).or(lower.strip_suffix('h'));
         if marked.map_or(lower.contains('e') && is_hexadecimal(&lower), |digits| digits.len() != 8) {
             return None;
         }
     }
-    match data_type.parse(word)? {
+    match data_type.parse(word).or_else(|| negative(&lower, data_type))? {
         Value::Real32(number) if number.is_nan() => Some(Shown::Nothing),
         value => Some(Shown::Value(value)),
     }
+}
+
+/// A negative number in hexadecimal digits: as many as its type has say that the first bit is the sign.
+fn negative(word: &str, data_type: DataType) -> Option<Value> {
+    let digits = word.strip_prefix(['$']).or(word.strip_prefix("0x")).or(word.strip_suffix('h'))?;
+    let bits = data_type.bytes() * 8;
+    let number = i64::from_str_radix(digits, 16).ok().filter(|_| digits.len() * 4 == bits && bits < 64)?;
+    data_type.integer(number - (1 << bits))
 }
 
 fn plain_unit(word: &str) -> &str {
@@ -331,7 +340,7 @@ fn plain_unit(word: &str) -> &str {
 /// `24061 mV` is not 24061 V.
 fn fits(printed: &str, own: Option<&str>) -> bool {
     let (Some(printed), Some(own)) = (unit(printed), own) else { return true };
-    // `0.1 °C` counts tenths of it.
+    // The unit `0.1 °C` counts tenths of a degree.
     let (factor, name) = own.rsplit_once(' ').map_or((None, own), |(factor, name)| (Some(factor), name));
     unit(name).is_none_or(|own| own.quantity != printed.quantity || (own == printed && factor.is_none()))
 }
@@ -396,6 +405,18 @@ mod tests {
         ] {
             assert_eq!(whole(rest, data_type, names), expected, "{rest:?}");
         }
+    }
+
+    #[test]
+    fn as_many_hexadecimal_digits_as_a_signed_type_has_show_a_negative_number() {
+        let read = |rest: &str, data_type| shown(rest, data_type, &["TC1"], None);
+        for rest in ["TC1 = FF38h", "TC1 = $FF38", "TC1 = 0xff38", "TC1 = -200"] {
+            assert_eq!(read(rest, DataType::Integer16), Some(Shown::Value(Value::Integer16(-200))), "{rest:?}");
+        }
+        assert_eq!(read("TC1 = 7FFFh", DataType::Integer16), Some(Shown::Value(Value::Integer16(0x7FFF))));
+        assert_eq!(read("TC1 = FFFFFF38h", DataType::Integer32), Some(Shown::Value(Value::Integer32(-200))));
+        assert_eq!(read("TC1 = FF38h", DataType::Unsigned16), Some(Shown::Value(Value::Unsigned16(0xFF38))));
+        assert_eq!(read("TC1 = 1FF38h", DataType::Integer16), None, "more digits than it has");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Uploads: the way into the loader, and what comes back after the end record.
 
+use axcon::device::longest_erase;
 use axcon::session::{LoadOrder, Phase, Proof, UnitNow, UnitState};
 use axcon::version::Version;
 
@@ -40,14 +41,19 @@ fn the_password_is_asked_for_in_many_words_and_sent_when_the_question_is_complet
 
 #[test]
 fn a_question_behind_l_that_is_not_understood_is_quoted_and_gets_no_password() {
-    for (script, heard) in [
-        (&[("l", 5, "Parole bitte: ")][..], "Parole bitte:"),
-        (&[("l", 5, "Das Zauberwort\r\n> ")], "Das Zauberwort"),
-        (&[("l", 5, "Load new software? Enter Yes: ")], "Load new software? Enter Yes:"),
+    for (script, heard, what) in [
+        (&[("l", 5, "Parole bitte: ")][..], "Parole bitte:", "the unit asks something that is not understood"),
+        (&[("l", 5, "Das Zauberwort\r\n> ")], "Das Zauberwort", "the unit does not ask for its password in words"),
+        (
+            &[("l", 5, "Load new software? Enter Yes: ")],
+            "Load new software? Enter Yes:",
+            "the unit asks for something other than the password",
+        ),
     ] {
         let (report, alone) = upload_behind(script);
         assert_eq!((report.verdict, report.unit), (Verdict::NoAnswer, UnitNow::Application), "{report:?}");
         assert_eq!((report.heard.as_str(), report.password_sent), (heard, false), "{report:?}");
+        assert!(report.what.starts_with(what), "{report:?}");
         assert!(!report.advice().contains("check the password"), "{}", report.advice());
         assert_eq!((password_at(&alone), alone.sent.last().map(|(_, text)| text.as_str())), (None, Some("~")));
     }
@@ -60,7 +66,7 @@ fn an_upload_that_turns_back_leaves_every_question_the_unit_asks() {
     const OTHER: (&str, u64, &str) = ("l", 5, "Load new software? Enter Yes: ");
     const PASSWORD: (&str, u64, &str) = ("l", 5, "Password: ");
     type Script = &'static [(&'static str, u64, &'static str)];
-    let table: [(Script, Verdict, &str); 4] = [
+    let table: [(Script, Verdict, &str); 5] = [
         (&[OTHER], Verdict::NoAnswer, "l ~"),
         (&[OTHER, ("~", 300, "\r\nSure? ")], Verdict::NoAnswer, "l ~ ~"),
         (&[PASSWORD, ("AXIO-2010", 40, "\r\nWrong password\r\n")], Verdict::UnitRefused, "l AXIO-2010 ~ ~"),
@@ -69,6 +75,15 @@ fn an_upload_that_turns_back_leaves_every_question_the_unit_asks() {
             Verdict::UnitRefused,
             "l AXIO-2010 ~ ~ ~",
         ),
+        // Known again by its own words.
+        (
+            &[
+                ("l", 5, "Authorisation code: "),
+                ("AXIO-2010", 40, "\r\nsorry\r\nauthorisation code (attempt 2 of 3): "),
+            ],
+            Verdict::UnitRefused,
+            "l AXIO-2010 ~ ~",
+        ),
     ];
     for (script, verdict, sent) in table {
         let (report, alone) = upload_behind(script);
@@ -76,6 +91,11 @@ fn an_upload_that_turns_back_leaves_every_question_the_unit_asks() {
         let from_l = alone.sent.iter().map(|(_, text)| text.as_str()).skip_while(|text| *text != "l");
         assert_eq!(from_l.collect::<Vec<_>>().join(" "), sent);
     }
+    // What came of it is quoted, and not only that the password was wrong.
+    let locked =
+        [PASSWORD, ("AXIO-2010", 40, "\r\nWrong password\r\nPassword: "), ("~", 0, ""), ("~", 5, "\r\nLocked.\r\n")];
+    let (report, _) = upload_behind(&locked);
+    assert_eq!((report.what.as_str(), report.heard.as_str()), ("the unit did not accept the password", "Locked."));
 }
 
 #[test]
@@ -176,6 +196,13 @@ fn a_unit_that_comes_back_with_rows_alone_is_asked_for_its_version() {
 }
 
 #[test]
+fn a_unit_that_comes_back_with_a_menu_without_its_name_is_asked_a_second_later() {
+    let named = "AXTC4CO V1.2.0\r\nV - View Object Dictionary\r\nT - Toggle Stream\r\nL - Load New Software\r\n";
+    let (report, time, log) = end_of_an_upload(&[(100, NAMELESS_MENU)], &[("\u{11}m", 5, named)]);
+    assert_eq!((report.verdict, log.as_str(), time), (Verdict::Done, "\u{11}m", 1_100 + 5 + 150), "{report:?}");
+}
+
+#[test]
 fn a_loader_that_names_itself_and_wants_a_key_is_one_and_either_alone_is_not() {
     let state = |text: &str| {
         let mut session = Session::new(115_200);
@@ -240,6 +267,9 @@ fn a_name_that_was_heard_before_the_upload_may_be_that_of_another_unit() {
     assert_eq!(report.verdict, Verdict::UnitRefused, "{}", report.what);
     let (report, _) = load(MENU, None);
     assert_eq!((report.verdict, report.product.as_deref()), (Verdict::Refused, Some("AXRTD8CO")), "{}", report.what);
+    let (report, _) = load(MENU, Some("AXTC4CO"));
+    assert_eq!((report.verdict, report.product.as_deref()), (Verdict::Refused, Some("AXRTD8CO")), "{}", report.what);
+    assert_eq!(report.what, "the unit is an AXRTD8CO, not an AXTC4CO");
 }
 
 #[test]
@@ -273,4 +303,106 @@ fn a_note_before_the_question_is_not_a_refusal_and_a_refusal_is_left_with_enter(
     assert_eq!(report.what, "the unit refuses to load new software");
     let pressed = alone.sent.iter().find(|(_, text)| text == "l").expect("L").0;
     assert_eq!(alone.sent.last(), Some(&(pressed + 505, "~".to_owned())), "{}", alone.log());
+}
+
+#[test]
+fn an_upload_that_is_cancelled_after_l_sends_no_password_and_leaves_the_question() {
+    let mut alone = Alone::with(&[("\u{11}m", 3, MENU), ("l", 300, "Password: ")]);
+    let load = Command::Load(Box::new(order(small_image("AXRTD8CO", "1.2.0"))));
+    alone.session.command(alone.now, load).expect("it is free");
+    while !alone.log().ends_with(":l") {
+        alone.step();
+        alone.take_sent(Instant::ZERO);
+    }
+    alone.session.command(alone.now, Command::Cancel).expect("always");
+    let (outcome, _) = alone.end(Instant::ZERO);
+    let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+    assert_eq!((report.verdict, report.unit), (Verdict::Interrupted, UnitNow::Application), "{report:?}");
+    assert_eq!((report.what.as_str(), report.password_sent), ("cancelled before anything was changed", false));
+    let from_l = alone.sent.iter().map(|(_, text)| text.as_str()).skip_while(|text| *text != "l");
+    assert_eq!(from_l.collect::<Vec<_>>().join(" "), "l ~ ~", "the question comes later, and is left as well");
+}
+
+#[test]
+fn a_line_about_the_password_that_was_sent_is_no_question_for_another() {
+    let accepts = [
+        ("l", 5, "Password: "),
+        ("AXIO-2010", 40, "\r\nChecking the password:\r\n"),
+        ("", 900, "Waiting for application S-Record.\r\n"),
+    ];
+    let (report, _) = upload_behind(&accepts);
+    assert!(report.password_sent && report.records > 0, "{report:?}");
+}
+
+#[test]
+fn a_silent_unit_is_asked_until_the_longest_erasing_is_over_if_its_product_is_known() {
+    let silent = |product: Option<&str>| {
+        let product = product.map(str::to_owned);
+        let order = LoadOrder { product, ..order(image_of("AXTC4CO", "1.2.0", 320)) };
+        let (outcome, time) = Alone::with(&[]).ask(Command::Load(Box::new(order)));
+        let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+        assert_eq!((report.verdict, report.unit), (Verdict::NoAnswer, UnitNow::Unknown), "{report:?}");
+        time
+    };
+    let once = silent(None);
+    assert_eq!(once, 2_400);
+    // What it was doing when it was asked for the first time may have taken so long, and four seconds more.
+    let erasing = longest_erase(&Product::named("AXTC4CO").expect("it is known").flash);
+    let patience = once + millis(erasing) + 4_000;
+    assert_eq!(silent(Some("AXTC4CO")), patience.div_ceil(once) * once);
+}
+
+#[test]
+fn an_error_after_data_that_was_taken_is_not_a_late_answer_of_a_loader_that_was_found_waiting() {
+    const COMPLAINT: &str = "Error # 0004\r\nRestarting.\r\nWaiting for application S-Record.\r\n";
+    let mut script = vec![("\u{11}m", 3, COMPLAINT), ("~", 3, COMPLAINT)];
+    // A page has been written, and the record after it is wrong.
+    script.extend([("S3", 0, ""); 16]);
+    script.extend([("S3", 8, "\u{13}"), ("", 30, "\u{11}"), ("S3", 10, COMPLAINT)]);
+    let mut alone = Alone::with(&script);
+    let order = LoadOrder { product: Some("AXTC4CO".into()), ..order(image_of("AXTC4CO", "1.2.0", 768)) };
+    let (outcome, time) = alone.ask(Command::Load(Box::new(order)));
+    let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+    assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
+    assert_eq!(report.what, "the loader reports error 4 (wrong checksum)");
+    let headers = alone.sent.iter().filter(|(_, text)| text.starts_with("S0")).count();
+    assert!(report.found_in_loader && headers == 1 && time < 2_000, "{headers} headers in {time} ms: {report:?}");
+}
+
+/// An upload whose first data has been let go, and has not been taken to the line yet.
+fn with_data_let_go() -> Alone {
+    let waits = "\r\nWaiting for application S-Record.\r\n";
+    let mut alone = Alone::with(&[("\u{11}m", 3, MENU), ("l", 5, "Password: "), ("AXIO-2010", 50, waits)]);
+    let load = Command::Load(Box::new(order(small_image("AXRTD8CO", "1.2.0"))));
+    alone.session.command(alone.now, load).expect("it is free");
+    while !alone.log().contains(":S0") {
+        alone.step();
+        alone.take_sent(Instant::ZERO);
+    }
+    while alone.session.waiting() == 0 {
+        alone.now = alone.session.poll_timeout().expect("a deadline").max(alone.now);
+        alone.session.handle_timeout(alone.now);
+    }
+    alone
+}
+
+#[test]
+fn a_record_that_waits_when_the_upload_fails_never_leaves() {
+    let end = |mut alone: Alone| {
+        let (outcome, _) = alone.end(Instant::ZERO);
+        let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+        assert!(report.verdict == Verdict::Failed && !alone.log().contains(":S3"), "{report:?}: {}", alone.log());
+        (*report, alone.log())
+    };
+    // The unit shows its menu: only what leaves a dialogue is sent.
+    let mut alone = with_data_let_go();
+    alone.session.handle_bytes(alone.now, b"\r\nV - View Object Dictionary\r\n");
+    let (report, log) = end(alone);
+    assert!(report.unit == UnitNow::Application && log.ends_with(":~"), "{report:?}: {log}");
+    // The loader stops us for too long, and lets us go on when that has been given up.
+    let mut alone = with_data_let_go();
+    alone.session.handle_bytes(alone.now, b"\x13");
+    alone.says.push((alone.now + Duration::from_secs(5), "\u{11}"));
+    let (report, log) = end(alone);
+    assert!(report.what.contains("(XOFF)"), "{report:?}: {log}");
 }

@@ -1,24 +1,24 @@
-//! Sending an image to a loader: records rebuilt, never more on their way than it can keep, flow control awaited where
+//! Sending an image to a loader: never more records on their way than it can keep, and its flow control awaited where
 //! it must come.
 //!
-//! What decides how to send is in the public sources of the loaders, as profiles (`device::Pacing`):
+//! How to send depends on how the loader stops its sender, known from the loaders' public sources (`device::Pacing`):
 //!
-//! - Generation `g1` keeps one page of 256 words. A record whose data crosses into another page is parked, XOFF goes out,
-//!   and after 0.6 ms of silence the old page is written, during which the loader is deaf; XON says that it listens
-//!   again. A second record in the meantime is an overrun, and at the end record a parked one is lost while success is
-//!   reported. So after each record that crosses, and before the end record, the sender waits for XON.
-//! - Generation `g3` has a ring of some 550 characters without an overrun check. It stops us after every record and lets
-//!   us go on when the ring is empty, so each XOFF with its XON says that one more record has been taken. No more than
-//!   [`WINDOW`] characters are on their way without that, so the ring cannot overflow whatever an adapter shows late; and
-//!   after the header, while all of the flash is erased, and before the end record nothing is. Should an
-//!   acknowledgement be missing, a record is lost, or its acknowledgement is, or the loader has taken two in one hold, as
-//!   it does if it writes more slowly than the line is. Which record it was cannot be told, so everything is sent once
-//!   more from the header on, one record at a time.
+//! - Generation `g1` keeps one page of 256 words. A record whose data crosses into another page is parked, XOFF goes
+//!   out, and after 0.6 ms of silence the old page is written, during which the loader is deaf; XON says that it
+//!   listens again. A second record in the meantime is an overrun, and at the end record a parked one is lost while
+//!   success is reported. So after each record that crosses, and before the end record, the sender waits for XON.
+//! - Generation `g3` has a ring of some 550 characters without an overrun check. It stops us after every record and
+//!   lets us go on when the ring is empty, so each XOFF with its XON acknowledges one record. No more than [`WINDOW`]
+//!   characters are on their way unacknowledged, so the ring cannot overflow however late an adapter shows a hold.
+//!   After the header, while all of the flash is erased, nothing leaves until it is acknowledged, and the end record
+//!   leaves only when all before it are. A missing acknowledgement has three possible causes: the record was lost, its
+//!   acknowledgement was, or a loader that writes more slowly than the line took two records in one hold. Which record
+//!   it was cannot be told, so everything is sent once more from the header on, one record at a time.
 //!
-//! That the XOFF may be shown late by an adapter (16 ms are 184 characters) does not matter either way: it is awaited,
-//! not reacted to. Which generation a unit has is assumed, not known. A loader that stops us after the header is a g3
-//! whatever the product's file says, and one that stops us neither there nor after the first data is sent to as a g1.
-//! How many words a page has is assumed as well: see `pages.rs`.
+//! An adapter may show an XOFF late (16 ms are 184 characters). With either generation that does no harm, since the
+//! XOFF is awaited, not reacted to. Which generation a unit has is assumed, not known. A loader that stops us after the
+//! header is a g3, whatever the product's file says; one that stops us neither there nor after the first data is sent
+//! to as a g1. How many words a page has is assumed as well: see `pages.rs`.
 
 mod holds;
 mod way;
@@ -36,8 +36,8 @@ use crate::time::{Duration, Instant};
 use holds::{Pace, Paging};
 use way::Way;
 
-/// Characters on their way to a ring of [`RING`] at most: six records of 32 data bytes, and 50 to spare for keys that
-/// were pressed before. More than the 369 that a line carries in the 32 ms an adapter makes of the way there and back.
+/// Most characters on their way to a ring of [`RING`]: six records of 32 data bytes. 50 are left for keys pressed
+/// before. The line carries 369 in the 32 ms that an adapter of 16 ms takes there and back, so it need not stand still.
 const WINDOW: usize = RING - 50;
 
 /// Why a transfer cannot go on.
@@ -45,9 +45,9 @@ const WINDOW: usize = RING - 50;
 pub(super) enum Stall {
     /// The loader has held us for too long.
     Held,
-    /// Nothing has been heard since the record before.
+    /// Nothing has been heard since the wait before this one, or since a record was taken.
     Silent,
-    /// A record that was alone on its way has not been acknowledged, though the loader did so before: it may be lost.
+    /// A record that was alone on its way has not been acknowledged, though others were: it may be lost.
     Unacknowledged,
 }
 
@@ -57,25 +57,26 @@ pub(super) struct Transfer {
     image: Image,
     flaw: Option<Flaw>,
     packed: bool,
-    /// How the loader paces its sender, and how many words its pages have, by the product's file.
+    /// How the loader paces its sender, and how many words its pages have, as assumed from the product's file.
     believed: (Pacing, u32),
     size: Size,
     way: Way,
     pace: Pace,
-    /// Flow control has shown that something was taken: that nothing came where it was awaited shows nothing.
+    /// An XON has acknowledged a record. `false` proves nothing: the XON may have been lost.
     acknowledged: bool,
-    /// Something has been heard since the loader was awaited last, or since the record taken last.
+    /// Something has been heard since the last wait for the loader, or since the last record was taken.
     alive: bool,
     /// Words let go without a sign of life.
     unheard_words: u32,
     /// Everything is being sent once more, one record at a time.
     again: bool,
-    /// How far it had come the first time, as long as the second has not been answered: a unit without power takes no header
-    /// either, and what was taken stays taken until the loader erases it.
+    /// How far the first pass had come, as long as the loader has not answered the second. It may be without power, and
+    /// what it had taken stays in its flash until it erases.
     before: Option<Reached>,
-    /// How long it may erase after the header.
+    /// How long the loader may erase after the header.
     longest_erase: Duration,
-    /// A loader with a ring has written each record before the next one has come, and acknowledges it alone.
+    /// A loader with a ring writes each record before the next one has come, and acknowledges it alone. On a line of
+    /// megabauds it takes two in one hold.
     writes_in_time: bool,
     begun: Option<Instant>,
     deadline: Option<Instant>,
@@ -84,7 +85,8 @@ pub(super) struct Transfer {
 }
 
 impl Transfer {
-    /// An image for this flash. `packed`: in records as long as the loader can keep, instead of the file's.
+    /// A transfer of this image to this flash. `packed`: in records as long as the loader can keep, instead of the
+    /// file's.
     pub(super) fn new(image: &Image, flash: &FlashMap, pacing: Pacing, packed: bool, flaw: Option<Flaw>) -> Self {
         let size = believed_size(packed, pacing);
         Transfer {
@@ -108,19 +110,16 @@ impl Transfer {
         }
     }
 
-    /// Lets go what may go now. Gives `Ok(true)` once the end record has been let go.
+    /// Lets go the records that may go now. Returns `Ok(true)` once the end record has been let go.
     ///
     /// # Errors
-    /// If the loader holds us too long, or seems to be gone.
+    /// If the loader holds us for too long, seems to be gone, or has not acknowledged a record.
     pub(super) fn advance(&mut self, now: Instant, transmitter: &mut Transmitter) -> Result<bool, Stall> {
         if self.begun.is_none() {
             self.begun = Some(now);
             self.character_time = transmitter.time_for(1);
-            // Where a record is written more slowly than it comes, two would be taken in one hold.
-            let writing = PROGRAM_TIME * DATA_WORDS;
-            self.writes_in_time = transmitter.time_for(DATA_CHARACTERS) > writing * 2;
+            self.writes_in_time = transmitter.time_for(DATA_CHARACTERS) > PROGRAM_TIME * DATA_WORDS * 2;
         }
-        self.deadline = None;
         if let Some(since) = transmitter.held_since().or(self.pace.stopped_since()) {
             let limit = since + self.longest_hold();
             self.deadline = Some(limit);
@@ -151,7 +150,7 @@ impl Transfer {
         Ok(false)
     }
 
-    /// Rebuilds the records. Nothing but the header may have left, which is the same in any size.
+    /// Rebuilds the records in this size. Only the header may have left, which is the same in any size.
     fn resize(&mut self, size: Size) {
         if size != self.size {
             self.size = size;
@@ -165,9 +164,9 @@ impl Transfer {
         self.unheard_words = 0;
     }
 
-    /// Whether it has stopped us where it was not expected to, or has not where it was.
+    /// Whether the loader has stopped us where it was not expected to, or has not stopped us where it was.
     pub(super) fn is_surprised(&self) -> bool {
-        matches!(&self.pace, Pace::Pages(paging) if paging.is_surprised())
+        matches!(&self.pace, Pace::Pages(paging) if paging.surprise().is_some())
     }
 
     /// Whether sending record by record may help against an overrun: a loader that keeps pages of another size than
@@ -195,8 +194,8 @@ impl Transfer {
         self.way.taken <= 1
     }
 
-    /// From the header on, as if nothing had been sent. What the loader has seemed to show of its pace so far it has not:
-    /// it was busy with something else, and its silence after the header has perhaps made another kind of loader of it.
+    /// Starts over from the header, as if nothing had been sent. What was learnt of the loader's pace is forgotten: the
+    /// loader was still answering an earlier key, so the absence of a hold proved nothing.
     pub(super) fn begin_again(&mut self) {
         self.start_over();
         (self.again, self.before) = (false, None);
@@ -205,10 +204,10 @@ impl Transfer {
         self.resize(believed_size(self.packed, pacing));
     }
 
-    /// Everything once more from the header on, with no belief about pages.
+    /// Starts over from the header, assuming nothing about pages.
     pub(super) fn start_over_slowly(&mut self) {
         self.start_over();
-        // The loader has asked for it.
+        // The loader has just prompted, so it has power.
         self.before = None;
         self.pace = Pace::Pages(Paging::watched(self.way.sent));
     }
@@ -223,23 +222,23 @@ impl Transfer {
         self.way.taken == 0 && self.pace.stopped_since().is_some()
     }
 
-    /// Whether a loader that has lost its place in a record waits in silence for the rest of it.
+    /// Whether this loader, if it has lost its place in a record, waits in silence for the rest of it.
     pub(super) fn may_wait_in_a_record(&self) -> bool {
         matches!(self.pace, Pace::Ring(_)) && self.way.sent > 0
     }
 
-    /// The loader has said that it is through.
+    /// The loader must have taken everything that has been sent.
     pub(super) fn take_all_sent(&mut self) {
         self.way.take_all();
         self.before = None;
     }
 
-    /// When [`advance`](Transfer::advance) is wanted.
+    /// When to call [`advance`](Transfer::advance) next.
     pub(super) fn deadline(&self) -> Option<Instant> {
         self.deadline
     }
 
-    /// How far it has come; the first time, as long as the second has not been answered.
+    /// How far the transfer has come; that of the first pass as long as the loader has not answered the second.
     pub(super) fn reached(&self) -> Reached {
         self.before.unwrap_or_else(|| self.way.reached())
     }
@@ -249,7 +248,7 @@ impl Transfer {
         (self.way.records.len(), self.way.bytes_total)
     }
 
-    /// Whether what it has [`reached`](Transfer::reached) is that of a second time.
+    /// Whether [`reached`](Transfer::reached) is about the second pass.
     pub(super) fn is_again(&self) -> bool {
         self.again && self.before.is_none()
     }
@@ -267,7 +266,7 @@ impl Transfer {
     /// Lets the next record go.
     fn let_go(&mut self, now: Instant, transmitter: &mut Transmitter) {
         let record = &self.way.records[self.way.sent];
-        // The piece is let go in this same step, so it leaves after what has been let go before.
+        // The piece is let go in this same step, so it is on the line right after what was let go before.
         let left_at = transmitter.free_at().max(now) + transmitter.time_for(record.text.len());
         transmitter.push_piece(Transmit::open(record.text.clone()));
         if let Some(words) = &record.words {
@@ -279,7 +278,7 @@ impl Transfer {
         self.way.let_go(left_at);
     }
 
-    /// From the header on, one record at a time.
+    /// Starts over from the header, one record at a time.
     fn start_over(&mut self) {
         self.before = Some(self.reached());
         self.again = true;
@@ -289,8 +288,8 @@ impl Transfer {
     }
 }
 
-/// Data bytes of the records for a loader that is assumed to have this pacing. How late its acknowledgements are shows
-/// only after the header; the adapters in use make no difference.
+/// Data bytes of the records for a loader that is assumed to have this pacing. How late its acknowledgements come shows
+/// only after the header; up to half of [`WINDOW`] that makes no difference.
 pub(super) fn believed_size(packed: bool, pacing: Pacing) -> Size {
     match (packed, pacing) {
         (false, _) => Size::AsInFile,
@@ -303,7 +302,7 @@ fn line_end(flaw: Option<Flaw>) -> &'static [u8] {
     if flaw == Some(Flaw::SendsCrLf) { b"\r\n" } else { records::LINE_END }
 }
 
-/// Data words of a record as compilers write them, and its characters with the line end.
+/// Data words of a record as compilers write them.
 const DATA_WORDS: u32 = 16;
-/// See [`DATA_WORDS`].
+/// Characters of such a record with its line end.
 const DATA_CHARACTERS: usize = 79;

@@ -1,4 +1,4 @@
-//! The records of a transfer, and where they are: still here, on their way, or taken.
+//! The records of a transfer, and where they are: not let go yet, on their way, or taken by the loader.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,8 @@ pub(in crate::session::upload) struct Reached {
     pub(in crate::session::upload) bytes_taken: usize,
 }
 
-/// Records on their way to a loader. None is taken before it has been let go, and all are in their order.
+/// The records of a transfer, in order. The first `taken` of them have been taken by the loader, those up to `sent` are
+/// on their way, and the rest has not been let go yet.
 #[derive(Debug)]
 pub(super) struct Way {
     pub(super) records: Vec<Outgoing>,
@@ -26,30 +27,30 @@ pub(super) struct Way {
     /// Records the loader must have taken.
     pub(super) taken: usize,
     bytes_taken: usize,
-    /// When the last character has left of each record let go and not taken.
+    /// For each record on its way: when its last character has left the line.
     pub(super) left_at: VecDeque<Instant>,
 }
 
 impl Way {
-    /// All of these are still here.
+    /// None of these records has been let go yet.
     pub(super) fn of(records: Vec<Outgoing>) -> Self {
         let bytes_total = records::characters(&records);
         Way { records, bytes_total, sent: 0, taken: 0, bytes_taken: 0, left_at: VecDeque::new() }
     }
 
-    /// Other records instead of those that have not been let go.
+    /// Replaces the records. Those that have been let go have to be the same as before.
     pub(super) fn replace(&mut self, records: Vec<Outgoing>) {
         self.bytes_total = records::characters(&records);
         self.records = records;
     }
 
-    /// All are here again.
+    /// Back to the first record: none has been let go.
     pub(super) fn start_over(&mut self) {
         (self.sent, self.taken, self.bytes_taken) = (0, 0, 0);
         self.left_at.clear();
     }
 
-    /// The next record is let go, the last character of which will have left then.
+    /// The next record is let go. Its last character will have left the line at `left_at`.
     pub(super) fn let_go(&mut self, left_at: Instant) {
         self.left_at.push_back(left_at);
         self.sent += 1;
@@ -63,7 +64,7 @@ impl Way {
         }
     }
 
-    /// It must have taken all that are on their way.
+    /// The loader must have taken all records that are on their way.
     pub(super) fn take_all(&mut self) {
         self.bytes_taken += self.characters();
         self.taken = self.sent;
@@ -75,17 +76,17 @@ impl Way {
         records::characters(&self.records[self.taken..self.sent])
     }
 
-    /// Whether only the end record is still here.
+    /// Whether only the end record has not been let go yet.
     pub(super) fn is_before_the_end(&self) -> bool {
         self.sent + 1 == self.records.len()
     }
 
-    /// How far it has come.
+    /// How far the transfer has come.
     pub(super) fn reached(&self) -> Reached {
         Reached { sent: self.sent, taken: self.taken, bytes_taken: self.bytes_taken }
     }
 
-    /// The last word of the data before a record.
+    /// Address of the last data word before the record of this number.
     pub(super) fn last_word(&self, record: usize) -> Option<u32> {
         self.records[..record].iter().rev().find_map(|record| Some(*record.words.as_ref()?.end()))
     }
