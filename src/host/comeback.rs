@@ -130,7 +130,7 @@ impl Comeback {
         Some(Comeback { what, options })
     }
 
-    /// The link is lost; to be told at once, since what is there now and looks the same is something else.
+    /// Call this at the moment the link is lost: adapters present now that look alike are other adapters.
     pub fn lost(&mut self) {
         match &mut self.what {
             What::Adapter { port, others } => *others = ports::alike(port),

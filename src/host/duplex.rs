@@ -17,6 +17,7 @@ use super::clock::Clock;
 use super::link::{Cause, LinkError, Operation, Options, QUEUED, WRITE_PATIENCE};
 use super::outlet::Outlet;
 use super::{Input, LinkId};
+use crate::telnet;
 use crate::time::Duration;
 
 /// The thread of an open port.
@@ -27,7 +28,7 @@ pub struct Lines {
     written: Receiver<()>,
 }
 
-/// How long a read waits, and so how long a key may: well below what a person notices.
+/// How long a read waits, and so how long a key may wait to be sent: too short for a person to notice.
 const READ_TIMEOUT: Duration = Duration::from_millis(5);
 
 /// Bytes read at once.
@@ -50,7 +51,7 @@ pub fn open(
         .open()
         .map_err(|error| failed(Operation::Open, open_cause(error)))?;
     let set = port.baud_rate().map_err(|error| failed(Operation::Configure, Cause::Io(error.into())))?;
-    if set != options.baud {
+    if !telnet::rate_is_close(options.baud, set) {
         return Err(failed(Operation::Configure, Cause::Baud { asked: options.baud, set }));
     }
     let (outgoing, queue) = sync_channel(QUEUED);

@@ -429,14 +429,14 @@ impl Connection {
     }
 
     /// Has something done to the emulated unit in this process, in the words of `axcon emulate`; `answered` hears what
-    /// came of it, perhaps from another thread.
+    /// came of it, perhaps from another thread. If the unit takes no more orders, it is dropped unheard.
     pub fn order(&self, line: &str, answered: impl FnOnce(Answer) + Send + 'static) {
         let Some((unit, product)) = &self.unit else {
             return answered(Err("there is no emulated unit at the other end".into()));
         };
         match Verb::read(line, product) {
             Err(error) => answered(Err(error.to_string())),
-            // An order that is not taken is never answered: a person waits for it, and sees that.
+            // An order that is not taken is dropped with `answered`, and with the channel in it: who waits there sees that.
             Ok(verb) => {
                 unit.order(verb, answered);
             }

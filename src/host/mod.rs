@@ -83,7 +83,7 @@ pub enum Input {
 pub struct LinkId(u64);
 
 impl LinkId {
-    /// Of a connection that is about to be opened.
+    /// The next one, for a connection that is about to be opened.
     pub fn next() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         LinkId(NEXT.fetch_add(1, Ordering::Relaxed))

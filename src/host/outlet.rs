@@ -1,7 +1,6 @@
 //! Where the threads of a port put what they have heard, and what became of the port.
 //!
-//! Each kind of port waits in its own way and is called off in its own way; what is done with what came of it is the
-//! same for all.
+//! Ports differ in how they wait and stop; delivering what they heard is the same for all.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError};
@@ -10,8 +9,8 @@ use super::link::{Cause, LinkError, Operation};
 use super::{Input, LinkId};
 use crate::time::{Duration, Instant};
 
-/// How often it is tried again to hand over bytes while the channel is full. The owner is far behind then, and a wait on
-/// the channel itself could not be called off.
+/// How often it is tried again to hand over bytes while the channel is full. The owner is late then, and a wait on the
+/// channel itself could not be called off.
 const RETRY: Duration = Duration::from_millis(2);
 
 /// The threads' way to the owner of the connection.

@@ -46,8 +46,8 @@ impl PortLink {
         match fs::symlink_metadata(link) {
             Ok(metadata) if metadata.is_symlink() => {
                 let former = fs::read_link(link).map_err(failed)?;
-                // A dangling link is stale whatever it pointed at.
-                if !former.starts_with("/dev/pts") && link.exists() {
+                // One that leads elsewhere is somebody's even if nothing is there now: a share may not be mounted.
+                if !is_pseudo_terminal(&former) {
                     let what = format!("a link to '{}', not to a pseudo-terminal", former.display());
                     return Err(PortLinkError::Taken { link: link.to_owned(), what });
                 }
@@ -80,6 +80,11 @@ impl PortLink {
     pub fn path(&self) -> &Path {
         &self.link
     }
+}
+
+/// Whether a path is where this system has its pseudo-terminals, those that are gone included.
+fn is_pseudo_terminal(path: &Path) -> bool {
+    path.starts_with("/dev/pts") || (cfg!(target_os = "macos") && path.to_string_lossy().starts_with("/dev/ttys"))
 }
 
 impl Drop for PortLink {
@@ -130,6 +135,12 @@ mod tests {
         std::os::unix::fs::symlink(&name, &foreign).expect("a link");
         let error = create(&foreign).expect_err("refused").to_string();
         assert!(error.contains("not to a pseudo-terminal"), "{error}");
-        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 2, "nothing temporary is left");
+
+        let dangling = folder.path().join("dangling");
+        std::os::unix::fs::symlink("/mnt/nas/thing", &dangling).expect("a link");
+        let error = create(&dangling).expect_err("refused").to_string();
+        assert!(error.contains("a link to '/mnt/nas/thing', not to a pseudo-terminal"), "{error}");
+        assert_eq!(fs::read_link(&dangling).expect("still there"), Path::new("/mnt/nas/thing"));
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 3, "nothing temporary is left");
     }
 }

@@ -178,7 +178,8 @@ mod watch {
 
     impl Watch {
         pub fn start(path: &Path) -> io::Result<Self> {
-            let inotify = inotify::init(CreateFlags::CLOEXEC | CreateFlags::NONBLOCK)?;
+            let inotify = inotify::init(CreateFlags::CLOEXEC | CreateFlags::NONBLOCK)
+                .map_err(|error| refused(error, || std::fs::File::open("/dev/null").is_ok()))?;
             let events = WatchFlags::OPEN | WatchFlags::CLOSE_WRITE | WatchFlags::CLOSE_NOWRITE;
             inotify::add_watch(&inotify, path, events)?;
             Ok(Watch { inotify })
@@ -201,6 +202,17 @@ mod watch {
                 }
             }
         }
+    }
+
+    /// Why there is no watch. The system says "too many open files" to two limits; that of the process leaves no file at
+    /// all.
+    pub(super) fn refused(error: Errno, has_files: impl FnOnce() -> bool) -> io::Error {
+        if error == Errno::MFILE && has_files() {
+            let why = "each emulated unit takes an inotify instance, and the user has no more of them (sysctl \
+                       fs.inotify.max_user_instances)";
+            return io::Error::other(why);
+        }
+        error.into()
     }
 
     impl AsFd for Watch {
@@ -265,6 +277,15 @@ mod tests {
         assert_eq!(pty.read(&mut buffer).expect("read"), 0, "nothing comes back");
         assert!(!pty.client_settings().expect("settings").obeys_xoff);
         assert_eq!(pty.visits().expect("visits"), []);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn which_limit_leaves_no_watch_is_named() {
+        let why = |error, has_files| watch::refused(error, || has_files).to_string();
+        assert!(why(Errno::MFILE, true).contains("fs.inotify.max_user_instances"), "{}", why(Errno::MFILE, true));
+        assert!(why(Errno::MFILE, false).starts_with("Too many open files"), "{}", why(Errno::MFILE, false));
+        assert!(!why(Errno::NOMEM, true).contains("inotify"), "{}", why(Errno::NOMEM, true));
     }
 
     #[test]

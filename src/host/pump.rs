@@ -118,7 +118,8 @@ impl Pump {
         self.cable.try_again(self.clock.now(), self.clock, inputs).map(Connection::port)
     }
 
-    /// Waits for this long, whatever else comes; a signal ends it.
+    /// Waits for this long while the link is lost; a signal ends it. No bytes are handed over: there is no connection that
+    /// could bring any.
     ///
     /// # Errors
     /// If a signal comes.

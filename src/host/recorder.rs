@@ -18,7 +18,7 @@ use crate::time::{Duration, Instant};
 pub enum Plan {
     /// In the state directory, the oldest recordings making room.
     Unasked,
-    /// In this file, without a limit; an existing one is overwritten.
+    /// In this file, without a limit; an existing one is overwritten, unless it is being written.
     File(PathBuf),
     /// Nowhere.
     Nothing,
@@ -165,7 +165,7 @@ impl Recorder {
         let Some(open) = &mut self.open else { return };
         open.last = open.last.max(at);
         if let Err(error) = write(open).and_then(|()| open.next_part_if_full()) {
-            self.warning = Some(format!("the recording ends here: {}: {error}", open.path.display()));
+            self.warning = Some(format!("the recording ends here: {error} ({})", open.path.display()));
             self.open = None;
         }
     }
@@ -374,6 +374,17 @@ pub(super) mod tests {
         drop(recorder);
         let last = std::fs::read_to_string(folder.path().join(&kept[kept.len() - 1])).expect("the last part");
         assert!(last.contains("\"part\":") && last.contains("end: 5000 bytes received"), "{last}");
+    }
+
+    #[test]
+    fn as_much_is_kept_as_the_documents_say() {
+        assert_eq!(LIMITS, Limits { bytes: 200_000_000, files: 20_000, part_bytes: 20_000_000 });
+        let words = |page: &str| page.split_whitespace().collect::<Vec<_>>().join(" ");
+        let page = words(include_str!("../../docs/recordings.md"));
+        for said in ["reaches 20 MB continues in another part", "take at most 200 MB in 20,000 files"] {
+            assert!(page.contains(said), "no '{said}' in docs/recordings.md");
+        }
+        assert!(words(include_str!("../../README.md")).contains("200 MB of them at most"));
     }
 
     #[test]

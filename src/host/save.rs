@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Why a file is not written. What was there is there.
 #[derive(Debug, thiserror::Error)]
@@ -55,14 +56,7 @@ pub fn save(path: &Path, bytes: &[u8], overwrite: bool) -> Result<(), SaveError>
     admit(path, overwrite)?;
     let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let beside = beside(&place);
-    let mut file = match File::create_new(&beside) {
-        // Left behind by a process of the same number that was killed: in a container they all have the same.
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-            fs::remove_file(&beside)?;
-            File::create_new(&beside)?
-        }
-        created => created?,
-    };
+    let mut file = make(&beside)?;
     let written = file
         .write_all(bytes)
         .and_then(|()| file.sync_all())
@@ -101,10 +95,24 @@ fn put_without_links(beside: &Path, place: &Path) -> io::Result<()> {
     })
 }
 
-/// A name in the same folder that no other run of the program uses.
+/// Makes a file of a name that [`beside`] gave.
+fn make(beside: &Path) -> io::Result<File> {
+    match File::create_new(beside) {
+        // Left by a process of the same number that was killed: in a container they all have the same.
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            fs::remove_file(beside)?;
+            File::create_new(beside)
+        }
+        made => made,
+    }
+}
+
+/// A name in the same folder that no other run of the program uses, nor another thread of this one.
 fn beside(path: &Path) -> PathBuf {
+    static NEXT: AtomicU32 = AtomicU32::new(1);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
     let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
+    name.push(format!(".{}-{number}.part", std::process::id()));
     path.with_file_name(name)
 }
 
@@ -112,8 +120,10 @@ fn beside(path: &Path) -> PathBuf {
 pub fn is_beside(file: &Path, place: &Path) -> bool {
     let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (file, place) = (name(file), name(place));
-    let number = file.strip_prefix(&place).and_then(|rest| rest.strip_prefix('.')?.strip_suffix(".part"));
-    number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+    let numbers = file.strip_prefix(&place).and_then(|rest| rest.strip_prefix('.')?.strip_suffix(".part"));
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    // Of the process, and of the file within it where it has one.
+    numbers.is_some_and(|numbers| numbers.splitn(2, '-').all(is_number))
 }
 
 #[cfg(test)]
@@ -127,18 +137,40 @@ mod tests {
         for other in ["a/x.bin", "a/x.bin.part", "a/x.bin..part", "a/x.bin.old.part", "a/y.bin.7.part"] {
             assert!(!is_beside(Path::new(other), place), "{other}");
         }
+        assert!(!is_beside(Path::new("a/x.bin.7-.part"), place) && !is_beside(Path::new("a/x.bin.7-1-2.part"), place));
+    }
+
+    // Elsewhere a file that somebody has open is not replaced.
+    #[cfg(unix)]
+    #[test]
+    fn threads_that_write_to_one_place_leave_a_whole_file_of_one_of_them() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("x.json");
+        std::thread::scope(|scope| {
+            for letter in *b"abcd" {
+                let path = &path;
+                scope.spawn(move || (0..10).for_each(|_| save(path, &[letter; 10_000], true).expect("written")));
+            }
+        });
+        let written = fs::read(&path).expect("there");
+        assert!(b"abcd".iter().any(|&letter| written == [letter; 10_000]));
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
     }
 
     #[test]
-    fn a_file_is_whole_or_as_it_was_and_nothing_stays_behind() {
+    fn a_file_is_whole_or_as_it_was_and_nothing_else_stays() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("x.S");
         save(&path, b"one", false).expect("written");
         assert!(matches!(save(&path, b"two", false), Err(SaveError::Exists)));
         assert_eq!(fs::read(&path).expect("there"), b"one");
-        fs::write(beside(&path), b"half").expect("left behind");
         save(&path, b"three", true).expect("replaced");
         assert_eq!(fs::read(&path).expect("there"), b"three");
+        let beside = beside(&path);
+        fs::write(&beside, b"half").expect("left by another");
+        make(&beside).expect("made again");
+        assert_eq!(fs::read(&beside).expect("there"), b"");
+        fs::remove_file(&beside).expect("removed");
         assert!(matches!(save(folder.path(), b"four", true), Err(SaveError::NotAFile)));
         assert!(matches!(save(&folder.path().join("no/such/x.S"), b"five", true), Err(SaveError::Io(_))));
         assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);

@@ -29,6 +29,7 @@ use super::outlet::Outlet;
 use super::ports;
 use super::wait::{Stop, Stopper, ready, stop};
 use super::{Input, LinkId};
+use crate::telnet;
 use crate::time::Duration;
 
 /// The two threads of an open port.
@@ -276,15 +277,11 @@ fn configure(port: &OwnedFd, baud: u32) -> Result<(), Cause> {
 
     // Drivers take a rate they cannot do without complaint: a 16550 then runs at 9600.
     let set = tcgetattr(port).map_err(cause)?.output_speed();
-    if set.abs_diff(baud) > baud / BAUD_TOLERANCE {
+    if !telnet::rate_is_close(baud, set) {
         return Err(Cause::Baud { asked: baud, set });
     }
     Ok(())
 }
-
-/// The part of a line rate by which a driver may miss it: 2 %, half of what 8N1 forgives in all. Some drivers report
-/// the rate their divider really gives.
-const BAUD_TOLERANCE: u32 = 50;
 
 fn apply(port: &OwnedFd, settings: &Termios) -> Result<(), Cause> {
     tcsetattr(port, OptionalActions::Now, settings).map_err(cause)

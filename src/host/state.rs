@@ -123,6 +123,10 @@ impl State {
         };
         let parameters = match read(&parameters_file, IMAGE_BYTES)? {
             None => Ok(None),
+            // An erased memory is blank; an empty file is what a crash or a full disk leaves.
+            Some(Found::Whole(bytes)) if bytes.is_empty() => {
+                Err(format!("it is empty, the parameter memory has {IMAGE_BYTES} bytes"))
+            }
             Some(Found::Whole(bytes)) => match Parameters::read(product, &bytes) {
                 Ok(_) => Ok(Some(bytes)),
                 Err(found @ ParametersError::Product { .. }) => {
@@ -311,6 +315,32 @@ mod tests {
     }
 
     #[test]
+    fn what_a_unit_wrote_before_a_write_that_fails_is_there_and_nothing_after_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let Opened { mut state, contents: before, .. } = open(folder.path(), "AXTC4CO").expect("created");
+        // A folder in the place of the parameters: they cannot be replaced.
+        let (parameters, aside) = (folder.path().join(PARAMETERS), folder.path().join("aside"));
+        fs::rename(&parameters, &aside).expect("renamed");
+        fs::create_dir(&parameters).expect("made");
+        let store = |area, offset, bytes: &[u8]| Store { area, offset, bytes: bytes.to_vec() };
+        let error = state
+            .write(&[
+                store(Area::Flash, 10, b"abc"),
+                store(Area::Flash, 11, b"B"),
+                store(Area::Parameters, 2_100, b"x"),
+                store(Area::Flash, 12, b"C"),
+            ])
+            .expect_err("refused");
+        assert!(matches!(error, StateError::Io { operation: "replace", .. }), "{error}");
+        drop(state);
+        fs::remove_dir(&parameters).expect("removed");
+        fs::rename(&aside, &parameters).expect("renamed");
+        let Opened { contents, .. } = open(folder.path(), "AXTC4CO").expect("opened");
+        assert_eq!(&contents.flash[10..13], b"aBc", "the first two, and not the last");
+        assert_eq!(contents.parameters, before.parameters);
+    }
+
+    #[test]
     fn two_emulators_cannot_share_a_directory() {
         let folder = tempfile::tempdir().expect("a folder");
         let _opened = open(folder.path(), "AXTC4CO").expect("created");
@@ -336,6 +366,20 @@ mod tests {
             assert!(texts[0].contains(&format!("{FLASH}.damaged-{round}")), "{}", texts[0]);
             assert_eq!(fs::read(&flash).expect("new"), initial("AXTC4CO").flash);
         }
+    }
+
+    #[test]
+    fn an_empty_file_is_reported_and_an_erased_memory_is_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        drop(open(folder.path(), "AXTC4CO").expect("created"));
+        for name in [FLASH, PARAMETERS] {
+            fs::write(folder.path().join(name), b"").expect("written");
+            let Opened { contents, damaged, .. } = open(folder.path(), "AXTC4CO").expect("opened all the same");
+            assert_eq!((contents, damaged.len()), (initial("AXTC4CO"), 1), "{name}");
+            assert_eq!(damaged[0].kept, folder.path().join(format!("{name}.damaged-1")));
+        }
+        fs::write(folder.path().join(PARAMETERS), [0xFF; IMAGE_BYTES]).expect("written");
+        assert_eq!(open(folder.path(), "AXTC4CO").expect("opened").damaged, []);
     }
 
     #[test]

@@ -4,7 +4,9 @@ use std::io::{self, PipeReader, PipeWriter};
 use std::os::fd::{AsFd, BorrowedFd};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 
+use super::clock::Clock;
 use crate::time::Duration;
 
 /// Calls off every wait on the [`Stop`] made with it, when dropped.
@@ -45,19 +47,49 @@ impl AsFd for Stop {
 }
 
 /// Waits until one of the descriptors is ready for what is asked of it (hang-up and errors count as ready) or the time
-/// is over, and says what each is ready for. A signal ends the wait early with nothing ready.
+/// is over, and says what each is ready for: nothing is ready only if all of the time is over.
 pub fn ready<const N: usize>(
     fds: [(BorrowedFd<'_>, PollFlags); N],
     timeout: Option<Duration>,
 ) -> io::Result<[PollFlags; N]> {
     let mut polled = fds.map(|(fd, flags)| PollFd::from_borrowed_fd(fd, flags));
-    let timeout = timeout.map(|timeout| Timespec {
-        tv_sec: i64::try_from(timeout.as_secs()).unwrap_or(i64::MAX),
-        tv_nsec: timeout.subsec_nanos().into(),
-    });
-    match poll(&mut polled, timeout.as_ref()) {
-        Ok(_) => Ok(polled.map(|fd| fd.revents())),
-        Err(rustix::io::Errno::INTR) => Ok([PollFlags::empty(); N]),
-        Err(error) => Err(error.into()),
+    despite_signals(timeout, |left| poll(&mut polled, left.map(timespec).as_ref()))?;
+    Ok(polled.map(|fd| fd.revents()))
+}
+
+fn timespec(time: Duration) -> Timespec {
+    Timespec { tv_sec: i64::try_from(time.as_secs()).unwrap_or(i64::MAX), tv_nsec: time.subsec_nanos().into() }
+}
+
+/// Waits again after each signal, for what is left of the time.
+fn despite_signals<T>(
+    timeout: Option<Duration>,
+    mut wait: impl FnMut(Option<Duration>) -> rustix::io::Result<T>,
+) -> io::Result<T> {
+    let begun = Clock::start();
+    loop {
+        match wait(timeout.map(|timeout| timeout.saturating_sub(begun.now().since_start()))) {
+            Err(Errno::INTR) => {}
+            waited => return waited.map_err(io::Error::from),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_does_not_end_a_wait_and_does_not_make_it_longer() {
+        for timeout in [Some(Duration::from_secs(5)), Some(Duration::ZERO), None] {
+            let mut waits = Vec::new();
+            let waited = despite_signals(timeout, |left| {
+                waits.push(left);
+                if waits.len() < 3 { Err(Errno::INTR) } else { Ok("ready") }
+            });
+            assert_eq!(waited.ok(), Some("ready"));
+            assert_eq!(waits.len(), 3);
+            assert!(waits.iter().all(|&left| left <= timeout && left.is_some() == timeout.is_some()), "{waits:?}");
+        }
     }
 }

@@ -84,9 +84,6 @@ const NO_FLOW_CONTROL: u8 = 1;
 /// Values of SET_CONTROL by which a server says that it does flow control on what we send.
 const FLOW_CONTROLS: [u8; 4] = [2, 3, 17, 19];
 
-/// The part of a line rate by which a server may miss it: 2 %, as at a port of our own.
-const BAUD_TOLERANCE: u32 = 50;
-
 /// What is asked for, in this order. The serial port comes last: with its answer the others are settled.
 const WANTED: [(Side, u8); 5] = [
     (Side::Theirs, BINARY),
@@ -202,10 +199,10 @@ impl Client {
         match (command.wrapping_sub(ANSWER), value) {
             (SET_BAUD, &[a, b, c, d]) => {
                 let set = u32::from_be_bytes([a, b, c, d]);
-                if set.abs_diff(self.baud) > self.baud / BAUD_TOLERANCE {
-                    self.refuse(Refusal::Baud { asked: self.baud, set });
-                } else {
+                if super::rate_is_close(self.baud, set) {
                     self.awaited = None;
+                } else {
+                    self.refuse(Refusal::Baud { asked: self.baud, set });
                 }
             }
             (SET_DATA_BITS, &[answer]) if answer != 8 => self.refuse(setting("8 data bits", answer)),

@@ -17,6 +17,15 @@ const IAC: u8 = 255;
 const SB: u8 = 250;
 const SE: u8 = 240;
 
+/// The part of a line rate by which a port may miss it: 2 %, half of what 8N1 forgives in all.
+const BAUD_TOLERANCE: u32 = 50;
+
+/// Whether a port that was asked for a line rate runs at it, or close enough, when it says that it is set to another one:
+/// some drivers and servers report the rate their divider really gives. The same for ports of this machine and remote ones.
+pub(crate) fn rate_is_close(asked: u32, set: u32) -> bool {
+    set.abs_diff(asked) <= asked / BAUD_TOLERANCE
+}
+
 /// The bytes that make `data` arrive as it is.
 pub fn escape(data: &[u8]) -> Vec<u8> {
     let mut escaped = Vec::with_capacity(data.len());
@@ -47,6 +56,16 @@ mod tests {
             decoder.decode(piece, &mut data, |item| heard.push(item));
         }
         (data, heard)
+    }
+
+    #[test]
+    fn a_rate_is_close_that_a_divider_gives_and_no_other() {
+        for set in [115_200, 115_384, 112_896, 117_504] {
+            assert!(rate_is_close(115_200, set), "{set}");
+        }
+        for set in [0, 9_600, 112_895, 117_505, u32::MAX] {
+            assert!(!rate_is_close(115_200, set), "{set}");
+        }
     }
 
     proptest! {

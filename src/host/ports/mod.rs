@@ -7,7 +7,7 @@ mod processes;
 
 use std::path::{Path, PathBuf};
 
-use serialport::SerialPortType;
+use serialport::{SerialPortInfo, SerialPortType};
 
 use crate::record::Adapter;
 
@@ -102,10 +102,14 @@ pub fn list() -> Result<Vec<Port>, serialport::Error> {
     if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
         return Ok(Vec::new());
     }
-    let mut ports: Vec<Port> =
-        serialport::available_ports()?.into_iter().filter(|info| !is_phantom(&info.port_name)).map(port).collect();
+    Ok(of_system(serialport::available_ports()?))
+}
+
+/// What the system lists, in our order and without what is not there.
+fn of_system(found: Vec<SerialPortInfo>) -> Vec<Port> {
+    let mut ports: Vec<Port> = found.into_iter().filter(|info| !is_phantom(&info.port_name)).map(port).collect();
     ports.sort_by_key(|port| (port.kind != Kind::Usb, natural_key(&port.path)));
-    Ok(ports)
+    ports
 }
 
 /// What a path names, for one that a list need not hold.
@@ -179,7 +183,7 @@ pub fn lock_holder(path: &Path) -> Option<Holder> {
 #[cfg(unix)]
 const LOCK_FOLDERS: [&str; 3] = ["/run/lock", "/var/lock", "/var/spool/uucp"];
 
-fn port(info: serialport::SerialPortInfo) -> Port {
+fn port(info: SerialPortInfo) -> Port {
     let (kind, usb) = match info.port_type {
         SerialPortType::UsbPort(usb) => (
             Kind::Usb,
@@ -333,10 +337,39 @@ mod tests {
     }
 
     #[test]
+    fn what_the_system_says_of_a_port_is_kept_and_adapters_come_first() {
+        let info = |path: &str, port_type| SerialPortInfo { port_name: path.into(), port_type };
+        let said = serialport::UsbPortInfo {
+            vid: 0x0403,
+            pid: 0x6001,
+            serial_number: Some("A1".into()),
+            manufacturer: Some("FTDI".into()),
+            product: None,
+        };
+        // Names no machine has, so that it says nothing else of them.
+        let ports = of_system(vec![
+            info("/dev/ttyNone9", SerialPortType::Unknown),
+            info("/dev/ttyNoneUSB10", SerialPortType::UsbPort(said.clone())),
+            info("/dev/rfcommNone0", SerialPortType::BluetoothPort),
+            info("/dev/ttyNoneUSB9", SerialPortType::UsbPort(said)),
+        ]);
+        let kinds: Vec<(&str, Kind)> = ports.iter().map(|port| (port.path.as_str(), port.kind)).collect();
+        let expected = [
+            ("/dev/ttyNoneUSB9", Kind::Usb),
+            ("/dev/ttyNoneUSB10", Kind::Usb),
+            ("/dev/rfcommNone0", Kind::Bluetooth),
+            ("/dev/ttyNone9", Kind::Native),
+        ];
+        assert_eq!(kinds, expected);
+        let Usb { vid, pid, serial_number, manufacturer, product } = ports[0].usb.clone().expect("an adapter");
+        assert_eq!((vid, pid, product), (0x0403, 0x6001, None));
+        assert_eq!((serial_number.as_deref(), manufacturer.as_deref()), (Some("A1"), Some("FTDI")));
+        assert_eq!(ports[3].usb, None);
+    }
+
+    #[test]
     fn listing_never_fails_where_there_is_nothing() {
-        for port in list().expect("a list, if an empty one") {
-            assert!(!port.path.is_empty());
-        }
+        assert!(list().expect("a list, if an empty one").iter().all(|port| !port.path.is_empty()));
         assert_eq!(holder(Path::new("/nowhere/ttyUSB0")), None);
     }
 }

@@ -38,9 +38,9 @@ pub fn other_host(path: &Path) -> Option<Holder> {
     Some(Holder { name: own, pid })
 }
 
-/// Whether a process was started with `--link` and this path, or what this path is numbered from. A link that a
-/// killed emulator has left may lead to the pseudo-terminal of another, which has got its number and has nothing to
-/// do with it.
+/// Whether a process was started with `--link PATH`, where this path is PATH, or PATH with a unit's number after it. A
+/// link that a killed emulator has left may lead to a pseudo-terminal of the same number that is another emulator's by
+/// now; that one was not told of the link.
 fn was_told_to_link(pid: u32, path: &Path) -> bool {
     let Ok(line) = fs::read(format!("/proc/{pid}/cmdline")) else { return false };
     let Ok(folder) = fs::read_link(format!("/proc/{pid}/cwd")) else { return false };

@@ -18,7 +18,7 @@ use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use super::state::{State, StateError};
-use crate::device::Product;
+use crate::device::{BAUD, Product};
 use crate::emulator::scenario::{Stage, Verb};
 use crate::emulator::{Setup, Store};
 use crate::endpoint::Endpoint;
@@ -175,9 +175,6 @@ pub struct Counts {
     /// Bytes of the unit that were lost: the client read too slowly, or was not there.
     pub lost: AtomicU64,
 }
-
-/// Line rate of all units (AXTC4CO manual, chapter 4).
-pub const BAUD: u32 = 115_200;
 
 /// Characters the line runs ahead of the unit: the transmit buffer of a 16550, which goes on after an XOFF too.
 pub const AHEAD: usize = 16;

@@ -79,6 +79,7 @@ impl App {
 
     /// A file is being written: the box in which its name was typed waits for that.
     fn is_written(&mut self, path: &Path) {
+        self.made.remove(path);
         if let Some(Popup::Asking(Question::FileName { form, .. })) = &mut self.popup {
             form.sent = Some(Sent::File(path.to_path_buf()));
         }
@@ -265,8 +266,11 @@ impl App {
             _ => None,
         };
         let is_awaited = matches!(sent, Some(Sent::File(of)) if of == path);
-        if result.is_ok() && is_awaited {
-            self.popup = None;
+        if result.is_ok() {
+            self.made.insert(path.to_path_buf());
+            if is_awaited {
+                self.popup = None;
+            }
         }
         match result {
             Ok(()) if is_export => {}
@@ -275,7 +279,8 @@ impl App {
                 if is_export {
                     self.view.export = None;
                 }
-                let text = format!("{shown} is not written: {why}.");
+                let what = if self.made.contains(path) { "ends early" } else { "is not written" };
+                let text = format!("{shown} {what}: {why}.");
                 match is_awaited {
                     true => self.not_written(text),
                     false => self.view.tell(Tone::Bad, text),
@@ -316,5 +321,38 @@ impl App {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::app::Options;
+    use crate::tui::input::Input;
+    use crate::tui::theme::Palette;
+
+    #[test]
+    fn a_file_that_is_there_ends_early_and_one_that_is_not_is_not_written() {
+        let palette = Palette::Mono;
+        let options = Options { link: None, directory: "/rows".into(), home: None, palette, size: (80, 24) };
+        let mut app = App::new(options);
+        let told = |app: &mut App, result: Result<(), &str>| {
+            let path = PathBuf::from("tc.csv");
+            if result.is_ok() {
+                app.view.export = Some(Export { path: path.clone(), rows: 3, channels: vec!["TC1".into()] });
+            }
+            app.handle(Instant::ZERO, Input::FileWritten { path, result: result.map_err(str::to_owned) });
+            app.view.notice.as_ref().map(|notice| notice.text.clone()).unwrap_or_default()
+        };
+        let shown = Path::new("/rows").join("tc.csv");
+        let shown = shown.display();
+        assert_eq!(told(&mut app, Err("it is full")), format!("{shown} is not written: it is full."));
+        told(&mut app, Ok(()));
+        assert!(app.view.export.is_some());
+        assert_eq!(told(&mut app, Err("it is full")), format!("{shown} ends early: it is full."));
+        assert!(app.view.export.is_none(), "no more rows go there");
+        // Another file of that name.
+        app.is_written(Path::new("tc.csv"));
+        assert_eq!(told(&mut app, Err("it exists")), format!("{shown} is not written: it exists."));
     }
 }

@@ -45,9 +45,8 @@ impl App {
         false
     }
 
-    /// Opens a link. The open one stays until that has worked, so that a name typed wrong costs nothing; only the same
-    /// port cannot be opened twice. So does a lost one: what it has shown is all there is until another link is open, and
-    /// its cable may be plugged in again meanwhile.
+    /// Opens a link. The open one stays until the new one works, so that a name typed wrong costs nothing, except when both
+    /// are the same port. A lost one stays too: what it has shown remains visible, and its cable may be plugged in again.
     pub(super) fn open(&mut self, link: String, effects: &mut Vec<Effect>) {
         let stays = match self.view.link.state {
             LinkState::Open => self.view.link.name.as_ref() != Some(&link),

@@ -9,6 +9,7 @@ mod keys;
 mod link;
 mod perform;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use link::Next;
@@ -80,8 +81,10 @@ pub struct App {
     overview: Overview,
     terminal: Terminal,
     load: Load,
-    /// Where the last file that is there was chosen.
+    /// The folder that the file picker showed last: there it begins.
     folder: PathBuf,
+    /// Files that the console has made. What goes wrong with one from then on makes it end early.
+    made: BTreeSet<PathBuf>,
     dictionary: Dictionary,
     stream: Stream,
     diagnostics: Diagnostics,
@@ -113,6 +116,7 @@ impl App {
             terminal: Terminal::default(),
             load: Load::new(options.directory.clone()),
             folder: options.directory.clone(),
+            made: BTreeSet::new(),
             dictionary: Dictionary::default(),
             stream: Stream::default(),
             diagnostics: Diagnostics::default(),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread;
 
-use super::connecting::Dial;
+use super::connecting::{Dial, OpenedRecording};
 use super::{Check, Console, files};
 use crate::device::LoaderKind;
 use crate::host;
@@ -49,6 +49,8 @@ pub(super) enum Found {
     Answer(Inquiry, Input),
     /// What came of dialling a network link.
     Dialled(Box<Dial>),
+    /// What came of opening a recording.
+    Recording(Box<OpenedRecording>),
 }
 
 impl From<Input> for Found {
@@ -118,6 +120,7 @@ impl Console {
                 self.handle(input);
             }
             Found::Dialled(dial) => self.take_dialled(*dial),
+            Found::Recording(opened) => self.take_recording(*opened),
         }
     }
 

@@ -1,31 +1,41 @@
 //! The link of the loop: opened, taken over, lost, looked for, closed.
 
 use std::path::PathBuf;
+use std::sync::mpsc::sync_channel;
 
-use super::Console;
 use super::answers::Found;
 use super::player::Player;
+use super::{Console, NOTE_PATIENCE};
 use crate::host::clock;
 use crate::host::comeback::{Cable, Comeback};
 use crate::host::link::{self, Connection, LinkError, LinkSpec};
 use crate::host::recorder::Recorder;
-use crate::host::replay::Recording;
+use crate::host::replay::{Recording, RecordingError};
 use crate::host::socket::Dialled;
 use crate::record::{LINK_BACK, LINK_LOST};
 use crate::time::Instant;
-use crate::tui::{Failure, Input, LinkInfo, LinkKind};
+use crate::tui::{Failure, Input, LinkInfo, LinkKind, Noted};
 
 /// A network link that was dialled.
 pub(super) struct Dial {
-    /// Which of those dialled so far.
+    /// Which of the links asked for so far.
     number: u64,
     name: String,
     spec: LinkSpec,
     result: Result<Dialled, LinkError>,
 }
 
+/// A recording that was opened.
+pub(super) struct OpenedRecording {
+    /// Which of the links asked for so far.
+    number: u64,
+    name: String,
+    path: PathBuf,
+    result: Result<Recording, RecordingError>,
+}
+
 impl Console {
-    /// Opens a link that does not have to be dialled.
+    /// Opens a link that does not have to be dialled; a recording in a thread.
     pub(super) fn open(&mut self, name: &str, spec: LinkSpec) {
         if let LinkSpec::Replay(path) = spec {
             return self.open_recording(name, path);
@@ -36,14 +46,27 @@ impl Console {
         }
     }
 
+    /// Begins to open a recording, in a thread: a disk may take its time.
     fn open_recording(&mut self, name: &str, path: PathBuf) {
-        let recording = match Recording::open_file(&path) {
+        let (number, name) = (self.dial, name.to_owned());
+        self.in_thread(move || {
+            let result = Recording::open_file(&path);
+            Found::Recording(Box::new(OpenedRecording { number, name, path, result }))
+        });
+    }
+
+    /// Plays a recording that was opened, unless the user has gone on to something else.
+    pub(super) fn take_recording(&mut self, OpenedRecording { number, name, path, result }: OpenedRecording) {
+        if number != self.dial {
+            return;
+        }
+        let recording = match result {
             Ok(recording) => recording,
             Err(error) => return self.handle(Input::LinkFailed((self.world.unreadable)(error))),
         };
         self.take_rest();
         self.close_link();
-        let player = Player::begin(name, path, recording, self.now());
+        let player = Player::begin(&name, path, recording, self.now());
         let info = player.link_info(self.world.baud);
         self.player = Some(player);
         self.handle(Input::LinkOpened(info));
@@ -95,12 +118,23 @@ impl Console {
                 LinkSpec::Serial(_) | LinkSpec::Tcp(_) | LinkSpec::Rfc2217(_) => LinkKind::Unit,
             },
             recording,
-            noted: (self.world.noted)(name),
+            noted: self.noted(name),
             start_of_day,
             start_millis: self.clock.wall(Instant::ZERO).as_millisecond()
                 - i64::try_from(self.skew.as_millis()).unwrap_or_default(),
         });
         self.handle(opened);
+    }
+
+    /// What is noted of an upload on a link, once everything from before is noted; nothing if the journal keeps everybody
+    /// waiting.
+    fn noted(&self, link: &str) -> Option<Noted> {
+        let (noted, link) = (self.world.noted, link.to_owned());
+        let (tell, told) = sync_channel(1);
+        self.writer.run(move || {
+            let _ = tell.try_send(noted(&link));
+        });
+        told.recv_timeout(NOTE_PATIENCE).ok().flatten()
     }
 
     /// The open link has ended by itself.

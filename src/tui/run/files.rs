@@ -1,7 +1,7 @@
 //! What the console asks of files, folders and ports; all of it is done in threads.
 
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::super::picker::is_image_name;
@@ -118,10 +118,23 @@ pub(super) fn create(path: &Path, bytes: &[u8]) -> Result<(), String> {
     })
 }
 
-/// Writes more at the end of a file.
+/// Writes more at the end of a file, all of it or nothing.
 pub(super) fn append(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    let written = File::options().append(true).open(path).and_then(|mut file| file.write_all(bytes));
+    let file = File::options().write(true).open(path);
+    let written = file.and_then(|mut file| write_at_end(&mut file, bytes, |file, end| file.set_len(end)));
     written.map_err(|error| error.to_string())
+}
+
+/// Part of what is to be written would be taken for a whole row, and is cut off again.
+fn write_at_end<F: Write + Seek>(
+    file: &mut F,
+    bytes: &[u8],
+    cut: impl FnOnce(&mut F, u64) -> io::Result<()>,
+) -> io::Result<()> {
+    let end = file.seek(SeekFrom::End(0))?;
+    file.write_all(bytes).inspect_err(|_| {
+        let _ = cut(file, end);
+    })
 }
 
 /// A text file that is not too large.
@@ -179,6 +192,48 @@ mod tests {
         assert_eq!(length, Ok(Some(crate::time::Duration::from_millis(1500))));
         fs::remove_file(&path).expect("removed");
         assert_eq!(in_folder(state.path(), Some(&path)).entries, listed[1..], "what is not there is not listed");
+    }
+
+    #[test]
+    fn of_what_a_full_disk_takes_only_in_part_nothing_stays() {
+        /// A file on a disk that has room for this many bytes.
+        struct Tight(Vec<u8>, usize);
+
+        impl Write for Tight {
+            fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+                let taken = bytes.len().min(self.1 - self.0.len());
+                self.0.extend(&bytes[..taken]);
+                if taken > 0 { Ok(taken) } else { Err(io::ErrorKind::StorageFull.into()) }
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+
+        impl Seek for Tight {
+            fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+                assert_eq!(to, SeekFrom::End(0));
+                Ok(self.0.len() as u64)
+            }
+        }
+
+        let mut file = Tight(b"20.5\n".to_vec(), 12);
+        let mut write = |row: &[u8]| {
+            let written = write_at_end(&mut file, row, |file, end| {
+                file.0.truncate(end as usize);
+                Ok(())
+            });
+            (written.map_err(|error| error.kind()), file.0.clone())
+        };
+        assert_eq!(write(b"20.6\n"), (Ok(()), b"20.5\n20.6\n".to_vec()));
+        assert_eq!(write(b"20.7\n"), (Err(io::ErrorKind::StorageFull), b"20.5\n20.6\n".to_vec()));
+
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rows.csv");
+        fs::write(&path, "20.5\n").expect("written");
+        append(&path, b"20.6\n").expect("there is room");
+        assert_eq!(fs::read(&path).expect("there"), b"20.5\n20.6\n");
     }
 
     #[test]

@@ -2,8 +2,12 @@
 //!
 //! The app is told of everything that happens, its effects are performed in order, and the picture is drawn when
 //! something has changed: at once after a key, otherwise at most once a frame. Nothing wakes the loop without an input or
-//! a due timer. Files, ports and folders are read in threads of their own, files are written in one, and a network link
-//! is dialled in one, so that a slow disk or a silent host does not hold up the keys.
+//! a due timer. Files, ports and folders are read, network links dialled and recordings opened in threads of their own, and
+//! files are written in one, so that a slow disk or a silent host does not hold up the keys.
+//!
+//! The loop itself waits for the disk in two places, where a disk that hangs holds up the keys too: it records each event
+//! before that is shown, so that a killed program has recorded all it has shown; and it reads the recording that it plays,
+//! whose next piece says what time it is.
 
 mod answers;
 mod connecting;
@@ -51,7 +55,8 @@ const LONGEST_WAIT: Duration = Duration::from_secs(3600);
 const PART: usize = 8 * 1024;
 /// How long the console waits at its end for files that are still being written, the terminal given back already.
 const WRITING_PATIENCE: std::time::Duration = std::time::Duration::from_secs(5);
-/// How long an upload waits for its note: far longer than a disk takes. Without a note the next upload asks a question.
+/// How long an upload waits for its note to be written, and a link for what is noted of it: far longer than a disk takes.
+/// Without a note the next upload asks a question.
 const NOTE_PATIENCE: std::time::Duration = std::time::Duration::from_millis(250);
 
 /// What the loop cannot know itself: how the command line names links, and what helps when they fail.
@@ -199,7 +204,7 @@ struct Console {
     orders: VecDeque<PendingOrder>,
     /// The link, which may be lost and come back.
     cable: Option<Cable>,
-    /// The last dial, by number: whatever an earlier one brings is no longer wanted.
+    /// The last link that was asked for, by number: whatever an earlier one brings is no longer wanted.
     dial: u64,
     /// A recording that is being played.
     player: Option<Player>,

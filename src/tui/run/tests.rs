@@ -90,7 +90,7 @@ fn found(console: &Console) -> Found {
 fn answer(console: &Console) -> Input {
     match found(console) {
         Found::News(input) | Found::Answer(_, input) => input,
-        Found::Dialled(_) => panic!("nothing is dialled here"),
+        Found::Dialled(_) | Found::Recording(_) => panic!("no link is opened here"),
     }
 }
 
@@ -114,6 +114,19 @@ fn say(console: &Console, text: &str) {
 
 fn failure() -> Failure {
     Failure { text: "the port has gone".into(), hints: Vec::new() }
+}
+
+#[test]
+fn pictures_come_thirty_times_a_second_at_most_and_what_a_key_changes_at_once() {
+    assert!(FRAME * 30 >= Duration::from_secs(1));
+    let mut pace = Pace { next: Instant::ZERO, hurries: false };
+    pace.drawn(Instant::ZERO);
+    assert_eq!(pace.due(), Instant::ZERO + FRAME);
+    pace.hurries = true;
+    assert_eq!(pace.due(), Instant::ZERO);
+    // The next one pays for it.
+    pace.drawn(Instant::from_millis(1));
+    assert_eq!(pace.due(), Instant::ZERO + FRAME * 2);
 }
 
 #[test]
@@ -263,6 +276,8 @@ fn what_is_not_a_regular_file_is_refused_and_not_waited_for() {
     }
     console.world.resolve = |name| Ok(LinkSpec::Replay(name.into()));
     type_keys(&mut console, &format!("1p{}\r", pipe.display()));
+    let opened = found(&console);
+    console.take_found(opened);
     let picture = Paper::new().picture(&console);
     assert!(picture.contains("Not connected") && picture.contains("a regular file"), "{picture}");
 }
@@ -297,6 +312,37 @@ fn a_journal_that_keeps_everybody_waiting_does_not_keep_an_upload() {
     let noted = Noted { product: "AXTC4CO".into(), image: "a.S".into(), ran: None, begun: "today".into() };
     console.perform(vec![Effect::UploadBegins { link: "u0".into(), noted }, Effect::Quit]);
     assert!(console.quits);
+}
+
+#[test]
+fn a_journal_that_keeps_everybody_waiting_does_not_keep_a_link() {
+    let pty = Pty::open(115_200).expect("a port");
+    let mut console = console();
+    console.world.noted = |_| loop {
+        std::thread::park();
+    };
+    type_keys(&mut console, &format!("1p{}\r", pty.path().display()));
+    assert!(console.connection().is_some());
+}
+
+#[test]
+fn a_recording_is_opened_beside_the_loop_and_not_played_to_a_user_who_has_gone_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("it.cast");
+    std::fs::write(&path, "{\"version\": 2, \"width\": 80, \"height\": 24}\n").expect("written");
+    let mut console = console();
+    console.world.resolve = |name| Ok(LinkSpec::Replay(name.into()));
+    for is_awaited in [false, true] {
+        type_keys(&mut console, &format!("1p{}\r", path.display()));
+        assert!(console.player.is_none(), "a disk may take its time");
+        if !is_awaited {
+            console.handle(Input::Terminal(TerminalEvent::Key(KeyCode::Esc.into())));
+        }
+        let opened = found(&console);
+        assert!(matches!(opened, Found::Recording(_)));
+        console.take_found(opened);
+        assert_eq!(console.player.is_some(), is_awaited);
+    }
 }
 
 #[test]

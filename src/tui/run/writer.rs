@@ -159,7 +159,8 @@ impl Unwritten {
 /// Writes one piece after the other.
 struct Disk<R> {
     report: R,
-    /// Files that could not be made, since they existed already or the disk refused: nothing is added to them.
+    /// Files that could not be made, since they existed already or the disk refused, and those that could not take what
+    /// was to be added: nothing more is added to them, since it would follow on a gap.
     refused: BTreeSet<PathBuf>,
 }
 
@@ -177,6 +178,7 @@ impl<R: Fn(PathBuf, Result<(), String>)> Disk<R> {
             Piece::More(path, _) if self.refused.contains(&path) => {}
             Piece::More(path, bytes) => {
                 if let Err(why) = files::append(&path, &bytes) {
+                    self.refused.insert(path.clone());
                     (self.report)(path, Err(why));
                 }
             }
@@ -186,7 +188,32 @@ impl<R: Fn(PathBuf, Result<(), String>)> Disk<R> {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::RefCell;
+    use std::fs;
+
     use super::*;
+
+    #[test]
+    fn nothing_is_added_after_what_could_not_be_written_until_there_is_a_new_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (path, aside) = (folder.path().join("rows.csv"), folder.path().join("aside.csv"));
+        let told = RefCell::new(Vec::new());
+        let report = |_: PathBuf, result: Result<(), String>| told.borrow_mut().push(result.is_ok());
+        let mut disk = Disk { report, refused: BTreeSet::new() };
+        let create = |text: &str| Piece::New(path.clone(), text.into());
+        let append = |text: &str| Piece::More(path.clone(), text.into());
+        let written = || fs::read_to_string(&path).expect("there");
+        disk.write(create("a"));
+        fs::rename(&path, &aside).expect("moved away");
+        disk.write(append("b"));
+        fs::rename(&aside, &path).expect("moved back");
+        disk.write(append("c"));
+        assert_eq!((written(), told.take()), ("a".into(), vec![true, false]));
+        fs::remove_file(&path).expect("removed");
+        disk.write(create("d"));
+        disk.write(append("e"));
+        assert_eq!((written(), told.take()), ("de".into(), vec![true]));
+    }
 
     #[test]
     fn a_disk_that_hangs_keeps_nobody_waiting_and_its_files_are_named() {
