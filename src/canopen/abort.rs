@@ -7,8 +7,6 @@ use std::fmt;
 pub enum Abort {
     /// The object cannot be accessed in the way asked for.
     UnsupportedAccess,
-    /// The entry can only be written.
-    WriteOnly,
     /// The entry can only be read.
     ReadOnly,
     /// There is no object with this index.
@@ -19,8 +17,6 @@ pub enum Abort {
     MappingTooLong,
     /// The parameters do not go together.
     Incompatible,
-    /// The data has not the length of the entry's type.
-    WrongLength,
     /// The data is longer than the entry's type.
     TooLong,
     /// The data is shorter than the entry's type.
@@ -35,10 +31,6 @@ pub enum Abort {
     TooLow,
     /// The data cannot be transferred or stored: a signature is wrong.
     CannotStore,
-    /// The device's present state does not allow it.
-    PresentState,
-    /// There is nothing to be had at the moment.
-    NoData,
 }
 
 impl Abort {
@@ -46,13 +38,11 @@ impl Abort {
     pub const fn code(self) -> u32 {
         match self {
             Abort::UnsupportedAccess => 0x0601_0000,
-            Abort::WriteOnly => 0x0601_0001,
             Abort::ReadOnly => 0x0601_0002,
             Abort::NoSuchObject => 0x0602_0000,
             Abort::NotMappable => 0x0604_0041,
             Abort::MappingTooLong => 0x0604_0042,
             Abort::Incompatible => 0x0604_0043,
-            Abort::WrongLength => 0x0607_0010,
             Abort::TooLong => 0x0607_0012,
             Abort::TooShort => 0x0607_0013,
             Abort::NoSuchEntry => 0x0609_0011,
@@ -60,8 +50,6 @@ impl Abort {
             Abort::TooHigh => 0x0609_0031,
             Abort::TooLow => 0x0609_0032,
             Abort::CannotStore => 0x0800_0020,
-            Abort::PresentState => 0x0800_0022,
-            Abort::NoData => 0x0800_0024,
         }
     }
 
@@ -69,13 +57,11 @@ impl Abort {
     pub const fn reason(self) -> &'static str {
         match self {
             Abort::UnsupportedAccess => "this access is not supported",
-            Abort::WriteOnly => "the entry can only be written",
             Abort::ReadOnly => "the entry can only be read",
             Abort::NoSuchObject => "there is no object with this index",
             Abort::NotMappable => "the object cannot be mapped into a PDO",
             Abort::MappingTooLong => "the mapped objects are longer than a PDO",
             Abort::Incompatible => "the parameters do not go together",
-            Abort::WrongLength => "the length is not that of the entry's type",
             Abort::TooLong => "the data is longer than the entry's type",
             Abort::TooShort => "the data is shorter than the entry's type",
             Abort::NoSuchEntry => "the object has no entry with this sub-index",
@@ -83,8 +69,6 @@ impl Abort {
             Abort::TooHigh => "the value is above the high limit",
             Abort::TooLow => "the value is below the low limit",
             Abort::CannotStore => "the signature is wrong, nothing was done",
-            Abort::PresentState => "the device's present state does not allow it",
-            Abort::NoData => "there is no data at the moment",
         }
     }
 }

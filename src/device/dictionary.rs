@@ -1,7 +1,7 @@
 //! A product's object dictionary as its manual prints it: names, types, access, limits, defaults, meanings.
 //!
-//! What is here is the same for every unit of a product; the values of one unit are kept by what talks to it or
-//! is it.
+//! What is here is the same for every unit of a product. It holds no unit's present values: those are with whoever reads
+//! them from a unit, and in the emulated unit itself.
 
 use crate::canopen::{DataType, ObjectAddress, Value};
 

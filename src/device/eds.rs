@@ -21,7 +21,7 @@ const REVISION: ObjectAddress = ObjectAddress::new(0x1018, 3);
 /// Objects every CANopen node has (CiA 301, section 7.4.4).
 const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 /// Objects that no configuration is written back to: their values are commands (CiA 306, ObjFlags).
-const NEVER_RESTORED: [u16; 4] = [0x1010, 0x1011, 0x5E00, 0x6125];
+const NEVER_RESTORED: [u16; 2] = [0x1010, 0x1011];
 
 /// A unit as a device configuration file describes it.
 #[derive(Clone, Debug)]

@@ -6,8 +6,9 @@
 
 use serde::Deserialize;
 
+use super::BAUD;
 use crate::image::{FlashMap, Outside};
-use crate::time::Duration;
+use crate::time::{BITS_PER_CHARACTER, Duration};
 
 /// Which generation of loader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
@@ -80,12 +81,17 @@ pub const SECTOR_WORDS: u32 = 512;
 /// Programming one word (public data sheet of the 56F83xx, likely the part).
 pub const PROGRAM_TIME: Duration = Duration::from_micros(20);
 
-/// How long an image of this many characters with this many bytes of data takes, from its first record to its last: the line
-/// at 115200 baud with ten bits a character, and what the loader of the unit does besides. One that stops for pages
-/// erases and programs one after the other while the line is idle; one that stops for records erases all of the
-/// flash after the header, whatever the image's size, and programs while characters come. An estimate, for plans only.
+/// How long this many characters take on the units' line, one directly after the other.
+pub fn line_time(characters: u64) -> Duration {
+    Duration::from_secs_f64(characters as f64 * f64::from(BITS_PER_CHARACTER) / f64::from(BAUD))
+}
+
+/// How long an image of this many characters with this many bytes of data takes, from its first record to its last: the
+/// line, and what the loader of the unit does besides. One that stops for pages erases and programs one after the other
+/// while the line is idle; one that stops for records erases all of the flash after the header, whatever the image's size,
+/// and programs while characters come. An estimate, for plans only.
 pub fn transfer_time(characters: u64, data_bytes: u64, unit: Option<(LoaderKind, &FlashMap)>) -> Duration {
-    let line = Duration::from_secs_f64(characters as f64 / CHARACTERS_PER_SECOND);
+    let line = line_time(characters);
     match unit {
         Some((loader, flash)) if loader.pacing() == Pacing::Records => {
             line + ERASE_TIME * flash.program_words.div_ceil(SECTOR_WORDS)
@@ -98,8 +104,6 @@ pub fn transfer_time(characters: u64, data_bytes: u64, unit: Option<(LoaderKind,
     }
 }
 
-/// What the units' line carries at 115200 baud, 8N1.
-const CHARACTERS_PER_SECOND: f64 = 11_520.0;
 /// Words of the smallest page any part of the family has.
 const SMALLEST_PAGE_WORDS: u32 = 256;
 

@@ -12,7 +12,9 @@ pub mod schema;
 
 pub use complaint::{Complaint, Complaints};
 pub use dictionary::Dictionary;
-pub use loader::{ERASE_TIME, LoaderKind, PROGRAM_TIME, Pacing, RING, SECTOR_WORDS, longest_erase, transfer_time};
+pub use loader::{
+    ERASE_TIME, LoaderKind, PROGRAM_TIME, Pacing, RING, SECTOR_WORDS, line_time, longest_erase, transfer_time,
+};
 
 use std::sync::OnceLock;
 
@@ -165,6 +167,9 @@ pub struct Loader {
     pub file_name: String,
 }
 
+/// Line rate of the service port, in baud (AXTC4CO manual, appendix A).
+pub const BAUD: u32 = 115_200;
+
 /// Highest node-ID (CiA 301); the lowest is 1.
 pub const HIGHEST_NODE_ID: u8 = 127;
 
@@ -191,6 +196,11 @@ impl Product {
     /// The product of this name, in any case.
     pub fn named(name: &str) -> Option<&'static Product> {
         Product::all().iter().find(|product| product.name.eq_ignore_ascii_case(name))
+    }
+
+    /// The layout of rows with this many channels: by them a unit is known that has not said what it is.
+    pub fn layout_with(channels: usize) -> Option<&'static stream::Layout> {
+        Product::all().iter().map(|product| &product.stream).find(|layout| layout.channels.len() == channels)
     }
 
     /// What the check of an image needs to know of this product.
@@ -260,16 +270,17 @@ mod tests {
             layouts: products.iter().map(|product| &product.stream).collect(),
         };
         let table = [
-            ("Password:   23.500;Disabled;OpenCct ;  25.000; 100.125", Some((Prompt::Password, 10))),
-            ("Password:     23.500;  24.000;  24.000;  25.000; 100.125", Some((Prompt::Password, 12))),
-            ("Enter Yes:  21.5; 21.5; 21.5; 21.5;Null ; 21.5; 21.5;Open", Some((Prompt::ConfirmDefaults, 11))),
+            ("Password:   23.500;Disabled;OpenCct ;  25.000; 100.125", Some((Some(Prompt::Password), 10))),
+            ("Password:     23.500;  24.000;  24.000;  25.000; 100.125", Some((Some(Prompt::Password), 12))),
+            ("Enter Yes:  21.5; 21.5; 21.5; 21.5;Null ; 21.5; 21.5;Open", Some((Some(Prompt::ConfirmDefaults), 11))),
             ("  23.500;  24.000;  24.000;  25.000; 100.125", None),
-            ("Total:   23.500;  24.000;  24.000;  25.000; 100.125", None),
+            ("Selection:   23.500;  24.000;  24.000;  25.000; 100.125", Some((None, 11))),
+            ("> 23.500;  24.000;  24.000;  25.000; 100.125", None),
             ("Password:   23.500;  24.000;  24.000", None),
             ("Password: ", None),
         ];
         for (line, expected) in table {
-            assert_eq!(vocabulary.question_before_row(line), expected, "{line:?}");
+            assert_eq!(vocabulary.before_row(line), expected, "{line:?}");
         }
     }
 }

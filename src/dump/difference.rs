@@ -10,10 +10,8 @@ use crate::device::dictionary::Access;
 /// One entry that is not the same on both sides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// Four hexadecimal digits.
-    pub index: String,
-    /// Sub-index.
-    pub subindex: u8,
+    /// Where it is.
+    pub at: ObjectAddress,
     /// Its name.
     pub name: String,
     /// Its value on the left; `None` if it is not there.
@@ -49,18 +47,17 @@ impl Difference {
 pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
     let product = left.product.as_deref().or(right.product.as_deref()).and_then(Product::named);
     let is_setting = |entry: &DumpEntry| {
-        let known = product.zip(entry.at()).and_then(|(product, at)| product.dictionary.entry(at));
+        let known = product.and_then(|product| product.dictionary.entry(entry.at()));
         known.is_none_or(|entry| entry.access == Access::ReadWrite)
     };
     let (of_left, of_right) = (by_place(left), by_place(right));
-    let places: BTreeSet<Place<'_>> = of_left.keys().chain(of_right.keys()).copied().collect();
-    let differs = |place: Place<'_>| {
-        let left = Side { entry: of_left.get(&place).copied(), factory: left.factory };
-        let right = Side { entry: of_right.get(&place).copied(), factory: right.factory };
+    let places: BTreeSet<ObjectAddress> = of_left.keys().chain(of_right.keys()).copied().collect();
+    let differs = |at: ObjectAddress| {
+        let left = Side { entry: of_left.get(&at).copied(), factory: left.factory };
+        let right = Side { entry: of_right.get(&at).copied(), factory: right.factory };
         let entry = left.entry.or(right.entry).filter(|_| !same(left, right))?;
         Some(Difference {
-            index: place.map_or_else(|(index, _)| index.to_owned(), |at| format!("{:04X}", at.index)),
-            subindex: entry.subindex,
+            at,
             name: entry.name.clone(),
             left: left.entry.map(printed),
             right: right.entry.map(printed),
@@ -71,11 +68,8 @@ pub fn differences(left: &Dump, right: &Dump) -> Vec<Difference> {
     places.into_iter().filter_map(differs).collect()
 }
 
-/// Where an entry is; index and sub-index as written if the dump has been edited badly.
-type Place<'a> = Result<ObjectAddress, (&'a str, u8)>;
-
-fn by_place(dump: &Dump) -> BTreeMap<Place<'_>, &DumpEntry> {
-    dump.entries.iter().map(|entry| (entry.at().ok_or((entry.index.as_str(), entry.subindex)), entry)).collect()
+fn by_place(dump: &Dump) -> BTreeMap<ObjectAddress, &DumpEntry> {
+    dump.entries.iter().map(|entry| (entry.at(), entry)).collect()
 }
 
 /// One side of a comparison.
@@ -159,27 +153,6 @@ mod tests {
         assert_eq!(sides, [(Some("Ver. A"), Some("Ver. B"))]);
         left.entries[0].value = Some(1.into());
         assert_eq!(differences(&left, &right)[0].left.as_deref(), Some("1"));
-    }
-
-    #[test]
-    fn an_index_is_the_same_in_any_case_and_a_bad_one_is_shown_as_it_is() {
-        let product = Product::named("AXTC4CO").expect("built in");
-        let (left, mut right) = (Dump::factory(product), Dump::factory(product));
-        for entry in &mut right.entries {
-            entry.index.make_ascii_lowercase();
-        }
-        assert_eq!(differences(&left, &right), []);
-        let mut left = left;
-        (left.factory, right.factory) = (false, false);
-        right.entries.truncate(1);
-        left.entries.truncate(1);
-        left.entries[0].index = "6l26".into();
-        let found = differences(&left, &right);
-        let places: Vec<_> = found.iter().map(|found| (found.index.as_str(), found.left.is_some())).collect();
-        assert_eq!(
-            places,
-            [(format!("{:04X}", right.entries[0].at().expect("good").index).as_str(), false), ("6l26", true)]
-        );
     }
 
     #[test]

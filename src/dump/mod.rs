@@ -19,6 +19,7 @@ use crate::device::dictionary::{Access, Entry, Object};
 use crate::device::emergency::Emergency;
 use crate::device::{Product, eds};
 use crate::session::{DictionaryReading, Facts, ReadEntry};
+use crate::wire::dictionary::Shown;
 use crate::wire::visible;
 
 /// The list of active errors (CiA 301).
@@ -50,10 +51,9 @@ pub struct Dump {
 /// One entry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DumpEntry {
-    /// Four hexadecimal digits.
-    pub index: String,
-    /// Sub-index.
-    pub subindex: u8,
+    #[serde(with = "digits")]
+    index: u16,
+    subindex: u8,
     /// Object and entry as the manual names them; empty if it has no such entry.
     pub name: String,
     /// The value, where the unit shows one that fits the entry's type.
@@ -68,6 +68,9 @@ pub struct DumpEntry {
     pub unit: Option<String>,
     /// What the value means.
     pub meaning: Option<String>,
+    /// The text says a value, but which one is uncertain.
+    #[serde(default)]
+    pub doubtful: bool,
     /// Bits, not a number of something: people read these in hexadecimal digits.
     #[serde(skip)]
     bits: bool,
@@ -76,10 +79,26 @@ pub struct DumpEntry {
 /// An entry that was not shown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Missing {
-    /// Four hexadecimal digits.
-    pub index: String,
-    /// Sub-index.
-    pub subindex: u8,
+    #[serde(with = "digits")]
+    index: u16,
+    subindex: u8,
+}
+
+/// An index as four hexadecimal digits.
+mod digits {
+    use serde::de::{Error, Unexpected};
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(index: &u16, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("{index:04X}"))
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u16, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let is_index = text.len() == 4 && text.bytes().all(|digit| digit.is_ascii_hexdigit());
+        let index = u16::from_str_radix(&text, 16).ok().filter(|_| is_index);
+        index.ok_or_else(|| D::Error::invalid_value(Unexpected::Str(&text), &"four hexadecimal digits"))
+    }
 }
 
 /// What FFFFFFFFh, `nan`, or dashes mean in an entry that is measured (AXTC4CO manual, section 3.3.3).
@@ -92,7 +111,7 @@ const DOUBTFUL: &str = "not certain: hexadecimal?";
 #[derive(Debug, thiserror::Error)]
 pub enum DumpError {
     /// It is not JSON, or not that of a dump.
-    #[error("{name}:{}:{}: this is not a dump: {}", fault.line(), fault.column(), without_place(fault))]
+    #[error("{name}:{}:{}: this is not a dump: {}", fault.line(), fault.column().max(1), without_place(fault))]
     Syntax {
         /// What it was read from.
         name: String,
@@ -118,26 +137,27 @@ impl Dump {
             let entry = object.and_then(|object| object.entry(read.at.sub));
             let default = entry.and_then(|entry| entry.default).map(|default| default.on_node(node_id));
             DumpEntry {
-                index: format!("{:04X}", read.at.index),
+                index: read.at.index,
                 subindex: read.at.sub,
                 name: object.zip(entry).map_or_else(String::new, |(object, entry)| name(object, entry)),
-                value: read.value.and_then(number),
-                text: visible::line(read.numeral.as_deref().unwrap_or(&read.text).as_bytes()),
+                value: read.value().and_then(number),
+                text: visible::line(read.reading.as_ref().map_or(&read.text, |reading| &reading.numeral).as_bytes()),
                 default: default.and_then(number),
                 deviates: entry.is_some_and(|entry| deviates(read, entry, default)),
                 unit: entry.and_then(|entry| entry.unit.clone()),
-                meaning: entry.and_then(|entry| match read.value {
-                    Some(value) => meaning(product?, read.at, entry, value),
-                    None if read.doubtful => Some(DOUBTFUL.to_owned()),
-                    // What could not be read may be anything.
-                    None => (read.known && entry.data_type == DataType::Real32).then(|| NO_READING.to_owned()),
+                // What could not be read may be anything.
+                meaning: entry.zip(read.reading.as_ref()).and_then(|(entry, reading)| match reading.shown {
+                    Shown::Value(value) => meaning(product?, read.at, entry, value),
+                    Shown::Hexadecimal => Some(DOUBTFUL.to_owned()),
+                    Shown::Nothing => (entry.data_type == DataType::Real32).then(|| NO_READING.to_owned()),
                 }),
+                doubtful: read.is_doubtful(),
                 bits: entry.is_some_and(is_bits),
             }
         });
         let missing = product.into_iter().flat_map(|product| product.dictionary.entries()).filter_map(|(at, _, _)| {
             let there = reading.entries.iter().any(|read| read.at == at);
-            (!there).then(|| Missing { index: format!("{:04X}", at.index), subindex: at.sub })
+            (!there).then_some(Missing { index: at.index, subindex: at.sub })
         });
         Dump {
             schema: SCHEMA.to_owned(),
@@ -157,7 +177,7 @@ impl Dump {
         let entries = entries.filter_map(|(at, object, entry)| {
             let default = entry.default?.on_node(product.can.node_id);
             Some(DumpEntry {
-                index: format!("{:04X}", at.index),
+                index: at.index,
                 subindex: at.sub,
                 name: name(object, entry),
                 value: number(default),
@@ -166,6 +186,7 @@ impl Dump {
                 deviates: false,
                 unit: entry.unit.clone(),
                 meaning: entry.meaning(default).map(str::to_owned),
+                doubtful: false,
                 bits: is_bits(entry),
             })
         });
@@ -196,14 +217,12 @@ impl Dump {
         let clean = |text: &mut String| *text = visible::line(text.as_bytes());
         [&mut dump.product, &mut dump.version].into_iter().flatten().for_each(clean);
         for entry in &mut dump.entries {
-            [&mut entry.index, &mut entry.name, &mut entry.text].into_iter().for_each(clean);
+            [&mut entry.name, &mut entry.text].into_iter().for_each(clean);
             [&mut entry.unit, &mut entry.meaning].into_iter().flatten().for_each(clean);
         }
-        dump.missing.iter_mut().for_each(|missing| clean(&mut missing.index));
         if let Some(product) = dump.product.as_deref().and_then(Product::named) {
-            let known = |at: ObjectAddress| product.dictionary.object(at.index)?.entry(at.sub);
             for entry in &mut dump.entries {
-                entry.bits = entry.at().and_then(known).is_some_and(is_bits);
+                entry.bits = product.dictionary.entry(entry.at()).is_some_and(is_bits);
             }
         }
         Ok(dump)
@@ -218,7 +237,8 @@ impl Dump {
     /// The errors in the unit's list 1003h, the newest first, in words.
     pub fn errors(&self) -> impl Iterator<Item = &str> {
         let listed = |entry: &&DumpEntry| {
-            entry.at().is_some_and(|at| at.index == ERROR_FIELD && at.sub > 0)
+            entry.index == ERROR_FIELD
+                && entry.subindex > 0
                 && entry.value.as_ref().and_then(serde_json::Number::as_u64).is_some_and(|bits| bits != 0)
         };
         self.entries.iter().filter(listed).map(|entry| entry.meaning.as_deref().unwrap_or(&entry.text))
@@ -226,7 +246,7 @@ impl Dump {
 
     /// How many entries show a value that is not certain.
     pub fn doubtful(&self) -> usize {
-        self.entries.iter().filter(|entry| entry.value.is_none() && entry.meaning.as_deref() == Some(DOUBTFUL)).count()
+        self.entries.iter().filter(|entry| entry.doubtful).count()
     }
 
     /// How many parameters are not what the factory made them.
@@ -236,6 +256,11 @@ impl Dump {
 }
 
 impl DumpEntry {
+    /// Where it is.
+    pub fn at(&self) -> ObjectAddress {
+        ObjectAddress { index: self.index, sub: self.subindex }
+    }
+
     /// The value as a number; `-` where there is none.
     pub fn number(&self) -> String {
         self.value.as_ref().map_or_else(|| "-".to_owned(), ToString::to_string)
@@ -258,11 +283,12 @@ impl DumpEntry {
             Some((value, _)) => value.to_string(),
         }
     }
+}
 
-    /// Where it is; `None` in a dump that has been edited badly.
-    pub fn at(&self) -> Option<ObjectAddress> {
-        let index = u16::from_str_radix(&self.index, 16).ok()?;
-        Some(ObjectAddress { index, sub: self.subindex })
+impl Missing {
+    /// Where it is.
+    pub fn at(&self) -> ObjectAddress {
+        ObjectAddress { index: self.index, sub: self.subindex }
     }
 }
 
@@ -306,7 +332,7 @@ fn is_bits(entry: &Entry) -> bool {
 /// Whether a parameter is not what the factory made it. Measurements and what is a unit's own are not deviations.
 fn deviates(read: &ReadEntry, entry: &Entry, default: Option<Value>) -> bool {
     let parameter = entry.access == Access::ReadWrite && !matches!(read.at.index, 0x1003 | 0x1010 | 0x1011);
-    let differs = read.value.zip(default).is_some_and(|(value, default)| match (value, default) {
+    let differs = read.value().zip(default).is_some_and(|(value, default)| match (value, default) {
         (Value::Real32(value), Value::Real32(default)) => {
             let (value, default) = (f64::from(value), f64::from(default));
             (value - default).abs() > rounding(&read.text, value)
@@ -343,7 +369,7 @@ fn number(value: Value) -> Option<serde_json::Number> {
 
 /// The reading as a device configuration file (DCF) for this product, read at this moment since 1970.
 pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Facts, unix_millis: i64) -> String {
-    let values = reading.entries.iter().filter_map(|read| Some((read.at, read.value?))).collect::<BTreeMap<_, _>>();
+    let values = reading.entries.iter().filter_map(|read| Some((read.at, read.value()?))).collect::<BTreeMap<_, _>>();
     let configuration = eds::Configuration {
         node_id: facts.node_id.as_ref().map_or(product.can.node_id, |known| known.value),
         kbps: facts.can_kbps.as_ref().map_or(product.can.kbps, |known| known.value),
@@ -357,36 +383,28 @@ pub fn configuration(reading: &DictionaryReading, product: &Product, facts: &Fac
 mod tests {
     use super::*;
     use crate::session::WalkEnd;
+    use crate::wire::dictionary::Reading;
 
     #[test]
     fn what_is_measured_and_shown_as_nothing_is_no_reading() {
         let product = Product::named("AXTC4CO").expect("built in");
         let facts = Facts::default();
         let at = ObjectAddress::new(0x6100, 1);
-        let read = |value| ReadEntry {
-            at,
-            value,
-            text: "TC1 0xFFFFFFFF".into(),
-            span: Default::default(),
-            numeral: Some("0xFFFFFFFF".into()),
-            doubtful: false,
-            known: true,
-        };
-        let dump = |value| {
-            let entries = vec![read(value)];
+        let dump = |text: &str, reading: Option<(Shown, &str)>| {
+            let reading = reading.map(|(shown, numeral)| Reading { shown, numeral: numeral.into(), plain: false });
+            let entries = vec![ReadEntry { at, text: text.into(), span: Default::default(), reading }];
             Dump::of(&DictionaryReading { entries, end: WalkEnd::Whole, unrecognised_lines: 0 }, Some(product), &facts)
         };
-        let (nothing, something) = (dump(None), dump(Some(Value::Real32(23.5))));
+        let nothing = dump("TC1 0xFFFFFFFF", Some((Shown::Nothing, "0xFFFFFFFF")));
+        let something = dump("TC1 23.5", Some((Shown::Value(Value::Real32(23.5)), "23.5")));
         assert_eq!(nothing.entries[0].meaning.as_deref(), Some("no reading"));
         assert!(nothing.table().contains(" -  no reading\n"), "{}", nothing.table());
         assert_eq!(nothing.entries[0].text, "0xFFFFFFFF", "without what the line calls it");
-        let entries = vec![ReadEntry { doubtful: true, numeral: Some("41E80000".into()), ..read(None) }];
-        let reading = DictionaryReading { entries, end: WalkEnd::Whole, unrecognised_lines: 1 };
-        let doubtful = Dump::of(&reading, Some(product), &facts);
+        let doubtful = dump("TC1 41E80000", Some((Shown::Hexadecimal, "41E80000")));
         assert_eq!((doubtful.doubtful(), doubtful.entries[0].meaning.as_deref()), (1, Some(DOUBTFUL)));
+        assert_eq!(Dump::parse("d.json", &doubtful.json()).expect("a dump"), doubtful);
         assert_eq!((nothing.doubtful(), something.doubtful()), (0, 0));
-        let entries = vec![ReadEntry { known: false, numeral: None, text: "TC1: 23,500".into(), ..read(None) }];
-        let unread = Dump::of(&DictionaryReading { entries, ..reading }, Some(product), &facts);
+        let unread = dump("TC1: 23,500", None);
         assert_eq!((unread.entries[0].meaning.as_deref(), unread.entries[0].text.as_str()), (None, "TC1: 23,500"));
         assert_eq!(something.entries[0].meaning, None);
         assert!(something.table().contains("23.5 °C"), "{}", something.table());
@@ -398,17 +416,39 @@ mod tests {
         let mut dump = Dump::factory(product);
         assert_eq!(Dump::parse("d.json", &dump.json()).expect("a dump"), dump);
         dump.version = Some("1\u{9b}J".into());
-        dump.entries[0].index = "61\r12".into();
         dump.entries[0].name = "\u{1b}[2Jname".into();
         dump.entries[0].text = "\n".into();
         dump.entries[0].unit = Some("\t".into());
         dump.entries[0].meaning = Some("\u{202e}on".into());
-        dump.missing.push(Missing { index: "\u{7}".into(), subindex: 0 });
         let read = Dump::parse("d.json", &dump.json()).expect("a dump");
         let entry = &read.entries[0];
-        assert_eq!((entry.index.as_str(), entry.name.as_str(), entry.text.as_str()), ("61^M12", "^[[2Jname", "^J"));
+        assert_eq!((entry.name.as_str(), entry.text.as_str()), ("^[[2Jname", "^J"));
         assert_eq!((entry.unit.as_deref(), entry.meaning.as_deref()), (Some("^I"), Some("‹202e›on")));
-        assert_eq!((read.version.as_deref(), read.missing[0].index.as_str()), (Some("1‹9b›J"), "^G"));
+        assert_eq!(read.version.as_deref(), Some("1‹9b›J"));
         assert!(!read.table().chars().any(|c| c.is_control() && c != '\n'));
+    }
+
+    #[test]
+    fn an_index_is_four_hexadecimal_digits_in_any_case_and_nothing_else() {
+        let mut dump = Dump::factory(Product::named("AXTC4CO").expect("built in"));
+        dump.entries.retain(|entry| entry.index == 0x100C);
+        dump.missing.push(Missing { index: 0x6A, subindex: 1 });
+        let text = dump.json();
+        assert!(text.contains(r#""index":"100C""#) && text.contains(r#""index":"006A""#), "{text}");
+        assert_eq!(Dump::parse("d.json", &text.replace("100C", "100c")).expect("a dump"), dump);
+        for wrong in ["1O0C", "100", "+00C", "0100C", "", "10\\r\\u009b"] {
+            let error = Dump::parse("d.json", &text.replace("100C", wrong)).expect_err(wrong).to_string();
+            assert!(error.starts_with("d.json:1:") && error.contains("four hexadecimal digits"), "{error}");
+            assert!(!error.contains(char::is_control), "{error:?}");
+        }
+    }
+
+    #[test]
+    fn a_dump_of_an_earlier_version_is_read() {
+        let mut dump = Dump::factory(Product::named("AXTC4CO").expect("built in"));
+        dump.factory = false;
+        let text = dump.json().replace(r#","doubtful":false"#, "");
+        assert!(!text.contains("doubtful"));
+        assert_eq!(Dump::parse("d.json", &text).expect("a dump"), dump);
     }
 }

@@ -14,19 +14,19 @@ impl Dump {
             None => "compared with nothing: the unit does not say which product it is".to_owned(),
         };
         for entry in &self.entries {
-            let DumpEntry { index, subindex, name, unit, meaning, .. } = entry;
+            let DumpEntry { name, unit, meaning, .. } = entry;
             let value = entry.shown();
             let unit =
                 unit.as_deref().filter(|_| entry.value.is_some()).map(|unit| format!(" {unit}")).unwrap_or_default();
             let meaning = meaning.as_deref().map(|meaning| format!("  {meaning}")).unwrap_or_default();
-            let mark = if entry.deviates { "*" } else { " " };
+            let (at, mark) = (entry.at(), if entry.deviates { "*" } else { " " });
             let factory = if entry.deviates { format!("  (factory {})", entry.shown_default()) } else { String::new() };
-            text.push_str(&format!("{mark} {index}:{subindex:02X}  {name:<58} {value:>14}{unit}{meaning}{factory}\n"));
+            text.push_str(&format!("{mark} {at}  {name:<58} {value:>14}{unit}{meaning}{factory}\n"));
         }
         let entries = if self.entries.len() == 1 { "entry" } else { "entries" };
         text.push_str(&format!("{} {entries}, {compared}\n", self.entries.len()));
         if !self.missing.is_empty() {
-            let list: Vec<String> = self.missing.iter().map(|at| format!("{}:{:02X}", at.index, at.subindex)).collect();
+            let list: Vec<String> = self.missing.iter().map(|missing| missing.at().to_string()).collect();
             text.push_str(&format!("not shown by the unit: {}\n", list.join(", ")));
         }
         text
@@ -35,12 +35,12 @@ impl Dump {
     /// For spreadsheets, with a heading. A text that a spreadsheet would take for a formula gets a `'` in front; numbers
     /// never do.
     pub fn csv(&self) -> String {
-        let mut text = String::from("index,subindex,name,value,unit,meaning,default,deviates,text\n");
+        let mut text = String::from("index,subindex,name,value,unit,meaning,default,deviates,text,doubtful\n");
         for entry in &self.entries {
             let number =
                 |number: &Option<serde_json::Number>| number.as_ref().map(ToString::to_string).unwrap_or_default();
             let fields = [
-                quoted(&entry.index),
+                format!("{:04X}", entry.index),
                 entry.subindex.to_string(),
                 quoted(&entry.name),
                 number(&entry.value),
@@ -49,6 +49,7 @@ impl Dump {
                 number(&entry.default),
                 u8::from(entry.deviates).to_string(),
                 quoted(&entry.text),
+                u8::from(entry.doubtful).to_string(),
             ];
             text.push_str(&fields.join(","));
             text.push('\n');
@@ -74,7 +75,7 @@ mod tests {
         let mut dump = Dump::factory(Product::named("AXTC4CO").expect("built in"));
         dump.entries.truncate(1);
         let entry = &mut dump.entries[0];
-        (entry.index, entry.name) = ("@1000".into(), "+cmd|'/c calc'!A0".into());
+        (entry.index, entry.name) = (0x100A, "+cmd|'/c calc'!A0".into());
         (entry.value, entry.default) = (serde_json::Number::from_f64(-4.5), Some((-1).into()));
         (entry.unit, entry.meaning) = (Some("-1+1".into()), Some("on".into()));
         for (text, field) in [
@@ -85,7 +86,7 @@ mod tests {
         ] {
             dump.entries[0].text = text.into();
             let csv = dump.csv();
-            let expected = format!("'@1000,0,'+cmd|'/c calc'!A0,-4.5,'-1+1,on,-1,0,{field}");
+            let expected = format!("100A,0,'+cmd|'/c calc'!A0,-4.5,'-1+1,on,-1,0,{field},0");
             assert_eq!(csv.lines().nth(1), Some(expected.as_str()));
         }
     }

@@ -1,7 +1,7 @@
 //! Active errors: what underlies the error register 1001h and the list 1003h (manuals, sections 3.2.2 and 3.2.4).
 //!
-//! The list holds what is active, the newest first; an error leaves it when it clears. A list that is emptied by hand
-//! stays empty of what is still active until that has gone and come again (errata E-73, E-D13).
+//! The list holds what is active, the newest first; an error leaves it when it clears. After the list is cleared by hand,
+//! an error that is still active is listed again only once it has cleared and returned (errata E-73, E-D13).
 
 use std::collections::VecDeque;
 

@@ -5,11 +5,10 @@
 
 use std::collections::VecDeque;
 
+use crate::device::BAUD;
 use crate::endpoint::Transmit;
 use crate::time::{Duration, Instant, character_time};
 
-/// Bits a second on the service port (AXTC4CO manual, appendix A).
-pub const BAUD: u32 = 115_200;
 /// Lets the other side go on.
 pub const XON: u8 = 0x11;
 /// Stops the other side.

@@ -2,14 +2,14 @@
 //! and the text of the line. The console shows it, a report prints it.
 
 mod diagnostics;
-mod plugged;
 mod scrollback;
+mod stand_in;
 mod stream;
 mod trend;
 
 pub use diagnostics::{Diagnostics, Tracked};
-pub use plugged::Plugged;
 pub use scrollback::{KEPT_LINES, Origin, Scrollback, TextLine};
+pub use stand_in::StandIn;
 pub use stream::{Channel, Fault, Faults, Mark, Sample, Stream};
 
 use crate::device::Product;

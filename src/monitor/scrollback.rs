@@ -49,6 +49,8 @@ pub struct Scrollback {
     followed: u64,
     from_unit: Writer,
     to_unit: Writer,
+    /// Room for what one byte is shown as.
+    shown: String,
 }
 
 /// The line of one direction.
@@ -144,9 +146,11 @@ impl Scrollback {
     }
 
     fn write(&mut self, at: Instant, direction: Direction, byte: u8) {
-        let mut text = String::new();
+        let mut text = std::mem::take(&mut self.shown);
+        text.clear();
         self.writer_mut(direction).visible.push(&[byte], &mut text);
         self.append(at, direction, &text);
+        self.shown = text;
         if self.line(at, direction).text.len() >= LONGEST_LINE {
             self.end_line(at, direction);
         }

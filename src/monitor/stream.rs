@@ -1,12 +1,13 @@
 //! The data stream as the screens show it: channels with their values, trends and faults.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 
-use super::plugged::Plugged;
+use super::stand_in::StandIn;
 use super::trend::Trend;
 use crate::device::Product;
 use crate::time::{Duration, Instant};
-use crate::wire::stream::{Layout, Reading, Row, Source};
+use crate::wire::stream::{Reading, Row, Source};
 
 /// Samples kept of each channel as they came; a [`Trend`] keeps the rest.
 pub const KEPT_SAMPLES: usize = 3600;
@@ -32,6 +33,8 @@ const LATE_AT_LEAST: Duration = Duration::from_secs(2);
 pub struct Stream {
     /// What the newest row carries.
     pub source: Option<Source>,
+    /// Digits after the point of its numbers, as printed.
+    pub decimals: usize,
     /// The channels, in the row's order.
     pub channels: Vec<Channel>,
     /// Rows since the channels began.
@@ -71,7 +74,7 @@ pub struct Channel {
     /// The newest reading.
     pub reading: Reading,
     /// Some numbers of it may stand for a fault.
-    has_plugged: bool,
+    has_stand_ins: bool,
     /// Smallest value.
     pub min: Option<f64>,
     /// Largest value.
@@ -121,11 +124,12 @@ impl Stream {
     /// Takes in a row; faults that begin or end with it are noted in `faults`.
     pub(super) fn row(&mut self, at: Instant, row: &Row, product: Option<&Product>, faults: &mut Faults) {
         let names = channel_names(product, row.readings.len());
-        let same =
-            self.source == Some(row.source) && self.channels.iter().map(|channel| &channel.name).eq(names.iter());
+        let same = (self.source, self.decimals) == (Some(row.source), row.decimals)
+            && self.channels.iter().map(|channel| &channel.name).eq(names.iter());
         if !same {
             let marks = std::mem::take(&mut self.marks);
-            *self = Stream { source: Some(row.source), marks, set: self.set, ..Stream::default() };
+            let (source, decimals) = (Some(row.source), row.decimals);
+            *self = Stream { source, decimals, marks, set: self.set, ..Stream::default() };
             // No row will ever say that they are over.
             faults.end_all(at, |fault| !names.contains(&fault.channel));
             self.channels = names.iter().cloned().map(Channel::new).collect();
@@ -143,12 +147,12 @@ impl Stream {
         self.newest = Some(at);
         self.rows += 1;
         self.late = false;
-        let has_plugged = Plugged::are_in(row.source, product, &names);
+        let has_stand_ins = StandIn::are_in(row.source, product, &names);
         for (channel, &reading) in self.channels.iter_mut().zip(&row.readings) {
-            channel.has_plugged = has_plugged;
+            channel.has_stand_ins = has_stand_ins;
             channel.read(at, reading, gap_since);
             // This shows neither a fault nor that one is over.
-            if channel.plugged().is_none() {
+            if channel.stand_in().is_none() {
                 faults.note(&channel.name, Some(reading).filter(|reading| reading.is_fault()), at);
             }
         }
@@ -241,7 +245,7 @@ impl Stream {
     /// Restarts minimum, maximum and mean of every channel.
     pub fn restart_extremes(&mut self) {
         for channel in &mut self.channels {
-            let value = channel.reading.value().filter(|_| channel.plugged().is_none());
+            let value = channel.reading.value().filter(|_| channel.stand_in().is_none());
             (channel.min, channel.max) = (value, value);
             channel.sum = value.map_or((0.0, 0), |value| (value, 1));
         }
@@ -254,7 +258,7 @@ impl Stream {
             let readings: Option<Vec<Reading>> =
                 self.channels.iter().map(|channel| channel.history.get(number).map(|sample| sample.reading)).collect();
             let at = self.channels.first()?.history.get(number)?.at;
-            Some((at, Row { source: self.source?, readings: readings? }))
+            Some((at, Row { source: self.source?, decimals: self.decimals, readings: readings? }))
         })
     }
 }
@@ -264,7 +268,7 @@ impl Channel {
         Channel {
             name,
             reading: Reading::Disabled,
-            has_plugged: false,
+            has_stand_ins: false,
             min: None,
             max: None,
             sum: (0.0, 0),
@@ -278,7 +282,7 @@ impl Channel {
         let value = reading.value();
         self.reading = reading;
         // A number that may stand for a fault says nothing of what was measured.
-        if let Some(value) = value.filter(|_| self.plugged().is_none()) {
+        if let Some(value) = value.filter(|_| self.stand_in().is_none()) {
             self.min = Some(self.min.map_or(value, |min| min.min(value)));
             self.max = Some(self.max.map_or(value, |max| max.max(value)));
             self.sum = (self.sum.0 + value, self.sum.1 + 1);
@@ -300,17 +304,17 @@ impl Channel {
 
     /// The same of an earlier one.
     pub fn words_of(&self, reading: Reading) -> &'static str {
-        self.plugged_of(reading).map_or(reading.words(), Plugged::words)
+        self.stand_in_of(reading).map_or(reading.words(), StandIn::words)
     }
 
     /// What the newest reading may stand for besides a value.
-    pub fn plugged(&self) -> Option<Plugged> {
-        self.plugged_of(self.reading)
+    pub fn stand_in(&self) -> Option<StandIn> {
+        self.stand_in_of(self.reading)
     }
 
     /// The same of an earlier one.
-    pub fn plugged_of(&self, reading: Reading) -> Option<Plugged> {
-        Plugged::of(reading).filter(|_| self.has_plugged)
+    pub fn stand_in_of(&self, reading: Reading) -> Option<StandIn> {
+        StandIn::of(reading).filter(|_| self.has_stand_ins)
     }
 
     /// Mean of the values since minimum and maximum began.
@@ -365,13 +369,11 @@ impl Sample {
 }
 
 /// Names from the product's file; a unit that has not said what it is gives them away by their number.
-fn channel_names(product: Option<&Product>, count: usize) -> Vec<String> {
-    let fits = |layout: &&Layout| layout.channels.len() == count;
-    let known = product.map(|product| &product.stream).filter(fits);
-    let likely = || Product::all().iter().map(|product| &product.stream).find(fits);
-    match known.or_else(likely) {
-        Some(layout) => layout.channels.clone(),
-        None => (1..=count).map(|number| format!("#{number}")).collect(),
+fn channel_names(product: Option<&Product>, count: usize) -> Cow<'_, [String]> {
+    let known = product.map(|product| &product.stream).filter(|layout| layout.channels.len() == count);
+    match known.or_else(|| Product::layout_with(count)) {
+        Some(layout) => Cow::Borrowed(layout.channels.as_slice()),
+        None => Cow::Owned((1..=count).map(|number| format!("#{number}")).collect()),
     }
 }
 
@@ -437,7 +439,7 @@ mod tests {
 
     fn row(monitor: &mut Monitor, millis: u64, readings: [Reading; 5]) {
         let at = Instant::from_millis(millis);
-        let row = Row { source: Source::FieldValue, readings: readings.to_vec() };
+        let row = Row { source: Source::FieldValue, decimals: 3, readings: readings.to_vec() };
         monitor.fold(&Event::Row { at, span: Span::default(), row }, None);
     }
 
@@ -445,7 +447,7 @@ mod tests {
     fn a_fault_ends_with_its_channel() {
         let mut monitor = Monitor::default();
         row(&mut monitor, 1000, with_first(Reading::Open));
-        let fewer = Row { source: Source::FieldValue, readings: vec![Reading::Value(1.0)] };
+        let fewer = Row { source: Source::FieldValue, decimals: 3, readings: vec![Reading::Value(1.0)] };
         let at = Instant::from_millis(2000);
         monitor.fold(&Event::Row { at, span: Span::default(), row: fewer }, None);
         let names: Vec<_> = monitor.stream.channels.iter().map(|channel| channel.name.clone()).collect();
@@ -476,7 +478,7 @@ mod tests {
         let pv = |monitor: &mut Monitor, second: u64, source, first, product| {
             let mut readings = vec![Reading::Value(10.0); 8];
             readings[0] = first;
-            let (at, row) = (Instant::from_millis(1000 * second), Row { source, readings });
+            let (at, row) = (Instant::from_millis(1000 * second), Row { source, decimals: 0, readings });
             monitor.fold(&Event::Row { at, span: Span::default(), row }, product);
         };
         let value = Reading::Value;
@@ -499,6 +501,18 @@ mod tests {
         assert_eq!(monitor.stream.channels[0].words(), "ok");
         pv(&mut monitor, 11, Source::ProcessValue, value(-512.0), Product::named("AXTC4CO"));
         assert_eq!(monitor.stream.channels[0].words(), "ok");
+    }
+
+    #[test]
+    fn rows_that_are_kept_have_the_digits_that_were_printed() {
+        let mut monitor = Monitor::default();
+        let layout = Product::layout_with(8).expect("there is one");
+        for text in [["  4768"; 8].join(";"), ["  56.0"; 8].join(";")] {
+            let row = layout.parse(&text).expect("a row");
+            monitor.fold(&Event::Row { at: Instant::ZERO, span: Span::default(), row: row.clone() }, None);
+            assert_eq!(monitor.stream.kept_rows().map(|(_, kept)| kept).collect::<Vec<_>>(), [row]);
+        }
+        assert_eq!(monitor.stream.decimals, 1);
     }
 
     #[test]

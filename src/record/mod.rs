@@ -90,7 +90,7 @@ const ENTRY_BYTES: usize = 4096;
 const ENTRY_COST: usize = size_of::<Entry>() + 16;
 
 /// The newest bytes, both directions, in order.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Record {
     entries: VecDeque<Entry>,
     /// Entries let go since the record began: the number of the first one kept.
@@ -98,18 +98,25 @@ pub struct Record {
     kept: usize,
     from_unit: u64,
     to_unit: u64,
-    limit: Option<usize>,
+    /// The most memory kept, in bytes.
+    limit: usize,
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Record::new()
+    }
 }
 
 impl Record {
     /// An empty record.
     pub fn new() -> Self {
-        Record::default()
+        Record::with_limit(KEPT_BYTES)
     }
 
     /// An empty record that keeps `limit` bytes of memory instead of [`KEPT_BYTES`].
     pub fn with_limit(limit: usize) -> Self {
-        Record { limit: Some(limit), ..Record::default() }
+        Record { entries: VecDeque::new(), dropped: 0, kept: 0, from_unit: 0, to_unit: 0, limit }
     }
 
     /// Appends bytes and says where they are among those of their direction.
@@ -130,8 +137,7 @@ impl Record {
             self.entries.push_back(Entry { at, direction, secrecy, start, bytes: kept });
             start += chunk.len() as u64;
         }
-        let limit = self.limit.unwrap_or(KEPT_BYTES);
-        while self.kept > limit && self.entries.len() > 1 {
+        while self.kept > self.limit && self.entries.len() > 1 {
             if let Some(oldest) = self.entries.pop_front() {
                 self.kept -= oldest.bytes.len() + ENTRY_COST;
                 self.dropped += 1;

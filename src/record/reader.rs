@@ -57,7 +57,7 @@ pub struct ReadError {
 pub enum Ending {
     /// With a complete line.
     Whole,
-    /// In the middle of a line: its writer was killed, or the file was cut.
+    /// In the middle of a line: its writer was killed, its disk was full, or the file was cut.
     CutShort,
 }
 

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Direction, XOFF, XON};
+use crate::count::noun;
 use crate::time::{Duration, Instant};
 
 /// Numbers of one session.
@@ -48,9 +49,9 @@ impl Tally {
         format!(
             "{received} {} received, {sent} sent; XOFF {xoff} {}, XON {xon} {}; longest hold {hold:.3} s, \
              longest silence of the unit {silence:.3} s",
-            plural(*received, "byte"),
-            plural(*xoff, "time"),
-            plural(*xon, "time")
+            noun(*received, "byte"),
+            noun(*xoff, "time"),
+            noun(*xon, "time")
         )
     }
 
@@ -65,10 +66,6 @@ impl Tally {
             }
         }
     }
-}
-
-fn plural(number: u64, what: &str) -> String {
-    format!("{what}{}", if number == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]

@@ -107,11 +107,12 @@ impl Contents<'_> {
         let (Some(source), Some(newest)) = (stream.source, stream.newest) else {
             return page.paragraph("The stream has shown none.");
         };
-        let (what, decimals) = match source {
-            Source::FieldValue => ("field values (6100h) in °C", 3),
-            Source::ProcessValue => ("process values (7130h) in counts", 0),
+        let what = match source {
+            Source::FieldValue => "field values (6100h) in °C",
+            Source::ProcessValue => "process values (7130h) in counts",
         };
         page.paragraph(&format!("{} rows, the last at {}: {what}.", stream.rows, self.time(newest)));
+        let decimals = stream.decimals;
         let show = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
         let rows = stream.channels.iter().map(|channel| {
             let words = channel.words();
@@ -151,7 +152,7 @@ impl Contents<'_> {
         };
         page.paragraph(&format!("{} entries, {compared}.{complete}", dump.entries.len()));
         let rows = dump.entries.iter().map(|entry| {
-            let address = format!("{}:{:02X}", entry.index, entry.subindex);
+            let address = entry.at().to_string();
             let unit = entry.unit.as_deref().unwrap_or_default();
             let value = if entry.value.is_some() { format!("{} {unit}", entry.shown()) } else { entry.text.clone() };
             let meaning = entry.meaning.clone().unwrap_or_default();
@@ -187,24 +188,37 @@ impl Contents<'_> {
 /// What is in a place of a table, and how.
 pub struct Cell {
     text: String,
-    look: &'static str,
+    look: Look,
+}
+
+/// How a cell of a table looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// Like most.
+    Plain,
+    /// A fault.
+    Bad,
+    /// Not as the factory made it.
+    Marked,
+    /// A number among those above and below it.
+    Number,
 }
 
 impl Cell {
     fn plain(text: impl Into<String>) -> Self {
-        Cell { text: text.into(), look: "" }
+        Cell { text: text.into(), look: Look::Plain }
     }
 
     fn bad(text: impl Into<String>) -> Self {
-        Cell { text: text.into(), look: "bad" }
+        Cell { text: text.into(), look: Look::Bad }
     }
 
     fn marked(text: impl Into<String>) -> Self {
-        Cell { text: text.into(), look: "mark" }
+        Cell { text: text.into(), look: Look::Marked }
     }
 
     fn number(text: impl Into<String>) -> Self {
-        Cell { text: text.into(), look: "n" }
+        Cell { text: text.into(), look: Look::Number }
     }
 }
 
@@ -230,6 +244,7 @@ fn known<T>(label: &str, fact: &Option<Known<T>>, show: impl Fn(&T) -> String) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::Product;
     use crate::monitor::KEPT_LINES;
     use crate::record::Span;
     use crate::session::Event;
@@ -292,7 +307,7 @@ mod tests {
         let mut monitor = Monitor::default();
         for second in 0..20u64 {
             let reading = if (8..12).contains(&second) { Reading::Open } else { Reading::Value(second as f64) };
-            let row = Row { source: Source::FieldValue, readings: vec![reading; 5] };
+            let row = Row { source: Source::FieldValue, decimals: 3, readings: vec![reading; 5] };
             let at = Instant::from_millis(1000 * second);
             monitor.fold(&Event::Row { at, span: Span::default(), row }, None);
         }
@@ -309,5 +324,33 @@ mod tests {
         let html = contents.html();
         assert_eq!(html.matches("<polyline").count(), 10, "two stretches for each of five channels");
         assert!(html.contains("<td>12:00:08</td><td>12:00:12</td>"), "{html}");
+    }
+
+    #[test]
+    fn values_have_the_digits_that_the_unit_printed() {
+        let layout = Product::layout_with(8).expect("there is one");
+        let degrees = ([56.0, 57.0], ["57.0", "56.0", "57.0", "56.5"]);
+        let counts = ([4.0, 8.0], ["8", "4", "8", "6"]);
+        for (readings, shown) in [degrees, counts] {
+            let mut monitor = Monitor::default();
+            let decimals = usize::from(shown[0].contains('.'));
+            for value in readings {
+                let row = layout.parse(&[format!("{value:6.decimals$}").as_str(); 8].join(";")).expect("a row");
+                monitor.fold(&Event::Row { at: Instant::ZERO, span: Span::default(), row }, None);
+            }
+            let contents = Contents {
+                link: "u0",
+                made: "2026-01-31 12:00",
+                facts: &Facts::default(),
+                monitor: &monitor,
+                dump: None,
+                missing: &[],
+                transcript: &Scrollback::default(),
+                start_of_day: Duration::ZERO,
+            };
+            let html = contents.html();
+            let [value, min, max, mean] = shown.map(|number| format!("<td class=\"n\">{number}</td>"));
+            assert!(html.contains(&format!("<td>RTD1</td>{value}<td>ok</td>{min}{max}{mean}")), "{html}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! HTML, as little of it as a report needs.
 
-use super::Cell;
+use super::{Cell, Look};
 
 /// A page being written.
 pub struct Page {
@@ -52,9 +52,15 @@ impl Page {
         for row in rows {
             let cells: String = row
                 .iter()
-                .map(|cell| match cell.look {
-                    "" => format!("<td>{}</td>", escaped(&cell.text)),
-                    look => format!("<td class=\"{look}\">{}</td>", escaped(&cell.text)),
+                .map(|cell| {
+                    // The classes of the page's style.
+                    let class = match cell.look {
+                        Look::Plain => "",
+                        Look::Bad => " class=\"bad\"",
+                        Look::Marked => " class=\"mark\"",
+                        Look::Number => " class=\"n\"",
+                    };
+                    format!("<td{class}>{}</td>", escaped(&cell.text))
                 })
                 .collect();
             self.html.push_str(&format!("<tr>{cells}</tr>\n"));

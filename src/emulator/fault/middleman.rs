@@ -6,8 +6,9 @@
 
 use std::collections::VecDeque;
 
-use super::super::uart::{BAUD, XOFF, XON};
+use super::super::uart::{XOFF, XON};
 use super::{Deed, LineFault, Mishap, RecordFault, Setting, Way, When};
+use crate::device::BAUD;
 use crate::rng::Rng;
 use crate::time::{Duration, Instant, character_time};
 

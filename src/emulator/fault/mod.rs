@@ -411,5 +411,24 @@ mod tests {
                 prop_assert_eq!(read(&fault.to_string()), Ok(fault));
             }
         }
+
+        #[test]
+        fn every_fault_of_the_grammar_is_read_and_written_the_same(
+            text in concat!(
+                "(lost|doubled|corrupted|late) (to|from)-unit (at byte|one in) [1-9][0-9]{0,11}",
+                "|unreadable to-unit (at byte|one in) [1-9][0-9]{0,11}",
+                "|late (to|from)-unit (at byte|one in) [1-9][0-9]{0,11} by [1-9][0-9]{0,3}",
+                "|no-xon (at xoff|one in) [1-9][0-9]{0,11}",
+                "|reset at record [1-9][0-9]{0,11}",
+                "|(power-cut at record|unplug (to|from)-unit at byte) [1-9][0-9]{0,11}( for [0-9]{1,4}([.]25)?)?",
+                "|flash (worn-out|protected|stuck) at word (0x[0-9a-fA-F]{1,4}|[0-9]{1,4})",
+                "|latency [0-9]{1,4}|queue [0-9]{1,3}",
+            )
+        ) {
+            let fault = read(&text);
+            prop_assert!(fault.is_ok(), "{text}: {fault:?}");
+            let written = fault.clone().map(|fault| fault.to_string());
+            prop_assert_eq!(written.and_then(|written| read(&written)), fault, "{}", text);
+        }
     }
 }

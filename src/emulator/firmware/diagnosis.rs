@@ -28,7 +28,7 @@ impl Firmware {
         let inputs = layout.channels.iter().zip(&row.readings).skip(before);
         let channels = (1u8..).zip(inputs).map(|(number, (name, reading))| ChannelDiagnosis {
             name: name.clone(),
-            field_value: layout.emit(&Row { source: Source::FieldValue, readings: vec![*reading] }),
+            field_value: layout.emit(&Row { readings: vec![*reading], ..row }),
             process_value: objects.integer(0x7130, number),
             status: objects.integer(0x6150, number) as u8,
             microvolts: objects.integer(0x2010, number),

@@ -24,8 +24,10 @@ use thermocouples::Thermocouples;
 pub enum Reading {
     /// °C.
     Celsius(f64),
-    /// Switched off (object 6112h), or not read yet.
+    /// Switched off (object 6112h).
     Off,
+    /// Switched on, and not read since.
+    Unread,
     /// Open circuit.
     Open,
     /// Short circuit.
@@ -126,7 +128,7 @@ impl Measurement {
     /// Begins at the unit's start. The supply is known at once, everything else has no value yet.
     pub fn start(now: Instant, product: &Product, sensors: &Sensors, objects: &mut Objects) -> Self {
         let channel = Channel {
-            reading: Reading::Off,
+            reading: Reading::Unread,
             thresholds: [Threshold::Kept; 3],
             settings: Settings::default(),
             sensor_error: None,
@@ -204,9 +206,11 @@ impl Measurement {
         for (number, channel) in (1u8..).zip(&mut self.channels) {
             // A channel that is switched off says so at once, whichever is being read.
             let off = objects.integer(0x6112, number) == 0;
-            if off {
-                channel.reading = Reading::Off;
-            }
+            channel.reading = match channel.reading {
+                _ if off => Reading::Off,
+                Reading::Off => Reading::Unread,
+                reading => reading,
+            };
             if all || off || updated.includes(number) {
                 raised.extend(channel.evaluate(now, number, objects, errors));
             }
@@ -279,7 +283,7 @@ impl Channel {
     ) -> Vec<Emergency> {
         let (mut raised, mut cleared) = self.watch(now, number, objects);
         let sensor_error = match self.reading {
-            Reading::Celsius(_) | Reading::Off => None,
+            Reading::Celsius(_) | Reading::Off | Reading::Unread => None,
             Reading::Open => Some(Emergency { code: INPUT_OVERLOAD, channel: number, description: 0x02 }),
             Reading::Short => Some(Emergency { code: INPUT_OVERLOAD, channel: number, description: 0x04 }),
             Reading::MathError => Some(Emergency { code: DEVICE_SPECIFIC, channel: number, description: 0x08 }),
@@ -293,7 +297,7 @@ impl Channel {
         let (factor, offset) = (objects.number(0x6126, number), objects.number(0x6127, number));
         let (field_value, process_value) = match self.reading {
             Reading::Celsius(celsius) => (Value::Real32(celsius as f32), scaled(celsius, factor, offset)),
-            Reading::Off => (Value::NOT_A_NUMBER, PV_OFF),
+            Reading::Off | Reading::Unread => (Value::NOT_A_NUMBER, PV_OFF),
             Reading::Open => (Value::NOT_A_NUMBER, PV_OPEN),
             Reading::Short => (Value::NOT_A_NUMBER, PV_SHORT),
             // Errata E-C22.
@@ -351,7 +355,7 @@ impl Channel {
     fn status(&self) -> u8 {
         let [low, high, shutdown] = self.thresholds.map(|threshold| threshold == Threshold::Exceeded);
         match self.reading {
-            Reading::Off => 0x00,
+            Reading::Off | Reading::Unread => 0x00,
             Reading::Open => 0x03,
             Reading::Short => 0x05,
             Reading::MathError => 0x09,
@@ -371,7 +375,7 @@ pub fn row(objects: &Objects, source: Source) -> Row {
         Source::FieldValue => 0x6100,
         Source::ProcessValue => 0x7130,
     };
-    let mut readings = Vec::with_capacity(product.stream.channels.len());
+    let mut row = product.stream.row(source);
     if product.measurement.sensors == SensorKind::Thermocouple {
         // The cold junction comes first (errata E-104).
         let index = match source {
@@ -380,11 +384,11 @@ pub fn row(objects: &Objects, source: Source) -> Row {
         };
         // A converter that has been frozen since the start has never read it.
         let unread = objects.number(0x3100, 0).is_nan();
-        readings.push(if unread { Field::Disabled } else { Field::Value(objects.number(index, 0)) });
+        row.readings.push(if unread { Field::Disabled } else { Field::Value(objects.number(index, 0)) });
     }
-    readings.extend((1..=product.measurement.channels).map(|channel| {
+    row.readings.extend((1..=product.measurement.channels).map(|channel| {
         let status = objects.integer(0x6150, channel);
-        // One that has just been switched on has the value of one that is off until it is read.
+        // No value, and no error that explains it: it is off, or has not been read since it was switched on.
         let unread = status == 0 && objects.number(0x6100, channel).is_nan();
         match status {
             _ if unread || objects.integer(0x6112, channel) == 0 => Field::Disabled,
@@ -394,7 +398,7 @@ pub fn row(objects: &Objects, source: Source) -> Row {
             _ => Field::Value(objects.number(value_index, channel)),
         }
     }));
-    Row { source, readings }
+    row
 }
 
 /// Process value = field value x factor + offset, to the nearest, saturating (section 1.2, errata E-48, E-C18, E-C19).

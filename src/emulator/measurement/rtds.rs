@@ -157,7 +157,7 @@ impl Rtds {
                 return Reading::Open;
             }
             // Its wires have been read, by a converter that stood still before.
-            Sensor::Unread => return Reading::Off,
+            Sensor::Unread => return Reading::Unread,
         };
         let wires = match wiring {
             Wiring::Two => 0.0,

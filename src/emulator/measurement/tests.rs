@@ -601,8 +601,10 @@ fn a_row_says_why_a_value_is_missing() {
     let field_values = row(&bench.objects, Source::FieldValue);
     assert_eq!(field_values.readings[..3], [Field::Disabled, Field::Open, Field::Short]);
     assert!(matches!(field_values.readings[3], Field::Value(celsius) if (celsius - 20.0).abs() < 0.1));
+    assert_eq!(bench.measurement.channels[0].reading, Reading::Off);
     bench.write(0x6112, 1, 1.0);
-    for _ in 0..12 {
+    for round in 0..12 {
+        assert!(round == 0 || bench.measurement.channels[0].reading != Reading::Off, "it is on");
         let reading = row(&bench.objects, Source::FieldValue).readings[0];
         let is_read = matches!(reading, Field::Value(celsius) if (celsius - 20.0).abs() < 0.1);
         assert!(is_read || reading == Field::Disabled, "{reading:?} of a channel that has just been switched on");

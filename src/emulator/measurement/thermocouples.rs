@@ -30,7 +30,7 @@ impl Thermocouples {
         objects.set(0x3100, 0, Value::NOT_A_NUMBER);
         objects.set(0x3130, 0, Value::Integer16(PV_OFF));
         let channels = usize::from(channels);
-        Thermocouples { open_scans: vec![0; channels], last: vec![Reading::Off; channels] }
+        Thermocouples { open_scans: vec![0; channels], last: vec![Reading::Unread; channels] }
     }
 
     /// Reads all channels.
@@ -73,7 +73,7 @@ impl Thermocouples {
                 }
             };
             // A channel that is read for the first time and open has nothing to hold.
-            if *last == Reading::Off {
+            if *last == Reading::Unread {
                 *last = Reading::Open;
             }
             read(number, *last);

@@ -14,7 +14,7 @@ use crate::time::{Duration, Instant};
 /// Content of an erased word.
 const ERASED: u16 = 0xFFFF;
 
-/// How long a loader waits for a flash that does not come to an end: five times what erasing takes. A guess.
+/// How long a loader waits for an operation that does not end: five times what erasing takes. A guess.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Program flash with the operation that runs on it.
@@ -37,7 +37,7 @@ pub enum Written {
     Mismatch,
     /// The flash has refused: something there is protected. Nothing has changed.
     Refused,
-    /// The flash did not come to an end, and the loader has stopped to wait for it. Nothing has changed.
+    /// The operation did not end, and the loader has stopped waiting for it. Nothing has changed.
     Stuck,
 }
 

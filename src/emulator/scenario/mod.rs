@@ -13,6 +13,7 @@ pub use verb::{HELP, Verb};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::knob::{Knob, KnobError};
 use super::sensors::Sensors;
 use super::words::{self, shown};
 use crate::device::{Complaint, Complaints, Product};
@@ -76,7 +77,13 @@ impl Scenario {
         let mut complaints = Complaints::about(file, text);
         let raw: RawScenario = match toml::from_str(text) {
             Ok(raw) => raw,
-            Err(error) => return Err(complaints.ended_by(&error)),
+            Err(error) => {
+                if let Some(key) = key_of(&error) {
+                    complaints.add(error.span().map_or(0, |span| span.start), key, error.message());
+                    return complaints.or(None);
+                }
+                return Err(complaints.ended_by(&error));
+            }
         };
         if let Some(named) = &raw.product {
             match Product::named(named.get_ref()) {
@@ -91,14 +98,9 @@ impl Scenario {
                 Some(_) => {}
             }
         }
-        let mut reading = Reading {
-            text,
-            product,
-            // A file for several products may turn what some of them do not have.
-            terminals: raw.product.as_ref().map(|_| Sensors::new(product, 0)),
-            complaints,
-            deeds: Vec::new(),
-        };
+        let others = Product::all().iter().filter(|other| raw.product.is_none() && other.name != product.name);
+        let terminals = others.chain([product]).map(|product| Sensors::new(product, 0)).collect();
+        let mut reading = Reading { text, product, terminals, complaints, deeds: Vec::new() };
         for moment in &raw.at {
             reading.moment(moment);
         }
@@ -115,8 +117,9 @@ impl Scenario {
 struct Reading<'a> {
     text: &'a str,
     product: &'a Product,
-    /// Where the file is for this product alone: its terminals, which have to have what is turned.
-    terminals: Option<Sensors>,
+    /// The terminals of the products that the file is for, this one's last. One of them has to take what is turned: a file
+    /// for several products may turn what some of them do not have.
+    terminals: Vec<Sensors>,
     complaints: Complaints<'a>,
     deeds: Vec<(Duration, Verb)>,
 }
@@ -136,6 +139,7 @@ impl Reading<'_> {
     }
 
     fn ramp(&mut self, ramp: &RawRamp) {
+        let can_be_set = self.ends_can_be_set(ramp);
         let from = self.seconds(&ramp.from, "ramp.from");
         let to = self.seconds(&ramp.to, "ramp.to");
         let (Some(from), Some(to)) = (from, to) else { return };
@@ -143,24 +147,15 @@ impl Reading<'_> {
             self.complaints.add(ramp.to.span().start, "ramp.to", "a ramp ends later than it begins");
             return;
         }
-        let (start, end) = (*ramp.start.get_ref(), *ramp.end.get_ref());
-        // TOML has words for infinity and NaN, and what lies between would not be a number either.
-        for (raw, key) in [(&ramp.start, "ramp.start"), (&ramp.end, "ramp.end")] {
-            if !raw.get_ref().is_finite() {
-                self.complaints.add(raw.span().start, key, format!("{} is not a number like 23.5", raw.get_ref()));
-            }
-        }
-        if !start.is_finite() || !end.is_finite() {
-            return;
-        }
         let steps = ramp_steps(to - from);
-        if !self.has_room_for(steps as usize + 1, ramp.from.span().start, "ramp") {
+        if !can_be_set || !self.has_room_for(steps as usize + 1, ramp.from.span().start, "ramp") {
             return;
         }
+        let (start, end) = (*ramp.start.get_ref(), *ramp.end.get_ref());
         for step in 0..=steps {
             let part = f64::from(step) / f64::from(steps);
             let value = start + (end - start) * part;
-            match self.act(&format!("set {} {value}", ramp.what.get_ref())) {
+            match self.act(&set(ramp, value)) {
                 Ok(verb) => self.deeds.push((from + (to - from).mul_f64(part), verb)),
                 Err(error) => {
                     self.complaints.add(ramp.what.span().start, "ramp.what", error.message);
@@ -168,6 +163,40 @@ impl Reading<'_> {
                 }
             }
         }
+    }
+
+    /// Whether what a ramp sets can have the values at its ends, and so those in between; complains if not.
+    fn ends_can_be_set(&mut self, ramp: &RawRamp) -> bool {
+        let mut can_be_set = true;
+        let mut refuse = |reading: &mut Self, at: usize, key: &str, message: String| {
+            reading.complaints.add(at, key, message);
+            can_be_set = false;
+        };
+        for (raw, key) in [(&ramp.start, "ramp.start"), (&ramp.end, "ramp.end")] {
+            let (value, at) = (*raw.get_ref(), raw.span().start);
+            // TOML has words for infinity and NaN.
+            if !value.is_finite() {
+                refuse(self, at, key, format!("{value} is not a number like 23.5"));
+                continue;
+            }
+            let what = ramp.what.span().start;
+            match Verb::read(&set(ramp, value), self.product) {
+                Err(error) => {
+                    refuse(self, what, "ramp.what", error.message);
+                    break;
+                }
+                Ok(Verb::Turn(knob)) => match self.turn(knob) {
+                    Ok(()) => {}
+                    Err(error @ KnobError::Value { .. }) => refuse(self, at, key, error.to_string()),
+                    Err(error) => {
+                        refuse(self, what, "ramp.what", error.to_string());
+                        break;
+                    }
+                },
+                Ok(_) => {}
+            }
+        }
+        can_be_set
     }
 
     /// Whether there is room for this many more deeds; complains if not.
@@ -214,12 +243,42 @@ impl Reading<'_> {
                 Err(WordError { column: 1, message: "a scenario does things; nobody would hear the answer".into() })
             }
             Verb::Turn(knob) => {
-                let turned = self.terminals.as_mut().map_or(Ok(()), |terminals| terminals.turn(knob));
+                let turned = self.turn(knob);
                 turned.map(|()| Verb::Turn(knob)).map_err(|error| WordError { column: 1, message: error.to_string() })
             }
             verb => Ok(verb),
         }
     }
+
+    /// Turns a knob of every product that the file is for. If all refuse, the one that comes closest says why.
+    fn turn(&mut self, knob: Knob) -> Result<(), KnobError> {
+        let turned: Vec<_> = self.terminals.iter_mut().map(|terminals| terminals.turn(knob)).collect();
+        if turned.iter().any(Result::is_ok) {
+            return Ok(());
+        }
+        // The last of equals is this product's own.
+        let closeness = |error: &KnobError| match error {
+            KnobError::NotHere { .. } => 0,
+            KnobError::NoSuchInput { .. } => 1,
+            KnobError::Value { .. } => 2,
+        };
+        turned.into_iter().filter_map(Result::err).max_by_key(closeness).map_or(Ok(()), Err)
+    }
+}
+
+/// The verb that sets what a ramp sets.
+fn set(ramp: &RawRamp, value: f64) -> String {
+    format!("set {} {value}", ramp.what.get_ref())
+}
+
+/// The key whose value is of the wrong type, e.g. `at.seconds`. The parser names it only in its whole text, and there
+/// only where that does not show the line; other errors name their key themselves, or are about none.
+fn key_of(error: &toml::de::Error) -> Option<String> {
+    let mut error = error.clone();
+    error.set_input(None);
+    let text = error.to_string();
+    let (message, key) = text.trim_end().rsplit_once("\nin `")?;
+    message.starts_with("invalid ").then(|| key.trim_end_matches('`').to_owned())
 }
 
 /// Where in the file a column of a deed is; where the deed begins if it is not written as it reads (escapes, several
@@ -304,6 +363,9 @@ mod tests {
             ("[[at]]\nseconds = 1\ndo = [\"open\\u00203 X\"]", "test.toml:3:7: at.do: 'X' is not known"),
             ("[[at]]\nseconds = 1\ndo = ['''\nopen 3 X''']", "test.toml:3:7: at.do: 'X' is not known"),
             ("[[at", "test.toml:1:5: "),
+            ("[[at]]\nseconds = '1'\ndo = []", "test.toml:2:11: at.seconds: invalid type: string \"1\", expected f64"),
+            ("[[at]]\nseconds = 1\ndo = ['freeze', 3]", "test.toml:3:17: at.do: invalid type: integer `3`"),
+            ("repeat = []", "test.toml:1:10: repeat: invalid type: "),
             // Nothing of a file reaches the terminal as a control code.
             ("product = \"\\u001b[2J\"", "test.toml:1:11: product: '^[[2J' is not a product; there is axtc4co"),
             ("\"\\u001b[2J\" = 1", "test.toml:1:1: unknown field `^[[2J`, expected one of `product`"),
@@ -334,13 +396,47 @@ mod tests {
     }
 
     #[test]
+    fn what_no_product_could_take_is_refused_in_a_file_for_all() {
+        let deed = |deed: &str| -> Vec<String> {
+            let read = Scenario::read("test.toml", &format!("[[at]]\nseconds = 1\ndo = ['{deed}']"), product());
+            read.err().unwrap_or_default().iter().map(Complaint::to_string).collect()
+        };
+        assert_eq!(deed("set supply 2000"), ["test.toml:3:8: at.do: a supply cannot be 2000: it is from 0 to 100"]);
+        let hot = "test.toml:3:8: at.do: a temperature cannot be 5000: it is from -273.15 to 3000";
+        assert_eq!(deed("set 1 temperature 5000"), [hot]);
+        let far = "test.toml:3:8: at.do: there is no input 99: this unit has inputs 1 to 4";
+        assert_eq!(deed("set 99 temperature 20"), [far]);
+        let high = "test.toml:3:8: at.do: a resistance cannot be 2000000: it is from 0 to 1000000";
+        assert_eq!(deed("set 1 resistance 2e6"), [high]);
+        for other in ["set 8 temperature 20", "set 1 resistance 100", "set cold-junction 20", "open 8 A"] {
+            assert_eq!(deed(other), [""; 0], "{other}");
+        }
+    }
+
+    #[test]
+    fn the_end_of_a_ramp_that_cannot_be_is_named_with_its_own_number_and_place() {
+        let found = |ramp: &str| {
+            let complaints = Scenario::read("test.toml", &format!("[[ramp]]\n{ramp}"), product()).expect_err(ramp);
+            complaints.iter().map(Complaint::to_string).collect::<Vec<_>>()
+        };
+        let both = found("from=1\nto=2\nwhat='supply'\nstart=-1\nend=2000");
+        let low = "test.toml:5:7: ramp.start: a supply cannot be -1: it is from 0 to 100";
+        assert_eq!(both, [low, "test.toml:6:5: ramp.end: a supply cannot be 2000: it is from 0 to 100"]);
+        let and_time = found("from=3\nto=2\nwhat='1 temperature'\nstart=20\nend=1e9");
+        let hot = "test.toml:6:5: ramp.end: a temperature cannot be 1000000000: it is from -273.15 to 3000";
+        assert_eq!(and_time, [hot, "test.toml:3:4: ramp.to: a ramp ends later than it begins"]);
+        let nowhere = found("from=1\nto=2\nwhat='99 temperature'\nstart=20\nend=30");
+        assert_eq!(nowhere, ["test.toml:4:6: ramp.what: there is no input 99: this unit has inputs 1 to 4"]);
+    }
+
+    #[test]
     fn deeds_at_moments_are_limited_as_those_of_ramps_are() {
         let text = "[[at]]\nseconds = 1\ndo = ['heal']";
         let raw: RawScenario = toml::from_str(text).expect("a scenario");
         let mut reading = Reading {
             text,
             product: product(),
-            terminals: None,
+            terminals: Vec::new(),
             complaints: Complaints::about("test.toml", text),
             deeds: vec![(Duration::ZERO, Verb::Heal); MOST_DEEDS - 1],
         };

@@ -37,7 +37,7 @@ pub enum LoadError {
     Checksum,
     /// No record, one of a type it does not take, or one out of order.
     Type,
-    /// The flash does not come to an end.
+    /// A flash operation does not end.
     Access,
     /// The flash refuses: something is protected.
     Protection,
@@ -312,7 +312,7 @@ mod tests {
         let words = Read::Words { address: 0x80, words: vec![0x1234, 0xABCD] };
         let header = [Read::Text(b'A'), Read::Text(b'B'), Read::End(Kind::Header)];
         let expected = [&header[..], &[words]].concat();
-        assert_eq!(read(&text[..text.len() - 2]), (expected.clone(), None), "no check sum yet");
+        assert_eq!(read(&text[..text.len() - 2]), (expected.clone(), None), "no checksum yet");
         assert_eq!(read(&text), (expected.clone(), None), "no return yet");
         let expected = [&expected[..], &[Read::End(Kind::Data), Read::End(Kind::Terminator(0xA0))]].concat();
         assert_eq!(read(&(text + "\rS705000000A05A\r")), (expected, None));

@@ -6,8 +6,8 @@
 //!
 //! Decisions where no fact was at hand, all guesses: both cases of hex digits; an S0 in the middle of a load starts
 //! a new one; what comes while an error text leaves is lost without another error; after an error the sender is let
-//! go on (XON) if it was stopped; S7 waits for silence like a full page does; error 7 is a flash that does not come to
-//! an end. What is a guess of one generation is said at its profile.
+//! go on (XON) if it was stopped; S7 waits for silence like a full page does; error 7 is a flash operation that does not
+//! end. What is a guess of one generation is said at its profile.
 
 mod profile;
 mod record;
