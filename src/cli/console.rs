@@ -61,7 +61,7 @@ pub fn run(global: &Global) -> Result<(), CliError> {
     }
 }
 
-/// Whether a terminal that calls itself this understands more than text. Where none has a name, nobody says that it does not.
+/// Whether a terminal of this name can be drawn on. One without a name is taken for one that can.
 fn may_draw(term: Option<&OsStr>) -> bool {
     term.is_none_or(|name| !name.is_empty() && name != "dumb")
 }
@@ -106,7 +106,7 @@ fn incomplete(paths: &[PathBuf]) {
     }
 }
 
-/// The console says what it notes; that a note could not be written costs a question later, no more.
+/// Notes an upload, or forgets it. A note that cannot be written costs the user a question later, and nothing else.
 fn note(link: &str, upload: Option<Noted>) {
     let Some((journal, key)) = journal(link) else { return };
     let _ = match upload {

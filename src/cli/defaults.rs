@@ -50,12 +50,14 @@ pub fn run(_args: Args, global: &Global, output: &mut Output) -> Result<(), CliE
     }
     let unit = product.unwrap_or("the unit");
     let version = version.map(|version| format!(" V{version}")).unwrap_or_default();
-    output.remark(&match restart_seen {
-        true => format!("axcon: the defaults are restored; {unit}{version} has restarted"),
-        false => format!(
+    let done = if restart_seen {
+        format!("axcon: the defaults are restored; {unit}{version} has restarted")
+    } else {
+        format!(
             "axcon: {unit}{version} has taken the Yes and shows its menu; whether it has restarted cannot be seen\n  \
              'axcon dictionary dump' shows its parameters"
-        ),
-    });
+        )
+    };
+    output.remark(&done);
     Ok(())
 }

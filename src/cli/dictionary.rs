@@ -14,6 +14,7 @@ use super::numbers::counted;
 use super::output::{Closed, Output};
 use super::talk::{Ended, Talk};
 use super::{files, link, names};
+use crate::canopen::ObjectAddress;
 use crate::device::Product;
 use crate::dump::{self, Difference, Dump, DumpError};
 use crate::session::{Command, DictionaryReading, Outcome, WalkEnd};
@@ -64,7 +65,7 @@ enum Format {
 }
 
 impl Args {
-    /// Whether a unit is read, and not only what was read of one.
+    /// Whether a unit is read, rather than files.
     pub fn reads_a_unit(&self) -> bool {
         match self.command {
             Deed::Dump { .. } => true,
@@ -87,7 +88,7 @@ impl Format {
 
 #[derive(Serialize)]
 struct DifferenceObject<'a> {
-    index: &'a str,
+    index: String,
     subindex: u8,
     name: &'a str,
     left: Option<&'a str>,
@@ -104,7 +105,7 @@ struct DiffObject<'a> {
 
 /// What names the factory's values on the command line.
 const FACTORY: &str = "factory:";
-/// Largest dump that is read back; one of the largest product has a tenth of it.
+/// Bytes of the largest dump that is read back: ten times that of the product with the most entries.
 const LARGEST_DUMP: u64 = 4 << 20;
 
 /// Reads or compares.
@@ -128,10 +129,43 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
     }
     let mut talk = Talk::open(global, output)?;
     talk.find_application()?;
-    let ended = talk.run(Command::ReadDictionary, |_, _| Ok(()))?;
+    let (reading, stopped_by) = read(&mut talk)?;
     let facts = talk.session().facts().clone();
-    let unix_millis = talk.calendar().at(talk.now()).as_millisecond();
-    let (outcome, stopped_by) = match ended {
+    let product = facts.product.as_ref().and_then(|known| Product::named(&known.value));
+    let dump = Dump::of(&reading, product, &facts);
+    let text = match (format, product) {
+        (Format::Json, _) => dump.json(),
+        (Format::Table, _) => dump.table(),
+        (Format::Csv, _) => dump.csv(),
+        (Format::Dcf, Some(product)) => {
+            let unix_millis = talk.calendar().at(talk.now()).as_millisecond();
+            dump::configuration(&reading, product, &facts, unix_millis)
+        }
+        (Format::Dcf, None) => {
+            let message = "a DCF needs to know the product, and the unit does not say it";
+            return Err(CliError::message(Kind::Failed, message).hint("--format json keeps everything that was read"));
+        }
+    };
+    let written = out.save(text.as_bytes(), output);
+    say_what_is_open(&dump, output);
+    if dump.complete {
+        return written;
+    }
+    // That it is not everything counts, even if nobody reads the output any more.
+    written.or_else(|error| if error.error.is::<Closed>() { Ok(()) } else { Err(error) })?;
+    match stopped_by {
+        Some(error) => {
+            let entries = dump.entries.len();
+            Err(error.hint(format!("what was read is written all the same; entries read: {entries}")))
+        }
+        None => Err(not_all(&reading, &dump, talk.is_recorded())),
+    }
+}
+
+/// Reads the object dictionary, to its end or until an interrupt or the loss of the link stops it: then the error comes
+/// with what was read.
+fn read(talk: &mut Talk) -> Result<(Box<DictionaryReading>, Option<CliError>), CliError> {
+    let (outcome, stopped_by) = match talk.run(Command::ReadDictionary, |_, _| Ok(()))? {
         Ended::Finished { outcome, interrupted: false } => (outcome, None),
         Ended::Finished { outcome, interrupted: true } => {
             (outcome, Some(CliError::message(Kind::Interrupted, "interrupted; the view has been left")))
@@ -148,60 +182,37 @@ fn dump(format: Format, mut out: Destination, global: &Global, output: &mut Outp
         Kind::UnitRefused => error.hint(PRE_OPERATIONAL),
         _ => error,
     })?;
-    let product = facts.product.as_ref().and_then(|known| Product::named(&known.value));
-    let dump = Dump::of(&reading, product, &facts);
-    let text = match format {
-        Format::Json => dump.json(),
-        Format::Table => dump.table(),
-        Format::Csv => dump.csv(),
-        Format::Dcf => match product {
-            Some(product) => dump::configuration(&reading, product, &facts, unix_millis),
-            None => {
-                let message = "a DCF needs to know the product, and the unit does not say it";
-                return Err(
-                    CliError::message(Kind::Failed, message).hint("--format json keeps everything that was read")
-                );
-            }
-        },
-    };
-    let written = out.save(text.as_bytes(), output);
-    if has_no_reading(&dump) {
+    Ok((reading, stopped_by))
+}
+
+/// Remarks on values that are missing or not certain in a dump that is otherwise what was asked for.
+fn say_what_is_open(dump: &Dump, output: &mut Output) {
+    if has_no_reading(dump) {
         output.remark(
             "axcon: no input has a reading: a unit that has just started has none for up to 5 s, and measures nothing while \
              it shows its object dictionary; read it again",
         );
     }
     if dump.doubtful() > 0 {
-        let values = counted(dump.doubtful() as u64, "value");
+        let values = counted(dump.doubtful(), "value");
         output.remark(&format!(
             "{values} left open: the unit prints hexadecimal numbers without a mark, so digits may be either"
         ));
     }
-    if dump.complete {
-        return written;
-    }
-    // That it is not everything counts, even if nobody reads the output any more.
-    written.or_else(|error| if error.error.is::<Closed>() { Ok(()) } else { Err(error) })?;
-    match stopped_by {
-        Some(error) => {
-            let entries = dump.entries.len();
-            Err(error.hint(format!("what was read is written all the same; entries read: {entries}")))
-        }
-        None => Err(not_all(&reading, &dump, talk.is_recorded())),
-    }
 }
 
-/// Whether the unit shows its field values (6100h), and not one of them has a value: first values take 3 s after the
-/// power-up (AXTC4CO manual, section 1.1; 5 s on the AXRTD8CO).
+/// Whether the unit lists its field values (6100h) and none of them has a value. The first ones come 3 s after power-up
+/// (AXTC4CO manual, section 1.1), on the AXRTD8CO 5 s.
 fn has_no_reading(dump: &Dump) -> bool {
-    let mut inputs = dump.entries.iter().filter(|entry| entry.index == FIELD_VALUE && entry.subindex > 0).peekable();
+    let is_input = |at: ObjectAddress| at.index == FIELD_VALUE && at.sub > 0;
+    let mut inputs = dump.entries.iter().filter(|entry| is_input(entry.at())).peekable();
     inputs.peek().is_some() && inputs.all(|entry| entry.value.is_none())
 }
 
 /// The object with the field values.
-const FIELD_VALUE: &str = "6100";
+const FIELD_VALUE: u16 = 0x6100;
 
-/// That a reading is not all there is, and why.
+/// The error of a reading that has ended before the object dictionary did, with the reason.
 fn not_all(reading: &DictionaryReading, dump: &Dump, is_recorded: bool) -> CliError {
     let (missing, entries) = (dump.missing.len(), dump.entries.len());
     let message = match &reading.end {
@@ -236,8 +247,8 @@ fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), C
     found.retain(|difference| all || difference.setting);
     let written = if output.json {
         let differences = found.iter().map(|difference| DifferenceObject {
-            index: &difference.index,
-            subindex: difference.subindex,
+            index: format!("{:04X}", difference.at.index),
+            subindex: difference.at.sub,
             name: &difference.name,
             left: difference.left.as_deref(),
             right: difference.right.as_deref(),
@@ -248,10 +259,10 @@ fn diff(left: &str, right: &str, all: bool, output: &mut Output) -> Result<(), C
     } else {
         let mut lines = String::new();
         for difference in &found {
-            let Difference { index, subindex, name, .. } = difference;
+            let Difference { at, name, .. } = difference;
             let side = |value: Option<String>| value.unwrap_or_else(|| "not there".into());
             let (left, right) = (side(difference.shown_left()), side(difference.shown_right()));
-            lines.push_str(&format!("{index}:{subindex:02X}  {name:<58} {left:>14}  {right:>14}\n"));
+            lines.push_str(&format!("{at}  {name:<58} {left:>14}  {right:>14}\n"));
         }
         output.data(lines.as_bytes())
     };
@@ -272,7 +283,8 @@ fn source(named: &str) -> Result<Dump, CliError> {
         let error = match &error {
             DumpError::Syntax { name, fault } if fault.is_syntax() || fault.is_eof() => {
                 let what = if fault.is_eof() { "the file ends before its JSON does" } else { "this is not JSON" };
-                let (line, column) = (fault.line(), fault.column());
+                // In an empty file serde counts from 0.
+                let (line, column) = (fault.line(), fault.column().max(1));
                 CliError::message(Kind::Usage, format!("{name}:{line}:{column}: {what}"))
             }
             DumpError::Syntax { .. } | DumpError::Schema { .. } => CliError::new(Kind::Usage, error),

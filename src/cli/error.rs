@@ -142,8 +142,8 @@ impl CliError {
         CliError { kind, error: anyhow::Error::msg(kind.name()), hints: Vec::new(), reported: true }
     }
 
-    /// The end of a command that has told its finding on standard output: success, or what is left of it, the exit code.
-    /// The exit code holds even if nobody reads the finding; that it could not be written is said as well.
+    /// Ends a command that has already printed its result; only the exit code is left to give. It is the same if nobody
+    /// reads the result, and if the result could not be written; then the reason is given as well.
     ///
     /// # Errors
     /// If something was found that has an exit code, or `written` failed.

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use super::error::{CliError, Kind};
 use super::output::Output;
 use crate::host::save::{self, SaveError};
+use crate::wire::visible;
 
-/// Reads a text of no more bytes than that: whatever a name leads to need not have an end.
+/// Reads a text of at most `most` bytes, since a name may lead to something without an end, such as a device.
 ///
 /// # Errors
-/// If it cannot be read, has more bytes, or is not text.
+/// If it cannot be read, has more bytes, or is not UTF-8.
 pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
     let mut bytes = Vec::new();
     File::open(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
@@ -43,9 +44,9 @@ enum Place {
 }
 
 impl Destination {
-    /// A place that may be written: to be asked before the unit is, and before signals are heard, since a pipe waits here
-    /// for its reader. `None`, `-` and the system's own names for it are standard output. `overwrite`: the user has said
-    /// `--yes`.
+    /// A place that may be written. Call it before anything is asked of the unit, and before signals are taken, since
+    /// opening a pipe waits for its reader. `None`, `-` and the system's names for it are standard output. `overwrite`:
+    /// the user has said `--yes`.
     ///
     /// # Errors
     /// If something is there that should stay, there is no such folder, or the pipe or device does not open.
@@ -58,14 +59,14 @@ impl Destination {
             Place::Stream(opened.map_err(|error| save_error(path, SaveError::Io(error)))?)
         } else {
             admit(path, overwrite)?;
-            // Before any work is done for what could not be written in the end.
+            // Found out now, not after all the work.
             has_folder(path).map_err(|error| save_error(path, SaveError::Io(error)))?;
             Place::File(None)
         };
         Ok(Destination { path: path.to_owned(), overwrite, place })
     }
 
-    /// Whether it is standard output, where nothing else may come between then.
+    /// Whether it is standard output, which then takes nothing but this data.
     pub fn is_standard_output(&self) -> bool {
         matches!(self.place, Place::StandardOutput)
     }
@@ -75,10 +76,10 @@ impl Destination {
         shown(&self.path)
     }
 
-    /// Writes all there is to write; of a file the old or the new one is there at any moment.
+    /// Writes all of it at once. A file is replaced as a whole: at any moment either the old or the new one is there.
     ///
     /// # Errors
-    /// If a file has come that should stay, or it cannot be written.
+    /// If a file that should stay has appeared meanwhile, or it cannot be written.
     pub fn save(&mut self, bytes: &[u8], output: &mut Output) -> Result<(), CliError> {
         match &self.place {
             Place::File(_) => {
@@ -88,7 +89,7 @@ impl Destination {
         }
     }
 
-    /// Appends; a file is made with the first piece: until then yesterday's is there.
+    /// Appends. The first piece makes the file; until then an older one stays.
     ///
     /// # Errors
     /// As [`save`](Destination::save).
@@ -109,7 +110,8 @@ impl Destination {
     }
 }
 
-/// Names of standard output. Opened by one of the last three, a file that it leads to would be written from its beginning.
+/// Names of standard output. The last three are not opened as files: if standard output leads to a file, that would be
+/// written from its beginning.
 const STANDARD_OUTPUT: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 
 /// Whether a command may write this file: to be asked before the unit is. `overwrite`: the user has said `--yes`.
@@ -120,24 +122,26 @@ pub fn admit(path: &Path, overwrite: bool) -> Result<(), CliError> {
     save::admit(path, overwrite).map_err(|error| save_error(path, error))
 }
 
-/// Whether there is a folder for a file.
+/// Makes sure that the folder of a file is there.
 ///
 /// # Errors
-/// If there is not.
+/// If it is not.
 pub fn has_folder(path: &Path) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    match std::fs::metadata(folder)?.is_dir() {
-        true => Ok(()),
-        false => Err(ErrorKind::NotADirectory.into()),
-    }
+    if std::fs::metadata(folder)?.is_dir() { Ok(()) } else { Err(ErrorKind::NotADirectory.into()) }
 }
 
-/// A path for the screen: a name may hold anything, a terminal must not get it.
+/// A path for the screen, on which nothing in a name acts.
 pub fn shown(path: &Path) -> String {
     if path == Path::new("-") {
         return "standard input".into();
     }
-    path.to_string_lossy().chars().map(|letter| if letter.is_control() { '?' } else { letter }).collect()
+    visible::line(path.as_os_str().as_encoded_bytes())
+}
+
+/// A path for JSON, which can hold every character. Bytes that are not UTF-8 become U+FFFD.
+pub fn named(path: &Path) -> String {
+    if path == Path::new("-") { shown(path) } else { path.to_string_lossy().into_owned() }
 }
 
 /// What it means that a file is not written.
@@ -199,7 +203,12 @@ mod tests {
 
     #[test]
     fn a_file_name_cannot_reach_the_terminal_as_control_codes() {
-        assert_eq!(shown(Path::new("a\x1b[31m.S")), "a?[31m.S");
+        let table = [("a\x1b[31m.S", "a^[[31m.S"), ("a\n\tb", "a^J^Ib"), ("a\u{202e}S.b", "a‹202e›S.b")];
+        for (name, on_screen) in table {
+            assert_eq!(shown(Path::new(name)), on_screen);
+            assert_eq!(named(Path::new(name)), name, "JSON writes it so that it can be read back");
+        }
+        assert_eq!((shown(Path::new("-")), named(Path::new("-"))), ("standard input".into(), "standard input".into()));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Global;
 use super::ask::{READS_DICTIONARY, confirm};
 use super::error::{CliError, Kind};
-use super::journal::Desk;
+use super::journal::PortJournal;
 use super::link;
 use super::outcome::no_answer_hints;
 use super::output::Output;
@@ -102,7 +102,7 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         Some(Err(error)) => (Deep::default(), Err(error)),
     };
     let facts = talk.session().facts().clone();
-    let unfinished = Desk::of(&talk).note;
+    let unfinished = PortJournal::of(&talk).note;
     if let Some(note) = &unfinished {
         let Note { product, image, .. } = note;
         output.remark(&format!(
@@ -153,7 +153,7 @@ impl Deep {
             _ => error,
         })?;
         let entry = |index, sub| reading.entries.iter().find(|entry| entry.at == ObjectAddress::new(index, sub));
-        let bits = |index, sub| entry(index, sub)?.value?.as_integer().and_then(|bits| u32::try_from(bits).ok());
+        let bits = |index, sub| entry(index, sub)?.value()?.as_integer().and_then(|bits| u32::try_from(bits).ok());
         Ok(Deep {
             product_code: bits(0x1018, 2),
             serial_number: bits(0x1018, 4),

@@ -7,24 +7,25 @@ use crate::host::journal::{Journal, Note};
 use crate::session::{Facts, LoadReport, UnitNow, UnitState};
 use crate::version::Version;
 
-/// The journal's part in what is done on one port.
-pub struct Desk {
+/// The journal of uploads, as far as it is about one port.
+pub struct PortJournal {
+    /// The journal, and what it calls the port; `None` where nothing is noted.
     journal: Option<(Journal, String)>,
     /// The upload that began here and has not ended well, unless the unit runs its software.
     pub note: Option<Note>,
 }
 
-impl Desk {
+impl PortJournal {
     /// Looks up what is noted of this port. The unit has been identified.
     pub fn of(talk: &Talk) -> Self {
         let journal = link::journal_key(talk.spec()).and_then(|key| Some((Journal::of_user()?, key)));
         // A loader that erases its flash, or has lost its place in a record, does not say that it is one.
         let says_nothing = talk.session().facts().state != UnitState::Application;
         let note = journal.as_ref().filter(|_| says_nothing).and_then(|(journal, key)| journal.note(key));
-        Desk { journal, note }
+        PortJournal { journal, note }
     }
 
-    /// The note, if it knows the unit as another product than the user says and the unit itself does not say.
+    /// The note, if it names another product than the user does and the unit names none.
     pub fn against(&self, facts: &Facts, product: &str) -> Option<&Note> {
         self.note.as_ref().filter(|note| facts.product.is_none() && !note.product.eq_ignore_ascii_case(product))
     }
@@ -34,8 +35,8 @@ impl Desk {
         self.note.as_ref().filter(|note| note.product.eq_ignore_ascii_case(product))?.ran
     }
 
-    /// What is to be noted of this upload, if anything can be. A note that knows the unit as another product stays what
-    /// it is until the unit runs: an attempt that fails proves nothing against it.
+    /// The note to make of this upload; `None` if no product is known. An older note that names another product stays,
+    /// with the new time, until the unit runs: an upload that fails does not prove it wrong.
     pub fn compose(&self, facts: &Facts, product: Option<&str>, image: &str, talk: &Talk) -> Option<Note> {
         let said = facts.product.as_ref().map(|known| known.value.as_str());
         let product = said.or(product)?.to_owned();
@@ -61,6 +62,8 @@ impl Desk {
         let Some((journal, key)) = &self.journal else { return };
         if report.unit == UnitNow::Application
             && let Err(error) = journal.end(key)
+            // Where none could be made, none stays.
+            && journal.note(key).is_some()
         {
             output.remark(&format!("axcon: the note of this upload stays: {error}"));
         }

@@ -47,8 +47,8 @@ pub fn named(text: &str, found: impl FnOnce() -> Vec<Port>) -> Result<LinkSpec, 
     }
 }
 
-/// Two of these names that mean the same device, a link to it or its adapter's serial number perhaps: the second would be
-/// told that the first is in its way, by this program's own process number.
+/// Two of these names that mean the same device: one may be a symbolic link to it, or its adapter's serial number. Not
+/// found here, the second would be refused because this very program has the port.
 pub fn same_device(names: &[String]) -> Option<(&str, &str)> {
     let [_, _, ..] = names else { return None };
     let device = |name: &String| match named(name, || ports::list().unwrap_or_default()) {
@@ -100,9 +100,9 @@ pub fn open_recording(path: &Path, sender: SyncSender<Input>, inputs: &Receiver<
     waiting::end(inputs, &opened)?.map_err(recording_error)
 }
 
-/// What the journal of uploads calls the port: the adapter's serial number where it has one, since its name may be
-/// another one next time, or else the path as the user gives it; a network link is
-/// called what it is written. `None` for units that end with this process.
+/// What the journal of uploads calls the port of a link: the adapter's serial number if it has one, since the port may
+/// have another name next time, else the path as the user gives it; of a network link its address. `None` for units
+/// that end with this process.
 pub fn journal_key(spec: &LinkSpec) -> Option<String> {
     match spec {
         LinkSpec::Emulated(_) | LinkSpec::Replay(_) => None,
@@ -150,8 +150,8 @@ pub fn not_recorded_again(global: &Global) -> Result<(), CliError> {
     }
 }
 
-/// Starts recording. A user who names a file wants the recording, so there is no session without it; one that nobody asked for
-/// is missed with a warning.
+/// Starts recording. Without the recording that the user has asked for there is no session; if another one cannot be
+/// written, that is only a warning.
 ///
 /// # Errors
 /// If the file that the user named cannot be written.
@@ -295,7 +295,8 @@ pub fn recording_error(error: RecordingError) -> CliError {
 }
 
 /// What is said of a recording that was read to its end, if it did not end as recordings do.
-pub const CUT_SHORT: &str = "axcon: the recording ends in the middle of a line: the program that wrote it was killed";
+pub const CUT_SHORT: &str =
+    "axcon: the recording ends in the middle of a line: the program that wrote it was killed, or its disk was full";
 
 /// Whether the command line names a recording.
 pub fn is_recording(global: &Global) -> bool {

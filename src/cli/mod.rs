@@ -30,11 +30,13 @@ pub mod terminal;
 pub mod waiting;
 
 use std::ffi::OsString;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::device::BAUD;
 use error::CliError;
 use output::Output;
 
@@ -88,7 +90,7 @@ pub struct Global {
     #[arg(long = "port", value_name = "LINK", env = "AXCON_PORT", global = true)]
     pub ports: Vec<String>,
     /// Line rate in baud; the units have 115200.
-    #[arg(long, value_name = "RATE", default_value_t = 115_200, global = true, allow_negative_numbers = true, value_parser = numbers::within::<u32>(50..=12_000_000))]
+    #[arg(long, value_name = "RATE", default_value_t = BAUD, global = true, allow_negative_numbers = true, value_parser = numbers::within::<u32>(50..=12_000_000))]
     pub baud: u32,
     /// Data and errors as JSON. Not for `terminal`, `eds`, `completions` and `man`, whose output has a form of its own.
     #[arg(long, global = true)]
@@ -223,8 +225,15 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
             return output::conclude(&mut Output::standard(true), Err(error));
         }
         Err(error) => {
-            let _ = error.print();
-            return u8::try_from(error.exit_code()).unwrap_or(2);
+            let printed = error.print().and_then(|()| io::stdout().flush());
+            return match printed {
+                // Help and version are the data of such a command.
+                Err(unwritten) if !error.use_stderr() => {
+                    let json = args.iter().any(|arg| arg == "--json");
+                    output::conclude(&mut Output::standard(json), Err(output::unwritten(unwritten)))
+                }
+                _ => u8::try_from(error.exit_code()).unwrap_or(2),
+            };
         }
     };
     // An empty AXCON_PORT counts as unset.
@@ -238,8 +247,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     output::conclude(&mut output, result)
 }
 
-/// Makes sure that no named link is forgotten: after the command a global option takes the place of the same one before
-/// it, and of several units one would never get its software.
+/// Makes sure that no link is lost that was named before the command: the same option after it would replace it, and
+/// one of several units would never get its software.
 fn all_ports(global: &Global, args: &[OsString]) -> Result<(), CliError> {
     let options = args.iter().take_while(|arg| *arg != "--").map(|arg| arg.to_string_lossy());
     let named = options.filter(|arg| arg == "--port" || arg.starts_with("--port=")).count();

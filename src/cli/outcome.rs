@@ -91,8 +91,8 @@ impl Talk {
     }
 }
 
-/// The error of a job that has waited in vain. A question that was not understood is left, and nobody knows what its unit makes of
-/// that; a row or a page is awaited when the unit has been told already.
+/// The error of a job that has waited in vain, with hints that say how it has left the unit: a question that was not
+/// understood has been left with an answer that does the least harm, whatever the unit makes of it.
 fn unanswered(awaited: Awaited) -> CliError {
     let message = format!("the unit did not answer as expected: {awaited}");
     let error = CliError::message(Kind::NoAnswer, message);

@@ -96,15 +96,20 @@ impl Output {
     /// # Errors
     /// If standard output cannot be written.
     pub fn data(&mut self, bytes: &[u8]) -> Result<(), CliError> {
-        self.out.write_all(bytes).and_then(|()| self.out.flush()).map_err(|error| match error.kind() {
-            io::ErrorKind::BrokenPipe => CliError::new(Kind::Failed, Closed),
-            _ => CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot write to standard output")),
-        })
+        self.out.write_all(bytes).and_then(|()| self.out.flush()).map_err(unwritten)
     }
 
     /// A remark for a person, on standard error. Nothing can be done if that fails.
     pub fn remark(&mut self, text: &str) {
         self.err.say(text);
+    }
+}
+
+/// What it means that standard output cannot be written.
+pub fn unwritten(error: io::Error) -> CliError {
+    match error.kind() {
+        io::ErrorKind::BrokenPipe => CliError::new(Kind::Failed, Closed),
+        _ => CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot write to standard output")),
     }
 }
 

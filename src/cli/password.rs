@@ -1,7 +1,7 @@
 //! Where the password comes from: a file, the environment, or a prompt without echo. Never the command line.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::Path;
 
 use zeroize::Zeroizing;
@@ -17,6 +17,9 @@ const VARIABLE: &str = "AXCON_PASSWORD";
 
 /// Bytes of a password file at most: whatever is longer is another file.
 const LONGEST: usize = 256;
+
+/// Bytes that are read at once: more than the system's library keeps of standard input, which so keeps no copy.
+const READ: usize = 64 << 10;
 
 /// The password, if a file or the environment has it.
 ///
@@ -49,7 +52,7 @@ pub fn ask(talk: Option<&mut Talk>) -> Result<Secret, CliError> {
         rpassword::prompt_password("Password: ").map(|password| Secret::new(password.into_bytes()))
     })?;
     let password = password.map_err(|error| match error.kind() {
-        std::io::ErrorKind::Interrupted => CliError::interrupted(),
+        ErrorKind::Interrupted => CliError::interrupted(),
         _ => CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot ask for the password")),
     })?;
     accept(password, "the answer")
@@ -57,12 +60,19 @@ pub fn ask(talk: Option<&mut Talk>) -> Result<Secret, CliError> {
 
 fn read(path: &Path) -> Result<Secret, CliError> {
     let shown = files::shown(path);
-    let failed = |error: std::io::Error| {
+    let failed = |error: io::Error| {
         CliError::new(Kind::Usage, anyhow::Error::new(error).context(format!("cannot read the password file {shown}")))
     };
-    // With room for all of it, so that growing leaves no copy behind.
-    let mut text = Zeroizing::new(Vec::with_capacity(LONGEST + 2));
-    File::open(path).and_then(|file| file.take(LONGEST as u64 + 1).read_to_end(&mut text)).map_err(failed)?;
+    let text = if path == Path::new("-") {
+        if io::stdin().is_terminal() {
+            return Err(CliError::message(Kind::Usage, "standard input is a terminal, which shows what is typed")
+                .hint("without --password-file the password is asked for, and not shown"));
+        }
+        read_all(io::stdin().lock())
+    } else {
+        File::open(path).and_then(read_all)
+    };
+    let mut text = text.map_err(failed)?;
     if text.len() > LONGEST {
         let message = format!("the password file {shown} is longer than {LONGEST} bytes; is it the right one?");
         return Err(CliError::message(Kind::Usage, message));
@@ -72,6 +82,25 @@ fn read(path: &Path) -> Result<Secret, CliError> {
         text.pop();
     }
     accept(Secret::new(std::mem::take(&mut *text)), &format!("the password file {shown}"))
+}
+
+/// Reads to the end, or until it is too much.
+fn read_all(mut from: impl Read) -> io::Result<Zeroizing<Vec<u8>>> {
+    let mut piece = Zeroizing::new(vec![0u8; READ]);
+    // With room for all of it, so that growing leaves no copy of a password.
+    let mut text = Zeroizing::new(Vec::with_capacity(LONGEST + 2));
+    while text.len() <= LONGEST {
+        match from.read(&mut piece) {
+            Ok(0) => break,
+            Ok(count) => {
+                let room = LONGEST + 1 - text.len();
+                text.extend_from_slice(&piece[..count.min(room)]);
+            }
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(text)
 }
 
 fn accept(password: Secret, place: &str) -> Result<Secret, CliError> {

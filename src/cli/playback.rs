@@ -21,8 +21,8 @@ pub struct Playback {
     next: Option<Piece>,
 }
 
-/// How long timers go on after the last byte: a prompt's and a page's silence.
-const BEHIND_THE_END: Duration = Duration::from_secs(2);
+/// How long timers go on after the last byte: the silence after a prompt or a page is still to pass.
+const AFTER_THE_END: Duration = Duration::from_secs(2);
 
 impl Playback {
     /// A recording at its beginning.
@@ -54,7 +54,7 @@ impl Playback {
             let due = self.next.as_ref().map(moment);
             let timer = session.poll_timeout().filter(|&at| match due {
                 Some(due) => at <= due,
-                None => at <= self.now + BEHIND_THE_END,
+                None => at <= self.now + AFTER_THE_END,
             });
             let then = match (timer, due) {
                 (Some(at), _) | (None, Some(at)) => at.max(self.now),

@@ -225,10 +225,7 @@ impl Talk {
         until: Instant,
         news: impl FnMut(&Session, &Event) -> Result<ControlFlow<()>, CliError>,
     ) -> Result<(), CliError> {
-        match self.listen(until, news)? {
-            true => Ok(()),
-            false => Err(CliError::interrupted()),
-        }
+        if self.listen(until, news)? { Ok(()) } else { Err(CliError::interrupted()) }
     }
 
     /// Listens to a recording to its end.

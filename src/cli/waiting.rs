@@ -35,7 +35,7 @@ pub fn begin<T: Send + 'static>(
     thread.map(|_| done).map_err(|error| CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot wait")))
 }
 
-/// Waits for what was begun. Only for where nothing else comes on the channel that is not to be lost.
+/// Waits for what was begun. Anything else that comes on the channel meanwhile is thrown away, except a signal.
 ///
 /// # Errors
 /// If the user interrupts.

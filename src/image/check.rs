@@ -1,8 +1,8 @@
 //! Whole-file rules: reads an image once, of whatever size, and lists every defect in it.
 //!
-//! [`super::scan`] reads the lines, [`super::srecord_file`] and [`super::ihex_file`] know what they mean; what can only
-//! be said of the whole (addresses, identity) is [`super::whole`]'s, from the data that was kept. No more data is kept
-//! than the largest flash holds.
+//! [`super::scan`] reads the lines, [`super::srecord_file`] and [`super::ihex_file`] know what they mean, and
+//! [`super::whole`] judges what can only be said of the whole (addresses, identity), from the data that was kept. No
+//! more data is kept than the largest flash holds.
 
 use std::io::{self, Read};
 
@@ -22,7 +22,7 @@ use super::{Target, whole};
 /// image from being sent, but are still listed.
 ///
 /// # Errors
-/// Only if the reader fails. A bad file is a report.
+/// Only if the reader fails. A bad file gives a report.
 pub fn check(
     reader: impl Read,
     file_name: Option<&str>,
@@ -248,6 +248,38 @@ mod tests {
     }
 
     #[test]
+    fn what_follows_from_a_line_that_cannot_be_read_is_not_reported_as_well() {
+        let (one, count, end) = ("S307000000001122C5\n", "S5030002FA\n", "S70500000000FA\n");
+        let hex = ":040000001122334452\n:040002005566778840\n:0400000500000000F7\n";
+        let joined = format!("{HEAD}{}{end}", one.repeat(80)).replace('\n', "");
+        let table: [(String, Found); 12] = [
+            (format!(" {HEAD}{one}{end}"), ("not-a-record", 1, 1)),
+            (format!("\x0C{HEAD}{one}{end}"), ("not-a-record", 1, 1)),
+            (format!("SO{}{one}{end}", &HEAD[2..]), ("unknown-type", 1, 2)),
+            (format!("{HEAD}{one}S{end}"), ("unknown-type", 3, 2)),
+            (format!("{HEAD}{one} {end}"), ("not-a-record", 3, 1)),
+            (format!("{HEAD}{one}X{}\n \n", end[1..].trim()), ("not-a-record", 3, 1)),
+            (format!("{HEAD}{one}S"), ("short-record", 3, 3)),
+            (format!("{joined}\n"), ("long-line", 1, 1024)),
+            (format!("{HEAD}{one} {one}{count}{end}"), ("not-a-record", 3, 1)),
+            (format!("{hex} :00000001FF\n"), ("not-a-record", 4, 1)),
+            (format!("{hex}:0000\n"), ("short-record", 4, 2)),
+            (format!("{hex};00000001FF\n"), ("not-a-record", 4, 1)),
+        ];
+        for (file, expected) in table {
+            let report = report(file.as_bytes());
+            let errors = report.defects.iter().filter(|defect| defect.severity == Severity::Error);
+            let errors: Vec<Found> = errors.map(|defect| (defect.id.name(), defect.line, defect.column)).collect();
+            assert_eq!(errors, [expected], "{file:?}");
+        }
+        // What a line is that begins well is known, so that the rest of the file is judged.
+        let cut = report(format!("{HEAD}{one}S3070000").as_bytes());
+        assert!(found(&cut).contains(&("missing-terminator", 3, 1)), "{:?}", found(&cut));
+        let none = report(format!("{one}X{one}").as_bytes());
+        assert!(found(&none).contains(&("missing-header", 1, 1)), "{:?}", found(&none));
+    }
+
+    #[test]
     fn small_intel_hex_files_and_all_that_is_wrong_with_them() {
         let one = ":040000001122334452\n:040002005566778840\n";
         let (start, end) = (":0400000500000000F7\n", ":00000001FF\n");
@@ -414,9 +446,8 @@ mod tests {
         let mut file = b"S0030000FC\n".to_vec();
         file.extend(b"?\n".repeat(50_000));
         let report = report(&file);
-        assert_eq!(report.errors, 50_002 - 1, "every line and the missing terminator");
-        let terminator = 1; // The first of its kind.
-        assert_eq!(report.defects.len() as u64, super::super::defect::MOST_LISTED + terminator + report.warnings);
+        assert_eq!(report.errors, 50_000, "every line, the last of which may have been the terminator");
+        assert_eq!(report.defects.len() as u64, super::super::defect::MOST_LISTED + report.warnings);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What a reading keeps: the data of all records, and how their addresses advance.
+//! What is kept while a file is read: the data of all records, and how their addresses advance.
 
 use super::AddressUnit;
 
@@ -63,9 +63,11 @@ pub(super) const MOST_PIECES: usize = 65_536;
 pub(super) struct Steps {
     /// Steps of half as many addresses as the record before has bytes.
     words: u64,
-    /// Steps of as many.
+    /// Steps of as many addresses as the record before has bytes.
     bytes: u64,
+    /// The first line with a step of words.
     word_line: u64,
+    /// The first line with a step of bytes.
     byte_line: u64,
     last: Option<(u32, usize)>,
 }
@@ -85,7 +87,7 @@ impl Steps {
         self.last = Some((address, length));
     }
 
-    /// A record is missing here: the next one follows nothing.
+    /// A record is missing here, so the step to the next one shows nothing.
     pub(super) fn interrupt(&mut self) {
         self.last = None;
     }

@@ -1,8 +1,8 @@
 //! Writing an image as a file: either format, either unit of addresses, records of any size.
 //!
 //! S-records are written as CodeWarrior does (S0 with a four-byte address, S3, S7, upper case), Intel HEX with linear
-//! addresses (00, 01, 04, 05). Records keep their order, so that what is written twice ends as it did. The whole file
-//! is made in memory: an image has 512 KByte at most.
+//! addresses (00, 01, 04, 05). Records keep their order, so that of two records for one address the same one counts as
+//! before. The whole file is made in memory: an image has 512 KByte at most.
 
 use std::collections::BTreeMap;
 
@@ -78,7 +78,7 @@ pub fn convert(image: &Image, shape: &Shape) -> Result<Vec<u8>, ConvertError> {
         &kept
     };
     let entry = address_in(u64::from(image.entry) * u64::from(image.address_unit.bytes()), unit)?;
-    // Readers disagree where what runs past the last address goes on; an S-record keeps it as it is.
+    // Readers disagree about where data goes on that runs past the last address; an S-record keeps it as it is.
     let ends = blocks.iter().map(|block| u64::from(block.address) + unit.addresses(block.data.len()));
     if shape.format == Format::IntelHex
         && let Some(end) = ends.max().filter(|&end| end > ADDRESSES)
@@ -103,7 +103,7 @@ fn address_in(byte_address: u64, unit: AddressUnit) -> Result<u32, ConvertError>
     u32::try_from(address).map_err(|_| ConvertError::TooHigh { address })
 }
 
-/// The data in records of another size or unit. What follows on each other is joined first.
+/// The data in records of another size or unit. Records that continue one another are joined first.
 fn regrouped(image: &Image, unit: AddressUnit, record_bytes: Option<u8>) -> Result<Vec<Block>, ConvertError> {
     let longest = image.blocks.iter().map(|block| block.data.len()).max().unwrap_or(MOST_BLOCK_BYTES);
     let size = record_bytes.map_or(longest.next_multiple_of(2).min(MOST_BLOCK_BYTES), usize::from);
@@ -127,7 +127,8 @@ fn regrouped(image: &Image, unit: AddressUnit, record_bytes: Option<u8>) -> Resu
     Ok(blocks)
 }
 
-/// Gives every run that ends in the middle of a word the other half: as an earlier run left it, else as erased flash reads.
+/// Gives every run that ends in the middle of a word the other half: as an earlier run left it, else as erased flash
+/// reads.
 fn complete_words(runs: &mut [(u64, Vec<u8>)]) {
     let missing_half = |start: u64, data: &[u8]| Some(start + data.len() as u64).filter(|end| end % 2 == 1);
     let mut halves: BTreeMap<u64, u8> =
@@ -174,7 +175,7 @@ impl File {
                     base = address >> 16;
                     self.hex(&HexRecord::ExtendedLinearAddress(base as u16));
                 }
-                // No record runs past the last offset: readers disagree what that means.
+                // No record runs past the last offset: readers disagree about what that means.
                 let room = (OFFSETS - (address & (OFFSETS - 1))) * unit.bytes();
                 let (now, later) = rest.split_at(rest.len().min(room as usize));
                 self.hex(&HexRecord::Data { offset: address as u16, value: now.to_vec() });
@@ -187,7 +188,7 @@ impl File {
     }
 
     fn hex(&mut self, record: &HexRecord) {
-        // It fails above 255 data bytes only, and a block has fewer.
+        // This fails only above 255 data bytes, and a block has fewer.
         if let Ok(text) = record.to_record_string() {
             self.bytes.extend(text.into_bytes());
             self.bytes.extend(self.end);

@@ -10,7 +10,7 @@ use std::str::FromStr;
 pub enum Severity {
     /// It may not, unless the defect is allowed by name.
     Error,
-    /// It may; what is sent is sound, but the file is not what one expects.
+    /// It may; what is sent is sound, but the file is not as expected.
     Warning,
 }
 
@@ -291,7 +291,7 @@ impl DefectId {
         }
     }
 
-    /// Whether the defect can be allowed. It cannot where part of the program is not known: there is nothing to send.
+    /// Whether the defect can be allowed. It cannot if part of the program is not known: there is nothing to send.
     pub const fn can_be_allowed(self) -> bool {
         !matches!(
             self,
@@ -358,7 +358,7 @@ pub(super) struct Findings {
     seen: Vec<DefectId>,
 }
 
-/// What [`Findings`] come to.
+/// The result of [`Findings`].
 #[derive(Debug)]
 pub(super) struct Found {
     /// In the order of the file.
@@ -403,8 +403,8 @@ impl Findings {
                 self.overridden.push(id);
             }
         }
-        // Warnings must not crowd out errors, so each has its own share; and no kind of defect all the others, so the first
-        // of each is always there.
+        // Warnings must not crowd out errors, so each severity has its own limit. No kind of defect may crowd out the
+        // others, so the first of each kind is always listed.
         let is_first = !self.seen.contains(&id);
         if is_first {
             self.seen.push(id);
@@ -427,12 +427,8 @@ impl Findings {
     }
 }
 
-/// `1 byte`, `3 bytes`.
-pub(super) fn counted(number: usize, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
-}
-
-/// Nobody reads more, and a file of junk must not fill the memory with complaints.
+/// Most defects of each severity that are listed, besides the first of each kind. More would not be read, and a file of
+/// junk must not fill the memory.
 pub(super) const MOST_LISTED: u64 = 1000;
 
 #[cfg(test)]

@@ -91,7 +91,7 @@ pub fn diff(first: &Image, second: &Image) -> Difference {
     Difference { ranges, entry: byte_address(first.entry, first) != byte_address(second.entry, second) }
 }
 
-/// Words an image writes.
+/// Number of words an image writes.
 pub fn count_words(image: &Image) -> u64 {
     words(image).len() as u64
 }

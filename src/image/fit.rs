@@ -1,7 +1,7 @@
 //! Whether a sound image is right for the unit it is about to be sent to.
 //!
-//! A file is checked before anybody knows the unit: for the product it names, or for any. The unit's own
-//! flash, its loader, and the software that runs in it now are known later, and decide.
+//! A file is checked before the unit is known: for the product it names, or for any. The unit's own flash, its loader,
+//! and the software that runs in it are known later, and decide.
 
 use super::defect::DefectId;
 use super::report::{AddressRange, CheckedImage};
@@ -28,8 +28,8 @@ pub enum Software {
 }
 
 impl CheckedImage {
-    /// What speaks against sending this image to such a unit, whose software is this if that is known. Each kind of
-    /// misfit once; those that were allowed when the file was checked do not count.
+    /// Reasons not to send this image to a unit of this kind, each kind of reason once. `software`: what the unit runs,
+    /// if known. What was allowed when the file was checked does not count.
     pub fn misfits(&self, unit: &Target, software: Option<Software>) -> Vec<Misfit> {
         let mut misfits: Vec<Misfit> = Vec::new();
         let mut note = |id: DefectId, message: &dyn Fn() -> String| {
@@ -66,7 +66,7 @@ impl CheckedImage {
             });
             return misfits;
         }
-        // Loaders that fold write page by page, and what they have no data for they leave as it is.
+        // Loaders that fold write page by page, and leave words for which there is no data as they are.
         if let Some(gap) = self.gap().filter(|_| unit.outside == Outside::Folds) {
             note(DefectId::Gap, &|| {
                 format!(
@@ -100,7 +100,7 @@ impl CheckedImage {
         misfits
     }
 
-    /// The first words that no record writes and the identity block's CRC covers all the same, as erased flash.
+    /// The first words that no record writes, but that the identity block's CRC covers, as erased flash.
     fn gap(&self) -> Option<AddressRange> {
         let (identity, image) = (self.identity()?, self.image());
         let program = u64::from(identity.program_words) * 2 / u64::from(image.address_unit.bytes());

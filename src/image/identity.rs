@@ -14,6 +14,9 @@ pub const LENGTH: usize = 64;
 /// The most ASCII characters of a product name.
 pub const LONGEST_NAME: usize = 12;
 
+/// The most ASCII characters of a version.
+pub const LONGEST_VERSION: usize = 12;
+
 const BYTE_OFFSET: usize = WORD_ADDRESS as usize * 2;
 const MAGIC: &[u8; 4] = b"AXID";
 const FORMAT: u16 = 1;
@@ -118,7 +121,7 @@ impl Identity {
             block[at..at + text.len()].copy_from_slice(text.as_bytes());
         };
         put(8, LONGEST_NAME, &self.product);
-        put(20, 12, &self.version.to_string());
+        put(20, LONGEST_VERSION, &self.version.to_string());
         put(32, 10, &self.build_date);
         put(42, 8, &self.build_time);
         block[52..56].copy_from_slice(&self.program_words.to_le_bytes());

@@ -11,13 +11,13 @@ use super::{AddressUnit, srecord};
 
 /// An Intel HEX file as far as it has been read.
 pub(super) struct IntelHexFile {
-    /// What is added to offsets; unknown after a record that should have said it and cannot be read.
+    /// What is added to offsets; `None` after an unreadable record that should have set it.
     base: Option<u32>,
     /// Line of the entry point.
     start: Option<u64>,
     /// An entry point was given, though it may be unreadable.
     start_seen: bool,
-    /// Lines of records that run past their base's last offset if addresses count bytes, and not if words.
+    /// Lines of records that run past their base's last offset if addresses count bytes, but not if they count words.
     wraps_of_bytes: Vec<u64>,
 }
 
@@ -48,17 +48,19 @@ impl Grammar for IntelHexFile {
     }
 
     #[cold]
-    fn lose(&mut self, scan: &mut Scan, text: &[u8]) {
+    fn lose(&mut self, scan: &mut Scan, text: &[u8]) -> bool {
         match text.get(7..9).filter(|_| text.first() == Some(&b':')) {
-            // Without data and offset it can hardly have been anything else.
+            // A record without data and offset can hardly have been anything but the end.
             Some(kind) if text.starts_with(b":000000") && !kind.iter().all(u8::is_ascii_hexdigit) => {
                 scan.terminator = Some(Terminator::Lost);
             }
             Some(b"01") => scan.terminator = Some(Terminator::Lost),
             Some(b"02" | b"04") => self.base = None,
             Some(b"03" | b"05") => self.start_seen = true,
-            Some(_) | None => {}
+            Some(b"00") => {}
+            Some(_) | None => return false,
         }
+        true
     }
 
     fn conclude(&mut self, scan: &mut Scan) {
@@ -70,7 +72,7 @@ impl Grammar for IntelHexFile {
         if scan.facts.data_bytes == 0 {
             return;
         }
-        // It is sent with an empty header, and with a terminator in any case.
+        // The image is sent with an empty header, and with a terminator in any case.
         let frame = srecord::FEWEST_HEADER_CHARACTERS + 1 + srecord::TERMINATOR_CHARACTERS + 1;
         scan.facts.characters += frame as u64;
         if let (false, Some(Terminator::Read(line))) = (self.start_seen, scan.terminator) {
@@ -114,14 +116,14 @@ impl IntelHexFile {
             });
             return;
         }
-        // Where the base is not known, an error says so already, and the data belongs nowhere.
+        // If the base is not known, an error has been reported already, and nothing can be said about the data's place.
         let Some(base) = self.base else { return };
         self.look_for_wrap(scan, base, record);
         scan.data(base + u32::from(record.offset), OFFSET_COLUMN, record.data);
     }
 
-    /// Notes a record that runs past the last offset. Behind the last of all addresses there is nothing to disagree
-    /// about; that is another defect.
+    /// Notes a record that runs past the last offset. At the last base this is another defect (`address-wrap`), since
+    /// no reader can go on after it.
     fn look_for_wrap(&mut self, scan: &mut Scan, base: u32, record: &Record<'_>) {
         let room = OFFSETS - usize::from(record.offset);
         if base == LAST_BASE || record.data.len() <= room {

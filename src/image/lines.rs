@@ -1,7 +1,7 @@
 //! A file's lines, whatever its line ends, in bounded memory.
 //!
-//! A line end is CR, LF or CR LF. A line longer than any record could be is handed out as its beginning only, and the
-//! rest is passed over without being held, so a file that is one endless line costs no more memory than another.
+//! A line end is CR, LF or CR LF. Of a line longer than any record only the beginning is handed out, and the rest is
+//! skipped without being kept, so a file that is one endless line costs no more memory than another.
 
 use std::io::{self, Read};
 
@@ -75,7 +75,7 @@ impl<R: Read> Lines<R> {
         Lines::with_buffer(reader, BUFFER)
     }
 
-    /// Tests choose a small buffer, so that its borders come to be everywhere.
+    /// Tests choose a small buffer, so that its borders come everywhere in a line.
     pub(super) fn with_buffer(reader: R, size: usize) -> Self {
         assert!(size >= SMALLEST_BUFFER, "the beginning of the file and one line have to fit");
         Lines { reader, buffer: vec![0; size].into(), from: 0, to: 0, at_end: false, bytes: 0 }
@@ -116,7 +116,7 @@ impl<R: Read> Lines<R> {
                 continue;
             };
             let Some(end) = self.end_at(self.from + length) else {
-                // Only where the line fits can the buffer have room for what follows its CR.
+                // Only if the line fits does the buffer have room for what follows its CR.
                 if length > LONGEST {
                     return self.cut().map(Some);
                 }

@@ -44,6 +44,12 @@ pub enum MakeError {
         /// What would fit.
         most: u32,
     },
+    /// The identity block has no room for it.
+    #[error("version {version} has more than the {} characters that an image has room for", identity::LONGEST_VERSION)]
+    VersionTooLong {
+        /// What was asked for.
+        version: Version,
+    },
     /// The defect depends on more than the file.
     #[error("no file of its own can show the defect '{0}'")]
     NoSuchFlaw(DefectId),
@@ -85,6 +91,10 @@ const MOST_USUAL_WORDS: u32 = 0x1_4000;
 pub fn make(recipe: &Recipe<'_>) -> Result<Vec<u8>, MakeError> {
     let Recipe { target, words, .. } = *recipe;
     let most = target.flash.program_words;
+    let version = recipe.version;
+    if version.to_string().len() > identity::LONGEST_VERSION {
+        return Err(MakeError::VersionTooLong { version });
+    }
     if words < FEWEST_WORDS {
         return Err(MakeError::TooSmall { words });
     }
@@ -107,13 +117,13 @@ pub fn make(recipe: &Recipe<'_>) -> Result<Vec<u8>, MakeError> {
 /// The program alone, its identity block included: bytes in S-record order, from word 0 on.
 ///
 /// # Panics
-/// If the recipe asks for fewer than [`FEWEST_WORDS`].
+/// If the recipe asks for fewer than [`FEWEST_WORDS`], or for a version that the identity block has no room for.
 pub fn program(recipe: &Recipe<'_>) -> Vec<u8> {
     let Recipe { target, version, words, flaw } = *recipe;
     let mut rng = Rng::new(PROGRAMS).fork(&target.product).fork(&version.to_string());
     let mut clock = rng.fork("build time");
     let mut program = Vec::with_capacity(words as usize * 2);
-    // A vector is a jump and where to; the block and the code follow.
+    // A vector is a jump instruction and its target; the block and the code follow.
     for vector in 0..identity::WORD_ADDRESS {
         let word = if vector % 2 == 0 { JUMP } else { (ENTRY as u64 + rng.below(u64::from(words - ENTRY))) as u16 };
         program.extend(word.to_le_bytes());
@@ -126,7 +136,7 @@ pub fn program(recipe: &Recipe<'_>) -> Vec<u8> {
         program.extend(word.to_le_bytes());
     }
     match flaw {
-        // The check takes words that are not written for erased ones; so does this CRC.
+        // The check takes words that no record writes for erased flash; so does this CRC.
         Some(DefectId::Gap) => program[DAMAGED * STEP..(DAMAGED + 1) * STEP].fill(0xFF),
         // The missing half of the last word is sent as FFh.
         Some(DefectId::OddLength) => {
@@ -270,7 +280,7 @@ impl Draft {
                 self.lines.insert(damaged, record);
             }
             DefectId::OutOfRange => {
-                // Some boot flash follows directly; that would be another defect.
+                // If the boot flash follows directly, an address in it would be another defect.
                 let end = recipe.target.flash.end();
                 let boot = recipe.target.boot.filter(|boot| (boot.start..boot.end).contains(&end));
                 self.insert(last, data32(boot.map_or(end, |boot| boot.end) as u32, &[0x12, 0x34]));
@@ -377,5 +387,10 @@ mod tests {
         assert!(matches!(with(FEWEST_WORDS - 1, None), Err(MakeError::TooSmall { .. })));
         assert!(matches!(with(0x10001, None), Err(MakeError::TooBig { .. })));
         assert_eq!(with(FEWEST_WORDS, Some(DefectId::TooLarge)), Err(MakeError::NoSuchFlaw(DefectId::TooLarge)));
+        // The identity block has room for twelve characters.
+        let of = |version| make(&Recipe { target: &target, version, words: FEWEST_WORDS, flaw: None });
+        assert!(of(Version::new(1000, 1000, 100)).is_err() && of(Version::new(1000, 1000, 10)).is_ok());
+        let version = Version::new(u16::MAX, u16::MAX, u16::MAX);
+        assert_eq!(of(version), Err(MakeError::VersionTooLong { version }));
     }
 }

@@ -1,8 +1,8 @@
 //! Program images: S-record and Intel HEX files, what they hold, and whether they may be sent.
 //!
 //! [`check()`] reads a file of any size once and gives a [`Report`] with every defect in it; only a report without an
-//! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] and [`ihex`] know
-//! one line, [`make`] builds sample files. This module does not know the products: the caller passes them as [`Target`]s.
+//! error yields a [`CheckedImage`], and only a checked image can be uploaded. [`srecord`] and [`ihex`] know one line,
+//! [`make`] builds sample files. This module does not know the products: the caller passes them as [`Target`]s.
 
 mod check;
 mod content;
@@ -106,12 +106,12 @@ pub struct Target {
 /// What a loader does with data outside of the program flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Outside {
-    /// Addresses of a larger part of the family (below 00200000h) are folded onto the program flash, those marked as data
-    /// memory go there ([`Destination`]), others are skipped: all that silently, and success is reported.
+    /// Addresses of a larger part of the family (below 00200000h) are folded onto the program flash, those marked as
+    /// data memory go there ([`Destination`]), others are skipped. All of this is silent, and success is reported.
     Folds,
-    /// It stops with an error, when the old program is erased already.
+    /// It stops with an error, after it has erased the old program.
     Refuses,
-    /// Which loader it is is not known.
+    /// The loader is not known.
     Unknown,
 }
 
@@ -147,7 +147,7 @@ const fn is_marked_as_data(address: u64) -> bool {
 
 /// CodeWarrior's mark for data memory in an address.
 const DATA_MARK: u64 = 0x0200_0000;
-/// The upper half of the addresses that loaders which fold take for data memory.
+/// The upper half of the addresses that a folding loader takes for data memory.
 const DATA_HIGH_HALF: u64 = 0x0020;
 
 impl Target {

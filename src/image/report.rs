@@ -11,7 +11,7 @@ use super::{AddressUnit, Block, Image, MOST_BLOCK_BYTES, ihex, srecord_file};
 pub struct Report {
     /// What is in the file.
     pub facts: Facts,
-    /// Defects in the order of the file; of errors and of warnings the first thousand each.
+    /// Defects in the order of the file: the first thousand errors and warnings each, and the first of each kind.
     pub defects: Vec<Defect>,
     /// Number of errors, allowed ones included.
     pub errors: u64,
@@ -73,7 +73,7 @@ impl Report {
 pub struct Facts {
     /// What kind of file it is.
     pub format: Option<Format>,
-    /// Bytes read; of a file that is something else, only its beginning is.
+    /// Bytes read; of a file that is not an image, only the beginning is read.
     pub size: u64,
     /// The first line end.
     pub line_end: Option<LineEnd>,
@@ -186,7 +186,7 @@ impl CheckedImage {
         self.identity.as_ref()
     }
 
-    /// The errors it has all the same, because someone allowed them.
+    /// The errors it has that were allowed by name.
     pub fn overridden(&self) -> &[DefectId] {
         &self.overridden
     }

@@ -1,31 +1,32 @@
 //! Reading a file line by line, as far as it is the same in both formats.
 //!
-//! A [`Grammar`] says what a line means. Here are lines and their ends, what may be on every line and is reported once,
-//! the data that is kept, and the report at the end. A line that cannot be read is one defect: nothing that merely
-//! follows from it is reported as well.
+//! A [`Grammar`] says what a line means. This file deals with lines and their ends, with what may be on every line and
+//! is reported once, with the data that is kept, and with the report at the end. A line that cannot be read is one
+//! defect: nothing that merely follows from it is reported as well.
 
 use std::io::{self, Read};
 
 use super::content::{Content, MOST_BYTES, MOST_PIECES, Steps};
-use super::defect::{DefectId, Findings, counted};
+use super::defect::{DefectId, Findings};
 use super::lines::{self, LineEnd, Lines, RawLine};
 use super::report::{Facts, Format, Report};
 use super::whole;
+use crate::count::noun;
 
 /// What lines of one format mean.
 pub(super) trait Grammar {
     /// Where the bytes of a record are put.
     type Room;
 
-    /// It, empty.
+    /// An empty room.
     const ROOM: Self::Room;
 
     /// Reads a line that is not blank, not too long and not after the terminator.
     fn line(&mut self, scan: &mut Scan, text: &[u8], room: &mut Self::Room);
 
-    /// Believes of a line nothing can be made of what it was meant to be, so that a damaged header is not reported as
-    /// a missing one, too.
-    fn lose(&mut self, scan: &mut Scan, text: &[u8]);
+    /// Guesses what an unreadable line was meant to be, so that a damaged header is not also reported as missing. Says
+    /// whether that can be guessed.
+    fn lose(&mut self, scan: &mut Scan, text: &[u8]) -> bool;
 
     /// The last line has been read.
     fn conclude(&mut self, scan: &mut Scan);
@@ -77,9 +78,9 @@ impl Repeated {
 /// The end of a file's data, as its terminator gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Terminator {
-    /// It could be read.
+    /// It could be read, on this line.
     Read(u64),
-    /// There was one, but nothing can be made of it.
+    /// There was one, but it could not be read.
     Lost,
 }
 
@@ -95,8 +96,14 @@ pub(super) struct Scan {
     pub(super) steps: Steps,
     content: Content,
     after: Repeated,
-    /// Lines nothing could be made of.
+    /// Lines that could not be read.
     lost: u64,
+    /// Those of them of which nobody can say what they were meant to be.
+    unknown: u64,
+    /// One of these came before any record: it may have been the header.
+    unknown_first: bool,
+    /// One of these is the last line so far: it may have been the terminator.
+    unknown_last: bool,
     last_address: Option<u32>,
     too_large: bool,
     last_end: Option<LineEnd>,
@@ -117,6 +124,9 @@ impl Scan {
             content: Content::new(),
             after: Repeated::default(),
             lost: 0,
+            unknown: 0,
+            unknown_first: false,
+            unknown_last: false,
             last_address: None,
             too_large: false,
             last_end: None,
@@ -145,7 +155,22 @@ impl Scan {
         self.findings.note(id, self.line, column, message);
         self.lost += 1;
         self.steps.interrupt();
-        grammar.lose(self, text);
+        // A line that is too long may hold several records, and any of them.
+        if !grammar.lose(self, text) || id == DefectId::LongLine {
+            self.unknown += 1;
+            self.unknown_first |= self.facts.records == 0;
+            self.unknown_last = true;
+        }
+    }
+
+    /// Whether an unreadable line may have been the header.
+    pub(super) fn may_have_lost_header(&self) -> bool {
+        self.unknown_first
+    }
+
+    /// How many unreadable lines may have been anything, such as data.
+    pub(super) fn unknown_lines(&self) -> u64 {
+        self.unknown
     }
 
     pub(super) fn wrong_checksum(&mut self, characters: usize, stored: u8, computed: u8) {
@@ -162,7 +187,7 @@ impl Scan {
         } else {
             self.findings.note(DefectId::TrailingCharacters, self.line, characters + 1, || {
                 let follow = if rest.len() == 1 { "follows" } else { "follow" };
-                format!("{} {follow} the checksum", counted(rest.len(), "character"))
+                format!("{} {} {follow} the checksum", rest.len(), noun(rest.len(), "character"))
             });
         }
     }
@@ -177,7 +202,7 @@ impl Scan {
         self.last_address = Some(address);
         self.steps.step(self.line, address, data.len());
         self.facts.data_bytes += data.len() as u64;
-        // Whatever it was, it is sent as an S3, and odd data is filled up.
+        // Whatever its type was, the record is sent as an S3, and odd data is filled up.
         self.facts.characters += 4 + (4 + data.len().next_multiple_of(2) as u64 + 1) * 2 + 1;
         if !self.content.keep(self.line, address, data) && !self.too_large {
             self.too_large = true;
@@ -195,6 +220,7 @@ impl Scan {
             self.blank.seen(self.line, 1);
             return;
         }
+        self.unknown_last = false;
         if self.terminator.is_some() {
             self.after.seen(self.line, 1);
             return;
@@ -221,7 +247,7 @@ impl Scan {
 
     fn conclude(mut self, format: Format, request: &whole::Request<'_>) -> Report {
         self.note_repeated();
-        if self.terminator.is_none() {
+        if self.terminator.is_none() && !self.unknown_last {
             let terminator = format.terminator();
             self.findings.note(DefectId::MissingTerminator, self.line, 1, || {
                 format!("the file ends without {terminator}: it is cut off")

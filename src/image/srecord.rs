@@ -1,14 +1,14 @@
 //! One line of S-record text, in both directions.
 //!
-//! `S`, a type digit, a length byte (what follows it, in bytes), an address of two to four bytes, data, and a check
-//! sum: all bytes from the length on, the checksum included, add up to FFh modulo 256. Whole-file rules are
-//! [`super::check()`]'s. The decoder works on bytes and into the caller's room, because a file of any size passes
-//! through it and may hold anything at all.
+//! `S`, a type digit, a length byte (what follows it, in bytes), an address of two to four bytes, data, and a checksum:
+//! all bytes from the length on, the checksum included, add up to FFh modulo 256. Whole-file rules are
+//! [`super::check()`]'s. The decoder works on bytes, and puts those of a record into a buffer of the caller, because a
+//! file of any size passes through it and may hold anything at all.
 
 use std::fmt;
 
-use super::defect::counted;
 use super::digits::{self, INVALID, LOWER, digit};
+use crate::count::counted;
 
 /// What a record is for, and how wide its address is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -8,7 +8,7 @@ use super::srecord::{self, Kind, LineError, Record, Room};
 /// An S-record file as far as it has been read.
 pub(super) struct SRecordFile {
     header_seen: bool,
-    /// First data before a header.
+    /// Line of the first data before a header.
     early_data: Option<u64>,
     /// Lines that begin as data records, readable or not: what a count record counts.
     data_lines: u64,
@@ -53,7 +53,7 @@ impl Grammar for SRecordFile {
     }
 
     #[cold]
-    fn lose(&mut self, scan: &mut Scan, text: &[u8]) {
+    fn lose(&mut self, scan: &mut Scan, text: &[u8]) -> bool {
         let meant = text.first().is_some_and(|first| first.eq_ignore_ascii_case(&b'S'));
         match text.get(1).filter(|_| meant) {
             Some(b'0') => self.header_seen = true,
@@ -61,9 +61,11 @@ impl Grammar for SRecordFile {
                 self.data_lines += 1;
                 self.note_early_data(scan);
             }
+            Some(b'5' | b'6') => {}
             Some(b'7'..=b'9') => scan.terminator = Some(Terminator::Lost),
-            Some(_) | None => {}
+            Some(_) | None => return false,
         }
+        true
     }
 
     fn conclude(&mut self, scan: &mut Scan) {
@@ -72,7 +74,7 @@ impl Grammar for SRecordFile {
             let what = format!("loaders take S0, S3 and S7 only; {kind}, which they would take as {instead}");
             lines.note(&mut scan.findings, DefectId::RefusedType, &what);
         }
-        if !self.header_seen {
+        if !self.header_seen && !scan.may_have_lost_header() {
             scan.findings.note(DefectId::MissingHeader, 1, 1, || "there is no header (S0)".into());
         }
     }
@@ -101,7 +103,8 @@ impl SRecordFile {
         }
     }
 
-    /// A record of a type that loaders stop at: as a rule every line is of one, so each type is reported once.
+    /// A record of a type that loaders do not take. As a rule every line of such a file has one, so each type is
+    /// reported once.
     fn refused(&mut self, scan: &Scan, kind: Kind, instead: &'static str) {
         let known = self.refused.iter_mut().find(|(known, ..)| *known == kind);
         match known {
@@ -137,7 +140,7 @@ impl SRecordFile {
                 text
             }
         };
-        // A header with a short address may be two characters longer than one with a long address.
+        // The text of a header with a two-byte address may be two bytes longer than with a four-byte address.
         let text = &text[..text.len().min(srecord::LONGEST_HEADER)];
         scan.facts.characters += (srecord::FEWEST_HEADER_CHARACTERS + text.len() * 2 + 1) as u64;
         scan.facts.header = Some(text.to_vec());
@@ -164,7 +167,7 @@ impl SRecordFile {
     fn count(&mut self, scan: &mut Scan, record: &Record<'_>) {
         let (kind, says, counted) = (record.kind, u64::from(record.address), self.data_lines);
         scan.findings.note(DefectId::CountRecord, scan.line, 1, || format!("an {kind} record; not sent"));
-        if says != counted {
+        if !(counted..=counted + scan.unknown_lines()).contains(&says) {
             scan.findings.note(DefectId::WrongCount, scan.line, ADDRESS_COLUMN, || {
                 format!("its number of data records is {says}, and {counted} precede it")
             });

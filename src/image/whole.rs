@@ -1,10 +1,11 @@
 //! Rules about an image as a whole: where its data lies, whether it fits the unit, and what it says it is.
 
 use super::content::{Content, MOST_BYTES, Piece, Steps};
-use super::defect::{DefectId, Findings, Severity, counted};
+use super::defect::{DefectId, Findings, Severity};
 use super::identity::{self, Identity, IdentityError};
 use super::report::{AddressRange, Facts, Format};
 use super::{AddressUnit, Destination, Outside, Target, is_marked_as_data};
+use crate::count::counted;
 
 /// What the caller knows and wants.
 pub(super) struct Request<'a> {
@@ -13,7 +14,7 @@ pub(super) struct Request<'a> {
     pub expected: Option<&'a str>,
 }
 
-/// What the reading found out, next to the data.
+/// What reading the file has shown, besides the data.
 pub(super) struct Whole<'a> {
     pub steps: &'a Steps,
     /// Whether all data was read and kept; if not, what is missing is already an error.
@@ -24,7 +25,7 @@ pub(super) struct Whole<'a> {
 }
 
 impl Whole<'_> {
-    /// Notes the defects of the whole and fills in the facts.
+    /// Notes the defects of the image as a whole, and fills in the facts.
     pub(super) fn judge(
         &self,
         request: &Request<'_>,
@@ -54,7 +55,7 @@ impl Whole<'_> {
         let Some(flash) = target.flash else { return };
         if let Some((unit, line)) = seen.filter(|(unit, _)| *unit != flash.address_unit) {
             findings.note(DefectId::AddressUnit, line, column, || wrong_unit(unit, &target));
-            // Every address means something else than it says; more complaints about addresses would only mislead.
+            // Every address means something other than it says, so more defects of addresses would only mislead.
             return;
         }
         elsewhere(content, &target, flash.end(), column, findings);
@@ -130,8 +131,8 @@ pub(super) struct Judged {
     outside: Outside,
 }
 
-/// The product the image names, else the one expected, else the one its file name claims. If nothing says anything,
-/// the largest flash serves: what does not fit there fits nowhere.
+/// The product the image names, else the one expected, else the one its file name claims. If none is known, the image
+/// is judged for the largest flash: what does not fit there fits nowhere.
 fn target(request: &Request<'_>, identity: Option<&Identity>) -> Judged {
     let claimed = claim(request).map(|(product, _)| product);
     let names = [identity.map(|identity| identity.product.as_str()), request.expected, claimed];
@@ -260,7 +261,8 @@ impl Judged {
         }
     }
 
-    /// Whether the address carries a mark for data memory: the linker's, or the one of a loader that knows such.
+    /// Whether the address is marked as data memory: by the linker or, unless the loader refuses such data, by its
+    /// upper half.
     pub(super) fn is_data_memory(&self, address: u32) -> bool {
         match self.outside {
             Outside::Folds | Outside::Unknown => Destination::of(address.into()) == Destination::Data,
@@ -298,7 +300,7 @@ fn data_memory(content: &Content, target: &Judged, column: usize, findings: &mut
     });
 }
 
-/// Notes what is outside the program flash, the boot flash apart.
+/// Notes what is outside the program flash, separately for the boot flash and for all else.
 fn elsewhere(content: &Content, target: &Judged, flash_end: u64, column: usize, findings: &mut Findings) {
     let whose = target.product.as_ref().map_or("any unit's".to_owned(), |product| format!("the {product}'s"));
     let in_boot = |span: &AddressRange| target.boot.is_some_and(|boot| span.start < boot.end && boot.start < span.end);

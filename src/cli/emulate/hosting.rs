@@ -1,24 +1,26 @@
 //! Units on pseudo-terminals, with what becomes of them.
 
+use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::Serialize;
 
-use super::orders::{Order, help, places};
+use super::orders::{Order, Refused, help, places};
 use super::{Args, CliError, Global, Kind, Output};
 use crate::cli::{files, waiting};
 use crate::device::{Complaint, Product};
-use crate::emulator::Unit;
 use crate::emulator::fault::{self, Fault};
-use crate::emulator::scenario::{LARGEST_FILE, Scenario, Stage, Verb};
+use crate::emulator::scenario::{LARGEST_FILE, Scenario, Stage};
+use crate::emulator::{Setup, Unit};
 use crate::host::Input;
 use crate::host::port_link::{PortLink, PortLinkError};
 use crate::host::signal::Signals;
 use crate::host::state::{Contents, Opened, State};
-use crate::host::unit::{self, Answer, HostError, HostedUnit, Hosting, LineRate, Plug};
+use crate::host::unit::{self, Answer, HostError, HostedUnit, Hosting, Plug};
 use crate::wire::visible;
 
 /// One unit, as the first lines of the output tell it.
@@ -31,7 +33,7 @@ struct Started<'a> {
     pty: String,
 }
 
-/// A unit of this run. The link goes first, so that nobody opens a port about to end.
+/// A unit of this run. The link is dropped first, so that it never leads to a port that is gone.
 struct Running {
     link: Option<PortLink>,
     unit: HostedUnit,
@@ -44,29 +46,65 @@ struct Running {
 enum News {
     Input(Input),
     Line(String),
-    /// A unit has done what it was told, or not.
-    Answered {
-        place: usize,
-        verb: String,
-        answer: Answer,
-    },
-    /// The cable of a unit has been pulled.
-    Unplugged {
-        place: usize,
-    },
-    /// It is in again.
-    Replugged {
-        place: usize,
-        pty: PathBuf,
-    },
+    /// A unit has said something: [`Voices`] has it.
+    Said,
     Failed(HostError),
+}
+
+/// What a unit says.
+#[derive(Debug, PartialEq)]
+enum Said {
+    /// It has done what it was told, or not.
+    Answered { verb: String, answer: Answer },
+    /// Its cable has been pulled.
+    Unplugged,
+    /// It is in again.
+    Replugged(PathBuf),
+}
+
+/// What all units have said, with their places, in its order. Their threads never wait for us, whatever standard output
+/// does. No more waits here than the answers to one line, as the next one is read after them, and the last news of each
+/// cable.
+#[derive(Clone)]
+struct Voices {
+    said: Arc<Mutex<VecDeque<(usize, Said)>>>,
+    news: SyncSender<News>,
+}
+
+impl Voices {
+    /// Nothing has been said yet; that something has is put on this channel.
+    fn new(news: SyncSender<News>) -> Self {
+        Voices { said: Arc::default(), news }
+    }
+
+    fn say(&self, place: usize, said: Said) {
+        let is_answer = |said: &Said| matches!(said, Said::Answered { .. });
+        let mut all = self.all();
+        if !is_answer(&said) {
+            // What became of the cable before is over.
+            all.retain(|(other, earlier)| *other != place || is_answer(earlier));
+        }
+        all.push_back((place, said));
+        drop(all);
+        // A full channel brings something later on, and with all that comes what has been said is asked for.
+        let _ = self.news.try_send(News::Said);
+    }
+
+    /// The oldest that has not been taken.
+    fn take(&self) -> Option<(usize, Said)> {
+        self.all().pop_front()
+    }
+
+    fn all(&self) -> MutexGuard<'_, VecDeque<(usize, Said)>> {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// What a unit answered, in JSON.
 #[derive(Serialize)]
 struct Answered<'a> {
     schema: &'static str,
-    /// `None` where the line names none.
+    /// `None` where the line is for none in particular.
     unit: Option<usize>,
     verb: &'a str,
     ok: bool,
@@ -83,7 +121,7 @@ impl<'a> Answered<'a> {
     }
 }
 
-/// News that wait at most: lines a person types or a script writes, answers, and ends.
+/// News that wait at most: a line, signals, ends, and that units have said something.
 const NEWS: usize = 256;
 
 /// Hosts units until the user has enough.
@@ -96,17 +134,19 @@ pub fn run(args: Args, _global: &Global, output: &mut Output) -> Result<(), CliE
     let scenario = args.scenario.as_deref().map(read_scenario).transpose()?;
     // Dropped after `happened`: dropping a unit waits for its thread, which may be waiting to say that it has failed.
     let mut units = Vec::new();
-    let (news, happened) = std::sync::mpsc::sync_channel(NEWS);
+    let (news, happened) = sync_channel(NEWS);
+    let voices = Voices::new(news.clone());
     // Signals first: an interrupt in between would leave links behind.
     let _signals = listen_for_signals(news.clone())?;
     for (place, product) in products.into_iter().enumerate() {
-        units.push(start(&args, place, product, scenario.as_ref(), &faults[place], news.clone(), output)?);
+        units.push(start(&args, place, product, scenario.as_ref(), &faults[place], &voices, output)?);
     }
     for (place, running) in units.iter().enumerate() {
         announce(place, running, "", output)?;
     }
-    listen_for_lines(news.clone())?;
-    serve(&args, &mut units, &news, &happened, output)
+    let (go_on, next) = sync_channel(1);
+    listen_for_lines(news, next)?;
+    serve(&args, &mut units, &voices, &happened, &go_on, output)
 }
 
 /// The products of all units, in their order.
@@ -153,55 +193,21 @@ fn start(
     product: &'static Product,
     scenario: Option<&(String, String)>,
     faults: &[Fault],
-    news: SyncSender<News>,
+    voices: &Voices,
     output: &mut Output,
 ) -> Result<Running, CliError> {
-    let scenario = match scenario {
-        None => Scenario::default(),
-        Some((file, text)) => Scenario::read(file, text, product)
-            .map_err(|complaints| {
-                let list = Complaint::list(&complaints);
-                CliError::message(Kind::Usage, format!("the scenario cannot be played:\n{list}"))
-                    .hint("docs/emulator.md describes the format")
-            })?
-            .unwrap_or_default(),
-    };
+    let scenario = scenario.map(|scenario| scenario_for(scenario, product)).transpose()?.unwrap_or_default();
     let seed = args.seed.wrapping_add(place as u64);
     let mut setup = unit::factory_setup(product, seed);
     setup.dialect = args.dialect.map_or(0, |dialect| dialect.wrapping_add(place as u64));
     setup.loader = args.loader.unwrap_or(setup.loader);
     let state = match &args.state {
+        Some(folder) => Some(remember(&numbered(folder, place), &mut setup, output)?),
         None => None,
-        Some(folder) => {
-            let fresh = Unit::new(setup.clone());
-            let factory = Contents { flash: fresh.flash().to_vec(), parameters: fresh.parameters().to_vec() };
-            let Opened { state, contents, damaged } = State::open(&numbered(folder, place), product, &factory)
-                .map_err(|error| CliError::new(Kind::Failed, error))?;
-            for file in damaged {
-                output.remark(&format!("axcon: {file}"));
-            }
-            (setup.flash, setup.parameters) = (contents.flash, contents.parameters);
-            Some(state)
-        }
     };
     let emulated = Stage::new(Unit::new(setup), scenario).with_faults(seed, faults);
-    let plugs = news.clone();
-    let hosting = Hosting {
-        line_rate: if args.line_rate == "off" { LineRate::Off } else { LineRate::Real },
-        state,
-        seed,
-        // The unit's thread must not wait for us: should this be dropped, `unplug` and `plug` bring it again.
-        plug: Some(Box::new(move |plug| {
-            let _ = plugs.try_send(match plug {
-                Plug::Out => News::Unplugged { place },
-                Plug::In(pty) => News::Replugged { place, pty: pty.to_owned() },
-            });
-        })),
-        failed: Some(Box::new(move |error| {
-            let _ = news.send(News::Failed(error));
-        })),
-        ..Hosting::default()
-    };
+    let line_rate = args.line_rate.line_rate();
+    let hosting = Hosting { line_rate, state, seed, ..reporting(place, voices) };
     let unit = HostedUnit::start(emulated, hosting).map_err(|error| match error {
         HostError::NoPseudoTerminals => CliError::new(Kind::Failed, error)
             .hint(format!("'--port emu:{}' has a unit within the program", product.name.to_ascii_lowercase())),
@@ -210,6 +216,47 @@ fn start(
     let pty = unit.serial().to_owned();
     let link = link(args, place, &pty)?;
     Ok(Running { link, unit, pty, product })
+}
+
+/// Reads a scenario for this product, given the name and the text of its file.
+fn scenario_for((file, text): &(String, String), product: &Product) -> Result<Scenario, CliError> {
+    let read = Scenario::read(file, text, product).map_err(|complaints| {
+        let list = Complaint::list(&complaints);
+        CliError::message(Kind::Usage, format!("the scenario cannot be played:\n{list}"))
+            .hint("docs/emulator.md describes the format")
+    })?;
+    Ok(read.unwrap_or_default())
+}
+
+/// Gives a unit the flash and the parameters that are kept in a folder; those of the factory if there are none.
+fn remember(folder: &Path, setup: &mut Setup, output: &mut Output) -> Result<State, CliError> {
+    let fresh = Unit::new(setup.clone());
+    let factory = Contents { flash: fresh.flash().to_vec(), parameters: fresh.parameters().to_vec() };
+    let Opened { state, contents, damaged } =
+        State::open(folder, setup.product, &factory).map_err(|error| CliError::new(Kind::Failed, error))?;
+    for file in damaged {
+        output.remark(&format!("axcon: {file}"));
+    }
+    (setup.flash, setup.parameters) = (contents.flash, contents.parameters);
+    Ok(state)
+}
+
+/// How a unit's thread tells us what becomes of its cable and of itself.
+fn reporting(place: usize, voices: &Voices) -> Hosting {
+    let (plugs, news) = (voices.clone(), voices.news.clone());
+    Hosting {
+        plug: Some(Box::new(move |plug| {
+            let said = match plug {
+                Plug::Out => Said::Unplugged,
+                Plug::In(pty) => Said::Replugged(pty.to_owned()),
+            };
+            plugs.say(place, said);
+        })),
+        failed: Some(Box::new(move |error| {
+            let _ = news.send(News::Failed(error));
+        })),
+        ..Hosting::default()
+    }
 }
 
 fn link(args: &Args, place: usize, pty: &Path) -> Result<Option<PortLink>, CliError> {
@@ -235,52 +282,82 @@ fn announce(place: usize, running: &Running, prefix: &str, output: &mut Output) 
     }
 }
 
+/// Does what comes. The next line is read when all verbs of the last one are answered and the answers are written: so
+/// however fast verbs come and however slowly answers are read, none is refused or lost.
 fn serve(
     args: &Args,
     units: &mut [Running],
-    news: &SyncSender<News>,
+    voices: &Voices,
     happened: &Receiver<News>,
+    go_on: &SyncSender<()>,
     output: &mut Output,
 ) -> Result<(), CliError> {
-    loop {
-        match happened.recv() {
-            Ok(News::Line(line)) => {
-                let products: Vec<&Product> = units.iter().map(|running| running.product).collect();
-                match Order::read(&line, &products) {
-                    Ok(None) => {}
-                    Ok(Some(Order::Quit)) => return Ok(()),
-                    Ok(Some(Order::Help)) => tell_help(line.trim(), &help(), output)?,
-                    Ok(Some(Order::HelpFaults)) => tell_help(line.trim(), fault::HELP, output)?,
-                    Ok(Some(Order::Tell(verbs))) => {
-                        for (place, verb) in verbs {
-                            if !tell(&units[place], place, verb, line.trim(), news) {
-                                let refused = Err("the unit takes no more orders at the moment".to_owned());
-                                report(place, line.trim(), &refused, units.len(), output)?;
-                            }
-                        }
-                    }
-                    Err(complaint) if output.json => {
-                        output.object(&Answered::to(None, line.trim(), Err(&complaint)))?;
-                    }
-                    Err(complaint) => output.remark(&visible::line(complaint.as_bytes())),
+    let mut awaited = 0_usize;
+    while let Ok(news) = happened.recv() {
+        let mut line_is_done = false;
+        while let Some((place, said)) = voices.take() {
+            match said {
+                Said::Answered { verb, answer } => {
+                    report(place, &verb, &answer, units.len(), output)?;
+                    awaited = awaited.saturating_sub(1);
+                    line_is_done = awaited == 0;
+                }
+                // Its pseudo-terminal's number is somebody else's soon: the link must not lead there.
+                Said::Unplugged => units[place].link = None,
+                Said::Replugged(pty) => {
+                    let prefix = prefix(place, units.len());
+                    let running = &mut units[place];
+                    running.link = None;
+                    running.link = link(args, place, &pty)?;
+                    running.pty = pty;
+                    announce(place, running, &prefix, output)?;
                 }
             }
-            Ok(News::Answered { place, verb, answer }) => report(place, &verb, &answer, units.len(), output)?,
-            // Its pseudo-terminal's number is somebody else's soon: the link must not lead there.
-            Ok(News::Unplugged { place }) => units[place].link = None,
-            Ok(News::Replugged { place, pty }) => {
-                let prefix = prefix(place, units.len());
-                let running = &mut units[place];
-                running.link = None;
-                running.link = link(args, place, &pty)?;
-                running.pty = pty;
-                announce(place, running, &prefix, output)?;
+        }
+        match news {
+            News::Line(line) => {
+                let Some(told) = obey(&line, units, voices, output)? else { return Ok(()) };
+                awaited = told;
+                line_is_done = awaited == 0;
             }
-            Ok(News::Failed(error)) => return Err(CliError::new(Kind::Failed, error)),
-            Ok(News::Input(Input::Signal(_))) | Err(_) => return Ok(()),
-            Ok(News::Input(_)) => {}
+            News::Failed(error) => return Err(CliError::new(Kind::Failed, error)),
+            News::Input(Input::Signal(_)) => return Ok(()),
+            News::Input(_) | News::Said => {}
+        }
+        if line_is_done {
+            // Nobody waits for it if standard input has ended.
+            let _ = go_on.try_send(());
         }
     }
+    Ok(())
+}
+
+/// Does what a line says, and gives the number of answers that will come. `None` means the end.
+fn obey(line: &str, units: &[Running], voices: &Voices, output: &mut Output) -> Result<Option<usize>, CliError> {
+    let products: Vec<&Product> = units.iter().map(|running| running.product).collect();
+    let mut told = 0;
+    match Order::read(line, &products) {
+        Ok(None) => {}
+        Ok(Some(Order::Quit)) => return Ok(None),
+        Ok(Some(Order::Help)) => tell_help(line.trim(), &help(), output)?,
+        Ok(Some(Order::HelpFaults)) => tell_help(line.trim(), fault::HELP, output)?,
+        Ok(Some(Order::Tell(verbs))) => {
+            for (place, verb) in verbs {
+                let (voices, said) = (voices.clone(), line.trim().to_owned());
+                let answered = move |answer| voices.say(place, Said::Answered { verb: said, answer });
+                if units[place].unit.order(verb, answered) {
+                    told += 1;
+                } else {
+                    report(place, line.trim(), &Err("the unit has ended".to_owned()), units.len(), output)?;
+                }
+            }
+        }
+        Err(Refused { place, why }) if output.json => {
+            output.object(&Answered::to(place.map(|place| place + 1), line.trim(), Err(&why)))?;
+        }
+        Err(Refused { why, .. }) => output.remark(&visible::line(why.as_bytes())),
+    }
+    Ok(Some(told))
 }
 
 /// An answer like any other: a script that waits for an object after each verb gets one.
@@ -290,15 +367,6 @@ fn tell_help(verb: &str, text: &str, output: &mut Output) -> Result<(), CliError
         return output.object(&Answered::to(None, verb, Ok(Some(text))));
     }
     output.data(format!("{text}\n").as_bytes())
-}
-
-/// Has a unit do something; `false` if it takes no order.
-fn tell(running: &Running, place: usize, verb: Verb, line: &str, news: &SyncSender<News>) -> bool {
-    let (news, line) = (news.clone(), line.to_owned());
-    running.unit.order(verb, move |answer| {
-        // The unit's thread must not wait for us: an answer that nobody can take is dropped.
-        let _ = news.try_send(News::Answered { place, verb: line, answer });
-    })
 }
 
 /// Says what came of a verb: data to standard output, refusals to standard error.
@@ -342,7 +410,8 @@ fn listen_for_signals(news: SyncSender<News>) -> Result<Signals, CliError> {
 /// Bytes of a line of verbs that are looked at together; no verb is nearly as long.
 const LONGEST_LINE: u64 = 1 << 16;
 
-fn listen_for_lines(news: SyncSender<News>) -> Result<(), CliError> {
+/// Puts the lines of standard input on the channel, each but the first when `next` says so.
+fn listen_for_lines(news: SyncSender<News>, next: Receiver<()>) -> Result<(), CliError> {
     if !crate::host::terminal::may_read_standard_input() {
         return Ok(());
     }
@@ -353,7 +422,7 @@ fn listen_for_lines(news: SyncSender<News>) -> Result<(), CliError> {
         while matches!(input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line), Ok(1..)) {
             let text = String::from_utf8_lossy(&line).trim_end_matches(['\r', '\n']).to_owned();
             line.clear();
-            if news.send(News::Line(text)).is_err() {
+            if news.send(News::Line(text)).is_err() || next.recv().is_err() {
                 return;
             }
         }
@@ -400,6 +469,26 @@ mod tests {
         assert!(complaint.starts_with("--fault ' 1  explode': column 5: 'explode' is not known"), "{complaint}");
         let complaint = read(&["3 latency 1"]).expect_err("no such unit");
         assert!(complaint.contains("there is no unit 3: they are numbered 1 to 2"), "{complaint}");
+    }
+
+    #[test]
+    fn what_units_say_of_their_cables_waits_once_each_and_takes_no_room_from_answers() {
+        let (news, happened) = sync_channel(1);
+        let voices = Voices::new(news);
+        let answered = |verb: &str| Said::Answered { verb: verb.to_owned(), answer: Ok(None) };
+        for round in 0..1_000 {
+            voices.say(0, Said::Replugged(PathBuf::from(format!("/dev/pts/{round}"))));
+            voices.say(0, Said::Unplugged);
+        }
+        voices.say(0, answered("unplug"));
+        voices.say(1, Said::Unplugged);
+        voices.say(0, Said::Replugged(PathBuf::from("/dev/pts/7")));
+        voices.say(0, answered("plug"));
+        let said: Vec<_> = std::iter::from_fn(|| voices.take()).collect();
+        let last = Said::Replugged(PathBuf::from("/dev/pts/7"));
+        assert_eq!(said, [(0, answered("unplug")), (1, Said::Unplugged), (0, last), (0, answered("plug"))]);
+        assert!(matches!(happened.try_recv(), Ok(News::Said)));
+        assert!(happened.try_recv().is_err(), "a full channel is enough");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! What is written is checked like any other image before it takes its place, so a conversion cannot make a bad file of
 //! a good one.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
@@ -11,7 +11,7 @@ use super::report::contents;
 use super::{allowable, checked, read, report_text, targets};
 use crate::cli::Global;
 use crate::cli::error::{CliError, Kind};
-use crate::cli::files::{Destination, shown};
+use crate::cli::files::{Destination, named, shown};
 use crate::cli::numbers::{self, counted};
 use crate::cli::output::Output;
 use crate::image::{self, AddressUnit, ConvertError, DefectId, LineEnd, Report, Shape};
@@ -72,16 +72,16 @@ enum LineEndName {
 }
 
 pub(super) fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
-    let name = shown(&args.input);
     let mut allow = args.allow.clone();
     if args.address_unit.is_some() {
         allow.push(DefectId::AddressUnit);
     }
     let report = read(&args.input, None, &allow)?;
     let Some(image) = report.image() else {
-        return refuse(&report, &name, "has errors, so nothing is written", output);
+        return refuse(&report, &args.input, "has errors, so nothing is written", output);
     };
     let image = image.image();
+    let name = shown(&args.input);
     let shape = shape(args, image.address_unit);
     if args.address_unit.is_some() && report.facts.address_unit.is_none() && report.facts.identity.is_none() {
         let message = format!("nothing in {name} shows whether its addresses count words or bytes");
@@ -94,17 +94,17 @@ pub(super) fn run(args: &Args, global: &Global, output: &mut Output) -> Result<(
     allow.push(DefectId::AddressUnit);
     let written = checked(&bytes[..], &args.out, &targets(), None, &allow)?;
     if !written.is_ok() {
-        return refuse(&written, &shown(&args.out), "would have errors, so it is not written", output);
+        return refuse(&written, &args.out, "would have errors, so it is not written", output);
     }
     let mut out = Destination::admit(Some(&args.out), global.yes)?;
     out.save(&bytes, output)?;
     if out.is_standard_output() {
         return Ok(());
     }
-    let out = out.shown();
     if output.json {
-        return output.object(&super::ImageObject::new(&written, &out));
+        return output.object(&super::ImageObject::new(&written, &named(&args.out)));
     }
+    let out = out.shown();
     let unit = shape.address_unit.name();
     output.remark(&format!(
         "{out}: {}, addresses count {unit}s, {} written",
@@ -147,12 +147,13 @@ fn inexpressible(error: ConvertError, name: &str) -> CliError {
     }
 }
 
-fn refuse(report: &Report, name: &str, what: &str, output: &mut Output) -> Result<(), CliError> {
+fn refuse(report: &Report, file: &Path, what: &str, output: &mut Output) -> Result<(), CliError> {
     let mut written = Ok(());
     if output.json {
-        written = output.object(&super::ImageObject::new(report, name));
+        written = output.object(&super::ImageObject::new(report, &named(file)));
     } else {
-        output.remark(report_text(report, name).trim_end());
+        let name = shown(file);
+        output.remark(report_text(report, &name).trim_end());
         output.remark(&format!("axcon: {name} {what}"));
     }
     CliError::found(Some(Kind::ImageRefused), written)

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::report::contents;
 use super::{read, report_text};
 use crate::cli::error::{CliError, Kind};
-use crate::cli::files::shown;
+use crate::cli::files::{named, shown};
 use crate::cli::numbers::counted;
 use crate::cli::output::Output;
 use crate::image::{self, Change, CheckedImage, DefectId, Difference, Differing, Report};
@@ -42,8 +42,20 @@ pub(super) fn run(args: &Args, output: &mut Output) -> Result<(), CliError> {
     CliError::found((!found.is_none()).then_some(Kind::Failed), written)
 }
 
+/// The report as nobody has allowed anything: that errors do not matter here is not the user's word.
+fn as_found(report: Report) -> Report {
+    let mut report = report;
+    report.defects.iter_mut().for_each(|defect| defect.allowed = false);
+    report.allowed = 0;
+    report.overridden.clear();
+    report
+}
+
 /// One of the two.
 struct Side {
+    /// As it was given.
+    file: String,
+    /// The same for the screen.
     name: String,
     report: Report,
     image: CheckedImage,
@@ -55,7 +67,7 @@ impl Side {
         let report = read(path, None, &DefectId::ALL)?;
         let Some(image) = report.image() else {
             if !output.json {
-                output.remark(report_text(&report, &name).trim_end());
+                output.remark(report_text(&as_found(report), &name).trim_end());
             }
             let message = format!("{name} leaves part of its data unknown, so it cannot be compared");
             return Err(CliError::message(Kind::ImageRefused, message)
@@ -64,7 +76,7 @@ impl Side {
         if report.errors > 0 {
             output.remark(&format!("axcon: {name} has {}; see 'axcon image check'", counted(report.errors, "error")));
         }
-        Ok(Side { name, report, image })
+        Ok(Side { file: named(path), name, report, image })
     }
 }
 
@@ -174,7 +186,7 @@ impl<'a> SideObject<'a> {
         let identity = side.image.identity();
         let image = side.image.image();
         SideObject {
-            file: &side.name,
+            file: &side.file,
             format: side.report.facts.format.map(image::Format::name),
             product: identity.map(|identity| identity.product.as_str()),
             version: identity.map(|identity| identity.version.to_string()),
@@ -189,3 +201,19 @@ impl<'a> SideObject<'a> {
 
 /// Two versions differ in thousands of places; nobody reads them all.
 const RANGES_SHOWN: usize = 20;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::image::targets;
+
+    #[test]
+    fn what_nobody_has_allowed_is_not_called_allowed() {
+        // A data record is cut off, and with it the rest of the file.
+        let file = "S0110000000050524F4752414D264441544196\nS3070000\n";
+        let report = image::check(file.as_bytes(), None, &targets(), None, &DefectId::ALL).expect("a slice");
+        assert!(report.allowed > 0, "{report:?}");
+        let text = report_text(&as_found(report), "trunc.S");
+        assert!(text.contains("error missing-terminator") && !text.contains("allowed"), "{text}");
+    }
+}

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use clap::Subcommand;
 
 use super::error::{CliError, Kind};
-use super::files::{Destination, shown};
+use super::files::{Destination, named, shown};
 use super::numbers::counted;
 use super::output::Output;
 use super::{Global, names, numbers};
@@ -106,22 +106,20 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
 fn check(args: &CheckArgs, output: &mut Output) -> Result<(), CliError> {
     let expected = args.product.map(|product| product.name.as_str());
     let report = read_for(&args.file, &targets_with(args.loader), expected, &args.allow)?;
-    let name = shown(&args.file);
     let written = if output.json {
-        output.object(&ImageObject::new(&report, &name))
+        output.object(&ImageObject::new(&report, &named(&args.file)))
     } else {
-        output.data(report_text(&report, &name).as_bytes())
+        output.data(report_text(&report, &shown(&args.file)).as_bytes())
     };
     CliError::found((!report.is_ok()).then_some(Kind::ImageRefused), written)
 }
 
 fn info(args: &InfoArgs, output: &mut Output) -> Result<(), CliError> {
     let report = read(&args.file, None, &[])?;
-    let name = shown(&args.file);
     if output.json {
-        output.object(&ImageObject::new(&report, &name))
+        output.object(&ImageObject::new(&report, &named(&args.file)))
     } else {
-        output.data(facts_text(&report, &name).as_bytes())
+        output.data(facts_text(&report, &shown(&args.file)).as_bytes())
     }
 }
 
@@ -138,10 +136,10 @@ fn make(args: &MakeArgs, global: &Global, output: &mut Output) -> Result<(), Cli
     }
     let report =
         image::check(&bytes[..], None, &targets(), None, &[]).map_err(|error| CliError::new(Kind::Failed, error))?;
-    let name = out.shown();
     if output.json {
-        return output.object(&ImageObject::new(&report, &name));
+        return output.object(&ImageObject::new(&report, &named(&path)));
     }
+    let name = out.shown();
     output.remark(&format!("{name}: {}, {} written", contents(&report), counted(bytes.len() as u64, "byte")));
     Ok(())
 }
@@ -197,6 +195,7 @@ fn unreadable(path: &Path, error: io::Error) -> CliError {
     let hint = match error.kind() {
         io::ErrorKind::NotFound => "Check the name; upload files are called like AXTC4CO_V1.2.0.elf.S.",
         io::ErrorKind::PermissionDenied => "Ask whoever owns the file for the right to read it, or copy it.",
+        _ if path == Path::new("-") => "Name the .S file itself, or have a program write it to standard input.",
         _ => "Copy the file to a local disk and try again.",
     };
     let context = format!("cannot read the image {}", shown(path));

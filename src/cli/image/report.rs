@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use crate::cli::numbers::{counted, counted_all, grouped};
+use crate::device::{BAUD, line_time};
 use crate::image::{self, Defect, DefectId, Report};
 
 /// The report as text: a line for each defect, then the verdict.
@@ -18,12 +19,14 @@ pub fn report_text(report: &Report, file: &str) -> String {
         let are = if report.unlisted() == 1 { "is" } else { "are" };
         let _ = writeln!(text, "{file}: {} {are} not listed", counted(report.unlisted(), "more defect"));
     }
-    // Sound as a file; but nobody could tell what runs then, so somebody has to answer for it ('axcon load').
+    // The file is sound, but afterwards nobody could tell what the unit runs: 'axcon load' wants it allowed.
     let is_nameless = report.defects.iter().any(|defect| defect.id == DefectId::NoIdentity && !defect.allowed);
-    let verdict = match report.is_ok() {
-        true if is_nameless => "may be sent with --allow no-identity",
-        true => "may be sent",
-        false => "must not be sent",
+    let verdict = if !report.is_ok() {
+        "must not be sent"
+    } else if is_nameless {
+        "may be sent with --allow no-identity"
+    } else {
+        "may be sent"
     };
     let errors = report.errors - report.allowed;
     let counts = counted_all(&[(errors, "error"), (report.warnings, "warning"), (report.allowed, "allowed error")]);
@@ -68,9 +71,9 @@ pub(super) fn facts_text(report: &Report, file: &str) -> String {
         row("Entry point", &format!("0x{entry:04X}"));
     }
     if facts.data_bytes > 0 {
-        let seconds = facts.characters as f64 / CHARACTERS_PER_SECOND;
+        let seconds = line_time(facts.characters).as_secs_f64();
         row("Data", &format!("{}{}", counted(facts.data_bytes, "byte"), share(report)));
-        row("To send", &format!("{} characters, {seconds:.1} s at 115200 baud", grouped(facts.characters)));
+        row("To send", &format!("{} characters, {seconds:.1} s at {BAUD} baud", grouped(facts.characters)));
     }
     match counted_all(&[(report.errors, "error"), (report.warnings, "warning")]) {
         None => row("Defects", "none"),
@@ -193,7 +196,5 @@ pub fn misfit_object(id: DefectId, message: &str) -> DefectObject<'_> {
     DefectObject { id: id.name(), severity: id.severity().name(), line: 0, column: 0, message, allowed: false }
 }
 
-/// 115200 baud, ten bits a character.
-const CHARACTERS_PER_SECOND: f64 = 11_520.0;
 /// A program is one range, rarely two or three.
 const RANGES_SHOWN: usize = 8;

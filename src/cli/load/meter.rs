@@ -114,7 +114,8 @@ fn size() -> (usize, usize) {
     terminal::size().unwrap_or(SIZE)
 }
 
-/// One line of fewer than this many columns: a line that fills its terminal wraps on many. What is left of them is the bar.
+/// One line that leaves the last of this many columns free, since many terminals wrap a line that fills them. The bar
+/// takes what the text leaves.
 fn text(progress: &Progress, columns: usize) -> String {
     let Progress { records, records_total, bytes, bytes_total, address, .. } = *progress;
     let share = if bytes_total == 0 { 0.0 } else { bytes as f64 / bytes_total as f64 };
@@ -148,8 +149,8 @@ fn cut(line: &str, columns: usize) -> String {
     line.chars().take(columns).collect()
 }
 
-/// A line for each of several uploads: repainted in place on a terminal that has room for all of them, printed again
-/// elsewhere when its phase changes.
+/// A line for each of several uploads. They are repainted in place on a terminal that has room for all of them;
+/// elsewhere a line is printed when its phase changes.
 pub struct Board {
     state: Mutex<State>,
     names: Vec<String>,
@@ -198,12 +199,10 @@ impl Board {
             let lines = lines.map(|(name, line)| format!("\r{}\x1b[K\r\n", cut(&format!("{name}  {line}"), room)));
             up + &lines.collect::<String>()
         } else if is_news {
-            let said = match self.on_terminal {
-                true => state.lines[line].clone(),
-                // Without its bar, which only a person looks at.
-                false => state.lines[line]
-                    .split_once(" [")
-                    .map_or_else(|| state.lines[line].clone(), |(phase, _)| format!("{phase} ...")),
+            // Elsewhere without its bar, which only a person looks at.
+            let said = match state.lines[line].split_once(" [") {
+                Some((phase, _)) if !self.on_terminal => format!("{phase} ..."),
+                _ => state.lines[line].clone(),
             };
             format!("{}  {said}\n", self.names[line])
         } else {

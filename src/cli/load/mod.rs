@@ -4,11 +4,11 @@ mod meter;
 mod several;
 mod verdict;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::error::{CliError, Kind};
 use super::image as image_cli;
-use super::journal::Desk;
+use super::journal::PortJournal;
 use super::numbers::{counted, grouped};
 use super::outcome::no_answer_hints;
 use super::output::Output;
@@ -20,6 +20,7 @@ use crate::image::{CheckedImage, DefectId, Report, Software};
 use crate::record::Direction;
 use crate::secret::Secret;
 use crate::session::{Command, Event, Facts, LoadOrder, LoadReport, Outcome, SILENT, UnitState};
+use crate::version::Version;
 use meter::Meter;
 use verdict::{conclude, planned, refuse, would_be_refused};
 
@@ -46,7 +47,7 @@ pub struct Args {
     /// does shows after the first record in any case.
     #[arg(long, value_name = "PROFILE", value_parser = names::loader)]
     loader: Option<LoaderKind>,
-    /// Read the password from FILE; otherwise AXCON_PASSWORD is taken, or it is asked for.
+    /// Read the password from FILE (- is standard input); otherwise AXCON_PASSWORD is taken, or it is asked for.
     #[arg(long, value_name = "FILE")]
     password_file: Option<PathBuf>,
     /// Send in spite of this defect; docs/images.md lists their names.
@@ -63,6 +64,9 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         let message = format!("several units cannot be recorded to one file, {}", files::shown(file));
         return Err(CliError::message(Kind::Usage, message)
             .hint("leave out --record: each upload has its own recording in the state directory"));
+    }
+    if args.image == Path::new("-") && args.password_file.as_deref() == Some(Path::new("-")) {
+        return Err(CliError::message(Kind::Usage, "image and password cannot both come from standard input"));
     }
     let name = files::shown(&args.image);
     let expected = args.product.map(|product| product.name.as_str());
@@ -85,12 +89,13 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
             .hint("add --yes where nobody can be asked"));
     }
     let password = if args.dry_run { None } else { password::find(args.password_file.as_deref())? };
-    if args.dry_run && global.ports.is_empty() {
-        plan(&report, &image, &name, &args, None, output)?;
-        return planned(&report, None, image.identity().map(|identity| identity.product.as_str()), output);
-    }
     let mut prepared = Prepared { args, name, report, image, password };
     match global.ports.as_slice() {
+        [] if prepared.args.dry_run => {
+            plan(&prepared, None, output)?;
+            let product = prepared.image.identity().map(|identity| identity.product.as_str());
+            planned(&prepared.report, None, product, output)
+        }
         [] | [_] => {
             let meter = Meter::new(global.port().unwrap_or_default(), output.json);
             upload(&prepared, global, meter, output)
@@ -116,6 +121,33 @@ struct Prepared {
     password: Option<Secret>,
 }
 
+/// The unit that is to get the image, as it is before.
+struct Target<'a> {
+    port: &'a str,
+    facts: &'a Facts,
+    /// The upload that was begun on this port and has not ended well, if there is one.
+    note: Option<&'a Note>,
+}
+
+impl Target<'_> {
+    /// What the unit is, in a few words.
+    fn words(&self) -> String {
+        let version = self.facts.version.as_ref().map_or_else(String::new, |known| format!(" V{}", known.value));
+        match (&self.facts.product, self.facts.state, self.note) {
+            (_, UnitState::Loader, Some(note)) => {
+                format!("waits in its loader; it is the {} that '{}' was for", note.product, note.image)
+            }
+            (_, UnitState::Loader, None) => "waits in its loader".to_owned(),
+            (Some(product), _, _) => format!("{}{version}", product.value),
+            (None, UnitState::Silent, Some(note)) => {
+                format!("does not answer; an upload of '{}' was begun here and may still erase", note.image)
+            }
+            (None, UnitState::Silent, None) => "does not answer".to_owned(),
+            (None, UnitState::Application | UnitState::Unknown, _) => "does not say what it is".to_owned(),
+        }
+    }
+}
+
 /// Uploads to one unit, or says what that would do.
 fn upload(prepared: &Prepared, global: &Global, meter: Meter, output: &mut Output) -> Result<(), CliError> {
     if link::is_recording(global) {
@@ -132,51 +164,28 @@ fn upload_over(
     meter: Meter,
     output: &mut Output,
 ) -> Result<(), CliError> {
-    let Prepared { args, name, report, image, password } = prepared;
+    let Prepared { args, name, report, password, .. } = prepared;
     talk.ask(Command::Identify)?;
-    let journal = Desk::of(talk);
+    let journal = PortJournal::of(talk);
     find_product(talk, args, global, output)?;
     let facts = talk.session().facts().clone();
-    plan(report, image, name, args, Some((&facts, talk.port(), journal.note.as_ref())), output)?;
+    let target = Target { port: talk.port(), facts: &facts, note: journal.note.as_ref() };
+    plan(prepared, Some(&target), output)?;
     if let Some(product) = args.product
         && let Some(note) = journal.against(&facts, &product.name)
         && !args.allow.contains(&DefectId::WrongProduct)
     {
         return Err(contradicted(note, product));
     }
-    let noted = journal.note.as_ref().map(|note| note.product.clone());
-    let said = facts.product.as_ref().map(|known| known.value.clone());
-    let assumed = said.clone().or(args.product.map(|product| product.name.clone())).or_else(|| noted.clone());
-    let ran = assumed.and_then(|product| journal.ran(&product));
-    let talks = matches!(facts.state, UnitState::Loader | UnitState::Application);
-    if talks && facts.version.is_none() && ran.is_none() && image.identity().is_some() {
-        output.remark("axcon: which version the unit ran is not known, so nobody can say whether the image is older");
-    }
+    let ran = ran_before(prepared, &facts, &journal, output);
     if args.dry_run {
-        let product = match check_fit(image, &facts, &journal, args) {
-            Ok(product) => product,
-            Err(Unfit { error, misfit: Some((product, misfit)) }) if output.json => {
-                let unit = (&facts, talk.port());
-                return would_be_refused(report, unit, &product.name, misfit, &error, output);
-            }
-            Err(Unfit { error, .. }) => return Err(error),
-        };
-        return planned(report, Some((&facts, talk.port())), Some(&product.name), output);
+        return end_dry_run(prepared, &target, &journal, output);
     }
     let password = consent(talk, password.as_ref(), &facts, global, output)?;
-    // What the unit says goes first, then the user, then the note of an upload that was left in the middle.
-    let product = args.product.map(|product| product.name.clone()).or(said).or(noted);
+    let order = order(prepared, &facts, &journal, ran, password);
     // A user who relies on the note alone has to learn how a wrong one is corrected.
     let doubt = journal.note.as_ref().filter(|_| args.product.is_none() && facts.product.is_none()).map(doubt);
-    let note = journal.compose(&facts, product.as_deref(), name, talk);
-    let order = LoadOrder {
-        product,
-        ran,
-        loader: args.loader,
-        packed: args.pack,
-        allowed: args.allow.clone(),
-        ..LoadOrder::new(image.clone(), password)
-    };
+    let note = journal.compose(&facts, order.product.as_deref(), name, talk);
     let (result, lost) = send(talk, order, note, &journal, meter, output)?;
     journal.end(&result, output);
     let is_wrong_product = result.misfit == Some(DefectId::WrongProduct);
@@ -184,6 +193,60 @@ fn upload_over(
     match doubt.filter(|_| is_wrong_product) {
         Some(doubt) => concluded.map_err(|error| error.hint(doubt)),
         None => concluded,
+    }
+}
+
+/// The version that ran before an upload that was left in the middle, if its note says so. Where neither the note nor
+/// the unit gives a version, remarks that an older image would not be noticed.
+fn ran_before(prepared: &Prepared, facts: &Facts, journal: &PortJournal, output: &mut Output) -> Option<Version> {
+    let said = facts.product.as_ref().map(|known| known.value.as_str());
+    let ordered = prepared.args.product.map(|product| product.name.as_str());
+    let noted = journal.note.as_ref().map(|note| note.product.as_str());
+    let ran = said.or(ordered).or(noted).and_then(|product| journal.ran(product));
+    let talks = matches!(facts.state, UnitState::Loader | UnitState::Application);
+    if talks && facts.version.is_none() && ran.is_none() && prepared.image.identity().is_some() {
+        output.remark("axcon: which version the unit ran is not known, so nobody can say whether the image is older");
+    }
+    ran
+}
+
+/// Ends a dry run with what the upload itself would say of the image.
+fn end_dry_run(
+    prepared: &Prepared,
+    target: &Target,
+    journal: &PortJournal,
+    output: &mut Output,
+) -> Result<(), CliError> {
+    let Prepared { args, report, image, .. } = prepared;
+    match check_fit(image, target.facts, journal, args) {
+        Ok(product) => planned(report, Some(target), Some(&product.name), output),
+        Err(Unfit { error, misfit: Some((product, misfit)) }) if output.json => {
+            would_be_refused(report, target, &product.name, misfit, &error, output)
+        }
+        Err(Unfit { error, .. }) => Err(error),
+    }
+}
+
+/// What the session is told to do. The product is what the user says, else what the unit says, else what the note of
+/// an upload that was left in the middle says.
+fn order(
+    prepared: &Prepared,
+    facts: &Facts,
+    journal: &PortJournal,
+    ran: Option<Version>,
+    password: Option<Secret>,
+) -> LoadOrder {
+    let Prepared { args, image, .. } = prepared;
+    let ordered = args.product.map(|product| &product.name);
+    let said = facts.product.as_ref().map(|known| &known.value);
+    let noted = journal.note.as_ref().map(|note| &note.product);
+    LoadOrder {
+        product: ordered.or(said).or(noted).cloned(),
+        ran,
+        loader: args.loader,
+        packed: args.pack,
+        allowed: args.allow.clone(),
+        ..LoadOrder::new(image.clone(), password)
     }
 }
 
@@ -218,7 +281,7 @@ fn send(
     talk: &mut Talk,
     order: LoadOrder,
     mut note: Option<Note>,
-    journal: &Desk,
+    journal: &PortJournal,
     mut meter: Meter,
     output: &mut Output,
 ) -> Result<(Box<LoadReport>, Option<CliError>), CliError> {
@@ -244,7 +307,7 @@ fn send(
     }
 }
 
-/// Whether nothing has come from the unit for longer than a loader that takes a file is silent.
+/// Whether the unit has been silent for longer than a loader that takes a file ever is.
 fn is_silent(talk: &Talk) -> bool {
     let mut entries = talk.session().record().entries().rev();
     let heard = entries.find(|entry| entry.direction == Direction::FromUnit).map(|entry| entry.at);
@@ -274,7 +337,7 @@ fn find_product(talk: &mut Talk, args: &Args, global: &Global, output: &mut Outp
             return Err(not_confirmed().hint("--product NAME says what the unit is without asking it"));
         }
     }
-    // What it showed is among the facts then; if it would not, the upload says what is missing.
+    // What it shows is then among the facts. If it shows nothing, the upload itself says what is missing.
     talk.ask(Command::ReadDictionary).map(|_| ())
 }
 
@@ -290,7 +353,7 @@ fn contradicted(note: &Note, product: &Product) -> CliError {
         .hint("if the note is wrong, since another unit is there now: the same command with --allow wrong-product")
 }
 
-/// How a note is corrected that is all there is to know the product by.
+/// How to correct a wrong note, where nothing but the note says which product the unit is.
 fn doubt(note: &Note) -> String {
     let Note { product, image, .. } = note;
     format!("{product} is what the note of '{image}' says; if that is wrong: --product NAME --allow wrong-product")
@@ -299,7 +362,7 @@ fn doubt(note: &Note) -> String {
 /// Why the upload would be refused.
 struct Unfit {
     error: CliError,
-    /// Where it is the image that speaks against it: what, and for which unit.
+    /// If the image is the reason: the product it was judged for, and its defect.
     misfit: Option<(&'static Product, DefectId)>,
 }
 
@@ -309,8 +372,13 @@ impl From<CliError> for Unfit {
     }
 }
 
-/// What the upload itself would say of this image for this unit.
-fn check_fit(image: &CheckedImage, facts: &Facts, journal: &Desk, args: &Args) -> Result<&'static Product, Unfit> {
+/// Judges the image for this unit as the upload itself does.
+fn check_fit(
+    image: &CheckedImage,
+    facts: &Facts,
+    journal: &PortJournal,
+    args: &Args,
+) -> Result<&'static Product, Unfit> {
     let refused = |message: String| CliError::message(Kind::ImageRefused, message + ": it would be refused");
     let said = facts.product.as_ref().and_then(|known| Product::named(&known.value));
     if let (Some(said), Some(ordered)) = (said, args.product)
@@ -346,52 +414,35 @@ fn check_fit(image: &CheckedImage, facts: &Facts, journal: &Desk, args: &Args) -
 }
 
 /// Says what is going to happen.
-fn plan(
-    report: &Report,
-    image: &CheckedImage,
-    name: &str,
-    Args { loader, pack: packed, dry_run, .. }: &Args,
-    unit: Option<(&Facts, &str, Option<&Note>)>,
-    output: &mut Output,
-) -> Result<(), CliError> {
+fn plan(prepared: &Prepared, target: Option<&Target>, output: &mut Output) -> Result<(), CliError> {
     if output.json {
         return Ok(());
     }
-    let (loader, packed) = (*loader, *packed);
-    // Of a dry run this is what was asked for.
-    let is_data = *dry_run;
-    let mut say = |line: String| match is_data {
-        true => output.data(format!("{line}\n").as_bytes()),
-        false => {
-            output.remark(&line);
-            Ok(())
-        }
-    };
+    let Prepared { args, name, report, image, .. } = prepared;
     let contents = image.identity().map_or_else(
         || "it does not say what it is".to_owned(),
         |identity| format!("{} V{}", identity.product, identity.version),
     );
-    say(format!("image  {name}: {contents}, {}", counted(report.facts.records, "record")))?;
-    if let Some((facts, port, note)) = unit {
-        let version = facts.version.as_ref().map_or_else(String::new, |known| format!(" V{}", known.value));
-        let unit = match (&facts.product, facts.state) {
-            (_, UnitState::Loader) => match note {
-                Some(note) => format!("waits in its loader; it is the {} that '{}' was for", note.product, note.image),
-                None => "waits in its loader".to_owned(),
-            },
-            (Some(product), _) => format!("{}{version}", product.value),
-            (None, UnitState::Silent) => match note {
-                Some(note) => {
-                    format!("does not answer; an upload of '{}' was begun here and may still erase", note.image)
-                }
-                None => "does not answer".to_owned(),
-            },
-            (None, _) => "does not say what it is".to_owned(),
-        };
-        say(format!("unit   {port}: {unit}"))?;
+    let mut lines = vec![format!("image  {name}: {contents}, {}", counted(report.facts.records, "record"))];
+    lines.extend(target.map(|target| format!("unit   {}: {}", target.port, target.words())));
+    lines.push(format!("plan   {}", steps(prepared, target)));
+    for line in lines {
+        // Of a dry run this is what was asked for.
+        if args.dry_run {
+            output.data(format!("{line}\n").as_bytes())?;
+        } else {
+            output.remark(&line);
+        }
     }
-    let said = unit.and_then(|(facts, ..)| Some(facts.product.as_ref()?.value.as_str()));
-    let noted = || unit.and_then(|(_, _, note)| Some(note?.product.as_str()));
+    Ok(())
+}
+
+/// What an upload does, with the number of characters and the time they take.
+fn steps(prepared: &Prepared, target: Option<&Target>) -> String {
+    let Prepared { args, report, image, .. } = prepared;
+    let (loader, packed) = (args.loader, args.pack);
+    let said = target.and_then(|target| Some(target.facts.product.as_ref()?.value.as_str()));
+    let noted = || target.and_then(|target| Some(target.note?.product.as_str()));
     let named = || image.identity().map(|identity| identity.product.as_str());
     let product = said.or_else(noted).or_else(named).and_then(Product::named);
     let pace = product.map(|product| (loader.unwrap_or(product.loader.kind), &product.flash));
@@ -401,15 +452,10 @@ fn plan(
         LoadOrder { product, loader, packed, ..LoadOrder::new(image.clone(), None) }.at_its_beginning()
     });
     let characters = size.map_or(report.facts.characters, |size| size.bytes_total as u64);
-    let data_bytes = report.facts.data_bytes;
-    let seconds = device::transfer_time(characters, data_bytes, pace).as_secs_f64();
-    let enter = match unit {
-        Some((facts, ..)) if facts.state == UnitState::Loader => "",
-        Some(_) | None => "enter the loader, ",
-    };
-    let records = size.map_or_else(String::new, |size| format!(" in {}", counted(size.records_total as u64, "record")));
+    let seconds = device::transfer_time(characters, report.facts.data_bytes, pace).as_secs_f64();
+    let is_in_loader = target.is_some_and(|target| target.facts.state == UnitState::Loader);
+    let enter = if is_in_loader { "" } else { "enter the loader, " };
+    let records = size.map_or_else(String::new, |size| format!(" in {}", counted(size.records_total, "record")));
     let characters = grouped(characters);
-    say(format!(
-        "plan   {enter}send {characters} characters{records} (some {seconds:.0} s), then trust only the new banner"
-    ))
+    format!("{enter}send {characters} characters{records} (some {seconds:.0} s), then trust only the new banner")
 }

@@ -25,7 +25,7 @@ struct Unit<'a> {
     exit_code: u8,
 }
 
-/// Where the lines of one of several uploads go: at once, whole lines only, or kept for the report.
+/// The lines of one of several uploads, kept until all have ended.
 #[derive(Clone)]
 struct Lines(Arc<Mutex<Vec<u8>>>);
 
@@ -99,7 +99,7 @@ pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut 
                 })
             })
             .collect();
-        // A panic in one of them is a defect of ours, and none of the others' business.
+        // A panic in one of them is a defect of ours, and must not end the others.
         uploads
             .into_iter()
             .map(|upload| upload.join().unwrap_or((1, Vec::new(), b"axcon: panicked\n".to_vec())))
@@ -118,8 +118,8 @@ pub fn run(ports: &[String], prepared: &Prepared, global: &Global, output: &mut 
     sum_up(ports, &codes, "run what was sent", written, output)
 }
 
-/// Finds out of each of them, one after the other, what an upload would do; one that cannot take it keeps nobody from
-/// looking at the next.
+/// Says of each unit, one after the other, what an upload would do. One that cannot take the image does not keep the
+/// next from being looked at.
 ///
 /// # Errors
 /// As [`run`], and if the user interrupts.

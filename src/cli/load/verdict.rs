@@ -2,13 +2,14 @@
 
 use serde::Serialize;
 
+use super::Target;
 use crate::cli::error::{CliError, Kind};
 use crate::cli::image::{self as image_cli, DefectObject};
 use crate::cli::numbers::{counted, grouped};
 use crate::cli::outcome::no_answer_hints;
 use crate::cli::output::{Closed, Output};
 use crate::image::{DefectId, Report};
-use crate::session::{Facts, LoadReport, Phase, SEE_POWER, UnitNow, UnitState, Verdict};
+use crate::session::{LoadReport, Phase, SEE_POWER, UnitNow, UnitState, Verdict};
 
 #[derive(Serialize)]
 struct LoadObject<'a> {
@@ -56,22 +57,50 @@ impl<'a> LoadObject<'a> {
             defects: image_cli::defect_objects(report),
         }
     }
+
+    /// Of an upload that has ended, and the exit code's kind.
+    fn of_upload(report: &'a LoadReport, kind: Option<Kind>, next: &'a str, image: &'a Report, port: &'a str) -> Self {
+        LoadObject {
+            schema: "axcon.load/1",
+            port: Some(port),
+            exit_code: kind.map_or(0, Kind::exit_code),
+            verdict: verdict_name(report.verdict),
+            unit: unit_name(report.unit),
+            phase: phase_name(report.phase),
+            product: report.product.as_deref(),
+            version_before: report.version_before.map(|version| version.to_string()),
+            version_after: report.version_after.map(|version| version.to_string()),
+            records: report.records,
+            // What was refused before it was packed and counted has the records of its file.
+            records_total: match report.verdict {
+                Verdict::Refused if report.records_total == 0 => image.facts.records as usize,
+                _ => report.records_total,
+            },
+            address: report.address,
+            seconds: (report.duration.as_secs_f64() * 1000.0).round() / 1000.0,
+            what: &report.what,
+            heard: &report.heard,
+            remark: report.remark.as_deref(),
+            next,
+            defects: with_misfit(image, report.misfit, &report.what),
+        }
+    }
 }
 
 /// A dry run has come to its end without an objection.
 pub fn planned(
     report: &Report,
-    unit: Option<(&Facts, &str)>,
+    target: Option<&Target>,
     product: Option<&str>,
     output: &mut Output,
 ) -> Result<(), CliError> {
     if !output.json {
         return Ok(());
     }
-    let state = unit.map_or(UnitNow::Unknown, |(facts, _)| as_it_is(facts.state));
-    let version = unit.and_then(|(facts, _)| facts.version.as_ref());
+    let state = target.map_or(UnitNow::Unknown, |target| as_it_is(target.facts.state));
+    let version = target.and_then(|target| target.facts.version.as_ref());
     output.object(&LoadObject {
-        port: unit.map(|(_, port)| port),
+        port: target.map(|target| target.port),
         verdict: "planned",
         unit: unit_name(state),
         product,
@@ -103,32 +132,31 @@ pub fn refuse(report: &Report, name: &str, port: Option<&str>, output: &mut Outp
     CliError::found(Some(Kind::ImageRefused), written)
 }
 
-/// The defects of the file, and what speaks against it for this unit, which is in no line of it.
+/// The defects of the file, and after them why it is not for this unit, if it is not; no line of the file shows that.
 fn with_misfit<'a>(image: &'a Report, misfit: Option<DefectId>, message: &'a str) -> Vec<DefectObject<'a>> {
     let mut defects = image_cli::defect_objects(image);
     defects.extend(misfit.map(|id| image_cli::misfit_object(id, message)));
     defects
 }
 
-/// A dry run has found what speaks against the image for this unit: the same object that the upload would end with.
+/// A dry run has found that the image is not for this unit: writes the object that the upload itself would end with.
 pub fn would_be_refused(
     image: &Report,
-    unit: (&Facts, &str),
+    target: &Target,
     product: &str,
     misfit: DefectId,
     error: &CliError,
     output: &mut Output,
 ) -> Result<(), CliError> {
-    let (facts, port) = unit;
     let what = error.to_string();
     let next = error.hints.join("; ");
     let written = output.object(&LoadObject {
-        port: Some(port),
+        port: Some(target.port),
         exit_code: Kind::ImageRefused.exit_code(),
         verdict: verdict_name(Verdict::Refused),
-        unit: unit_name(as_it_is(facts.state)),
+        unit: unit_name(as_it_is(target.facts.state)),
         product: Some(product),
-        version_before: facts.version.as_ref().map(|known| known.value.to_string()),
+        version_before: target.facts.version.as_ref().map(|known| known.value.to_string()),
         what: &what,
         next: &next,
         defects: with_misfit(image, Some(misfit), &what),
@@ -137,7 +165,8 @@ pub fn would_be_refused(
     CliError::found(Some(Kind::ImageRefused), written)
 }
 
-/// Says how it went, and what to do next. `is_silent`: at its end nothing was heard of the unit any more.
+/// Says how it went, and what to do next. `lost`: why the link was lost, if it was; `is_silent`: nothing was heard of
+/// the unit at the end.
 pub fn conclude(
     report: &LoadReport,
     lost: Option<CliError>,
@@ -148,44 +177,29 @@ pub fn conclude(
 ) -> Result<(), CliError> {
     let kind = exit_kind(report, lost.is_some());
     let next = next_step(report, report.doubt(lost.is_some(), is_silent));
-    let next = next.as_str();
     if output.json {
-        let written = output.object(&LoadObject {
-            schema: "axcon.load/1",
-            port: Some(port),
-            exit_code: kind.map_or(0, Kind::exit_code),
-            verdict: verdict_name(report.verdict),
-            unit: unit_name(report.unit),
-            phase: phase_name(report.phase),
-            product: report.product.as_deref(),
-            version_before: report.version_before.map(|version| version.to_string()),
-            version_after: report.version_after.map(|version| version.to_string()),
-            records: report.records,
-            // What was refused before it was packed and counted has the records of its file.
-            records_total: match report.verdict {
-                Verdict::Refused if report.records_total == 0 => image.facts.records as usize,
-                _ => report.records_total,
-            },
-            address: report.address,
-            seconds: (report.duration.as_secs_f64() * 1000.0).round() / 1000.0,
-            what: &report.what,
-            heard: &report.heard,
-            remark: report.remark.as_deref(),
-            next,
-            defects: with_misfit(image, report.misfit, &report.what),
-        });
+        let written = output.object(&LoadObject::of_upload(report, kind, &next, image, port));
         return CliError::found(kind, written.map_err(|error| untold(report, error, output)));
     }
-    let Some(kind) = kind else {
-        let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));
-        let seconds = report.duration.as_secs_f64();
-        if let Some(remark) = &report.remark {
-            output.remark(&format!("note: {remark}"));
-        }
-        let records = counted(report.records as u64, "record");
-        let done = format!("done: {}{before}; {records} in {seconds:.1} s\n", report.what);
-        return output.data(done.as_bytes()).map_err(|error| untold(report, error, output));
-    };
+    match kind {
+        None => say_done(report, output),
+        Some(kind) => Err(failure(report, kind, lost, next)),
+    }
+}
+
+/// The words for a success.
+fn say_done(report: &LoadReport, output: &mut Output) -> Result<(), CliError> {
+    let before = report.version_before.map_or_else(String::new, |version| format!(" (before: V{version})"));
+    let seconds = report.duration.as_secs_f64();
+    if let Some(remark) = &report.remark {
+        output.remark(&format!("note: {remark}"));
+    }
+    let done = format!("done: {}{before}; {} in {seconds:.1} s\n", report.what, counted(report.records, "record"));
+    output.data(done.as_bytes()).map_err(|error| untold(report, error, output))
+}
+
+/// The error that any other verdict is: what was sent and heard, then `next`, what to do.
+fn failure(report: &LoadReport, kind: Kind, lost: Option<CliError>, next: String) -> CliError {
     let mut error = CliError::message(kind, report.what.clone());
     if report.records > 0 && report.verdict != Verdict::WrongApplication {
         error = error.hint(sent(report));
@@ -205,12 +219,12 @@ pub fn conclude(
     if report.verdict == Verdict::NoAnswer && report.unit != UnitNow::Application {
         error = no_answer_hints(error);
     }
-    Err(error.hint(next))
+    error.hint(next)
 }
 
 /// How much of the file has left.
 fn sent(report: &LoadReport) -> String {
-    let (records, total) = (grouped(report.records as u64), counted(report.records_total as u64, "record"));
+    let (records, total) = (grouped(report.records), counted(report.records_total, "record"));
     let address = report.address.map_or_else(String::new, |address| format!(", address {address:#06x}"));
     format!("sent: {records} of {total}{address}")
 }
@@ -227,7 +241,8 @@ fn next_step(report: &LoadReport, doubt: Option<&str>) -> String {
     }
 }
 
-/// The verdict could not be written: what is true of the unit matters more than that, and is said as well.
+/// The verdict could not be written to standard output. It goes to standard error too, since what has become of the
+/// unit matters more than why it could not be written.
 fn untold(report: &LoadReport, error: CliError, output: &mut Output) -> CliError {
     if !error.error.is::<Closed>() {
         output.remark(&format!("axcon: {}: {}", verdict_name(report.verdict), report.what));

@@ -11,6 +11,8 @@ use crate::wire::stream::Source;
 
 /// How long a stream that runs already is listened for at first.
 const LISTEN_FIRST: Duration = Duration::from_millis(1200);
+/// How long the second row may take after the first: the units' own rate is one a second (errata E-105).
+const LISTEN_ON: Duration = Duration::from_millis(1200);
 
 /// The stream before we came.
 #[derive(Clone, Copy, Debug)]
@@ -54,26 +56,41 @@ impl Before {
 /// # Errors
 /// If the link is lost or the user interrupts.
 pub fn watch(talk: &mut Talk) -> Result<Before, CliError> {
-    let mut first: Option<Instant> = None;
-    let mut last = None;
-    let mut rows = 0u32;
+    let mut seen: Option<Rows> = None;
     let until = talk.now() + LISTEN_FIRST;
-    talk.hear(until, |_, event| {
-        if let Event::Row { at, row, .. } = event {
-            first.get_or_insert(*at);
-            last = Some((*at, row.source));
-            rows += 1;
-        }
-        Ok(ControlFlow::Continue(()))
-    })?;
-    let Some((begun, (ended, source))) = first.zip(last) else { return Ok(Before::Off) };
-    let period = (rows > 1).then(|| ended.since(begun) / (rows - 1));
+    listen(talk, until, &mut seen, u32::MAX)?;
+    // One row does not show how far apart they are.
+    if let Some(Rows { first, count: 1, .. }) = seen {
+        listen(talk, first + LISTEN_ON, &mut seen, 2)?;
+    }
+    let Some(Rows { first, last, count, source }) = seen else { return Ok(Before::Off) };
+    let period = (count > 1).then(|| last.since(first) / (count - 1));
     // Rows come at whole milliseconds; the clock that saw them is not that exact.
     let period = period.map(|period| Duration::from_millis(likely_millis(period)));
     Ok(Before::Seen(Found { source, period }))
 }
 
-/// What a person will have typed where this is measured: the roundest number within a hundredth and a millisecond.
+/// The rows that were seen.
+#[derive(Clone, Copy)]
+struct Rows {
+    first: Instant,
+    last: Instant,
+    count: u32,
+    source: Source,
+}
+
+/// Listens for rows until then, or until there are enough.
+fn listen(talk: &mut Talk, until: Instant, seen: &mut Option<Rows>, enough: u32) -> Result<(), CliError> {
+    talk.hear(until, |_, event| {
+        let Event::Row { at, row, .. } = event else { return Ok(ControlFlow::Continue(())) };
+        let (first, before) = seen.map_or((*at, 0), |rows| (rows.first, rows.count));
+        *seen = Some(Rows { first, last: *at, count: before + 1, source: row.source });
+        Ok(if before + 1 >= enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    })
+}
+
+/// The period that somebody has probably typed, by the one that was measured: the roundest number of milliseconds that
+/// is no further off than 1 %, or 1 ms.
 fn likely_millis(period: Duration) -> u64 {
     const STEPS: [u64; 6] = [1000, 500, 100, 50, 10, 5];
     let measured = period.as_secs_f64() * 1000.0;

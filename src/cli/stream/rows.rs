@@ -63,7 +63,7 @@ struct ValueObject<'a> {
 }
 
 impl Sink {
-    /// Writes a row, unless it is of another source than is wanted: then it is not, and `false`.
+    /// Writes a row. Returns `false`, and writes nothing, if the row is of a source that is not wanted.
     ///
     /// # Errors
     /// If it is another unit's, cannot be written, or nobody reads it.
@@ -75,7 +75,7 @@ impl Sink {
         if self.source.is_some_and(|source| source != row.source) {
             return Ok(false);
         }
-        let channels = channels_of(row);
+        let channels: &[String] = Product::layout_with(now).map_or(&[], |layout| &layout.channels);
         let time = self.calendar.text(at);
         let mut text = Vec::new();
         match self.format {
@@ -88,7 +88,7 @@ impl Sink {
             }
             Format::Jsonl => {
                 let values = channels.iter().zip(&row.readings);
-                let values = values.map(|(channel, reading)| json_value(channel, row.source, *reading)).collect();
+                let values = values.map(|(channel, reading)| json_value(channel, row.decimals, *reading)).collect();
                 let object = RowObject { schema: "axcon.stream/1", time, source: row.source.short(), values };
                 serde_json::to_writer(&mut text, &object).map_err(|error| CliError::new(Kind::Failed, error))?;
             }
@@ -111,18 +111,9 @@ pub fn another_unit(what: String) -> End {
     End::UnitGone(CliError::message(Kind::Failed, what).hint(LEFT))
 }
 
-/// Names of a row's fields, from the layout that has as many.
-fn channels_of(row: &Row) -> &'static [String] {
-    Product::all()
-        .iter()
-        .map(|product| product.stream.channels.as_slice())
-        .find(|channels| channels.len() == row.readings.len())
-        .unwrap_or_default()
-}
-
-fn json_value(channel: &str, source: Source, reading: Reading) -> ValueObject<'_> {
+fn json_value(channel: &str, decimals: usize, reading: Reading) -> ValueObject<'_> {
     let value = match reading {
-        Reading::Value(value) if source == Source::ProcessValue => Some(serde_json::Number::from(value as i64)),
+        Reading::Value(value) if decimals == 0 => Some(serde_json::Number::from(value as i64)),
         Reading::Value(value) => serde_json::Number::from_f64(value),
         Reading::Disabled | Reading::Open | Reading::Short | Reading::Error => None,
     };
@@ -137,5 +128,12 @@ mod tests {
     fn the_ending_of_a_file_says_what_is_written() {
         let of = |name| Format::of_file(Path::new(name));
         assert_eq!([of("a.jsonl"), of("a.CSV"), of("a.txt")], [Some(Format::Jsonl), Some(Format::Csv), None]);
+    }
+
+    #[test]
+    fn a_number_in_json_is_the_one_that_was_printed() {
+        let json = |decimals, value| json_value("RTD1", decimals, Reading::Value(value)).value.map(|n| n.to_string());
+        let written = [json(1, 63.9), json(1, 56.0), json(3, 23.5), json(0, 4768.0)];
+        assert_eq!(written.map(Option::unwrap_or_default), ["63.9", "56.0", "23.5", "4768"]);
     }
 }

@@ -24,8 +24,8 @@ const PATIENCE: Duration = Duration::from_secs(15);
 /// The longest period a unit takes: that of a stream of which too little was seen to know it.
 const SLOWEST: Duration = Duration::from_secs(60);
 
-/// How long the rows of a unit that was on all the time may take to come after a cable is back, beside their
-/// period: a unit that was switched off as well has none for up to 5 s (AXRTD8CO manual, section 1.1).
+/// How long rows are waited for once a cable is back, beside their period, before the unit is asked again. A unit that
+/// has lost its power with the cable has none for up to 5 s (AXRTD8CO manual, section 1.1).
 const ROWS_AGAIN: Duration = Duration::from_secs(7);
 
 /// When it is enough.
@@ -69,8 +69,8 @@ pub struct Stream {
     setting: Option<(Source, Duration)>,
     /// What it was before, as far as is known.
     before: Before,
-    /// Whether the unit has shown itself since the link was opened: another one, or something else, may be behind a
-    /// cable that is back, and takes every key for its own.
+    /// Whether the unit has shown itself since the link was last opened. A cable that is back may lead to another unit,
+    /// or to something else that obeys every key.
     is_known: bool,
     /// How long no row may come.
     patience: Duration,

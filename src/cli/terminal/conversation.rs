@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use super::keys::{self, Keys, Wish};
-use super::sending::{NewLine, Sending};
+use super::sending::{LineEnds, NewLine, Sending};
 use super::shown::{Look, Shown};
 use super::{log_error, printable, time_of};
 use crate::cli::calendar::Calendar;
@@ -17,7 +17,7 @@ use crate::cli::output::Output;
 use crate::endpoint::{Arrived, Endpoint};
 use crate::host::clock::Clock;
 use crate::host::comeback::Cable;
-use crate::host::link::Connection;
+use crate::host::link::{Connection, WRITE_PATIENCE};
 use crate::host::recorder::Recorder;
 use crate::host::{Closed, Inbox, Input};
 use crate::record::{Direction, LINK_BACK, LINK_LOST};
@@ -27,6 +27,10 @@ use crate::time::{Duration, Instant};
 /// How long the line must have been silent after the end of the input: a unit answers a key much faster, and repeats
 /// its diagnostics every second.
 const SILENCE: Duration = Duration::from_secs(1);
+
+/// The same where nothing has been heard since the last byte was sent: a port that takes no more bytes says so after
+/// [`WRITE_PATIENCE`], and what waits for it must not pass for sent.
+const UNANSWERED: Duration = WRITE_PATIENCE.saturating_add(SILENCE);
 
 /// How long a line that is never silent, with a stream on it, is shown after the end of the input and of what was sent:
 /// a script that pipes keys in waits for its end.
@@ -99,16 +103,32 @@ struct Quiet {
     last: Instant,
     /// When one last left, or there was no more to send.
     last_sent: Instant,
+    /// Nothing has come since one last left.
+    unanswered: bool,
 }
 
 impl Quiet {
     fn since(now: Instant) -> Self {
-        Quiet { last: now, last_sent: now }
+        Quiet { last: now, last_sent: now, unanswered: false }
+    }
+
+    fn heard(&mut self, at: Instant) {
+        (self.last, self.unanswered) = (at, false);
+    }
+
+    fn sent(&mut self, now: Instant) {
+        *self = Quiet { unanswered: true, ..Quiet::since(now) };
+    }
+
+    /// There is no more to send.
+    fn no_more(&mut self, now: Instant) {
+        (self.last, self.last_sent) = (now, now);
     }
 
     /// When a command whose input has ended is over.
     fn over_at(self) -> Instant {
-        (self.last + SILENCE).min(self.last_sent + LISTENING)
+        let silence = if self.unanswered { UNANSWERED } else { SILENCE };
+        (self.last + silence).min(self.last_sent + LISTENING)
     }
 }
 
@@ -147,6 +167,8 @@ pub struct Conversation {
     followed: u64,
     typing: Typing,
     sending: Option<Sending>,
+    /// Of what comes through a pipe.
+    line_ends: LineEnds,
     shown: Shown,
     settings: Settings,
     /// The user knows that the unit holds us.
@@ -173,6 +195,7 @@ impl Conversation {
             followed: 0,
             typing,
             sending: None,
+            line_ends: LineEnds::new(settings.new_line),
             shown,
             settings,
             hold_told: false,
@@ -226,7 +249,7 @@ impl Conversation {
                         }
                         Ok(Some(Input::TypedEnd)) => {
                             self.typing.ended = true;
-                            self.quiet = Quiet::since(self.clock.now());
+                            self.quiet.no_more(self.clock.now());
                         }
                         Ok(Some(Input::Gone { error, .. })) => self.lost(link::link_error(error), output)?,
                         Ok(Some(Input::Signal(_))) => return Err(CliError::reported(Kind::Interrupted)),
@@ -256,7 +279,7 @@ impl Conversation {
     /// Takes what the unit has said.
     fn hear(&mut self, arrived: &[Arrived], output: &mut Output) -> Result<(), CliError> {
         let Some(last) = arrived.last() else { return Ok(()) };
-        self.quiet.last = last.at;
+        self.quiet.heard(last.at);
         self.session.handle_backlog(self.clock.now(), arrived);
         self.follow(output)
     }
@@ -264,7 +287,8 @@ impl Conversation {
     /// Takes what came on standard input. Says whether the user leaves.
     fn typed(&mut self, bytes: Vec<u8>, output: &mut Output) -> Result<bool, CliError> {
         if !self.settings.interactive {
-            self.type_keys(bytes, output);
+            let keys = self.line_ends.converted(&bytes);
+            self.type_keys(keys, output);
             return Ok(false);
         }
         for wish in self.typing.keys.press(&bytes) {
@@ -384,26 +408,37 @@ impl Conversation {
 
     fn send(&mut self, now: Instant, output: &mut Output) -> Result<(), CliError> {
         self.session.handle_timeout(now);
-        if self.cable.connection().is_some() {
-            self.send_of_file(now, output)?;
-        }
-        let mut failed = None;
-        while let Some(transmit) = self.session.poll_transmit() {
-            self.quiet = Quiet::since(now);
-            self.recorder.follow(self.session.record());
-            let Some(connection) = self.cable.connection() else { continue };
-            if let Err(error) = connection.send(transmit.bytes) {
-                let text = format!("{}: {error}", connection.port());
-                failed = Some(CliError::message(Kind::PortGone, text));
-                break;
+        let failed = loop {
+            let sends_file = self.sending.is_some() && self.cable.connection().is_some();
+            if sends_file {
+                self.send_of_file(now, output)?;
             }
-        }
+            let failed = self.let_go(now).err();
+            // On a fast line all of that leaves at once, and nothing that waits would wake us for the rest of the file.
+            if failed.is_some() || !sends_file || self.session.waiting() > 0 {
+                break failed;
+            }
+        };
         self.follow(output)?;
         if let Some(error) = failed {
             self.lost(error, output)?;
         }
         if self.session.waiting() <= WAITING {
             self.typing.ask_for_more();
+        }
+        Ok(())
+    }
+
+    /// Gives the link what may leave now.
+    fn let_go(&mut self, now: Instant) -> Result<(), CliError> {
+        while let Some(transmit) = self.session.poll_transmit() {
+            self.quiet.sent(now);
+            self.recorder.follow(self.session.record());
+            let Some(connection) = self.cable.connection() else { continue };
+            connection.send(transmit.bytes).map_err(|error| {
+                let text = format!("{}: {error}", connection.port());
+                CliError::message(Kind::PortGone, text)
+            })?;
         }
         Ok(())
     }
@@ -417,7 +452,7 @@ impl Conversation {
                 let text = format!("sent {}", counted(sending.sent(), "byte"));
                 self.sending = None;
                 self.typing.keys.set_sending(false);
-                self.quiet = Quiet::since(now);
+                self.quiet.no_more(now);
                 return self.say(&text, output);
             }
             self.session.command(now, Command::Keys(piece)).map_err(|refusal| CliError::new(Kind::Failed, refusal))?;
@@ -488,8 +523,19 @@ mod tests {
         let sent = Instant::from_millis(500);
         assert_eq!(Quiet::since(sent).over_at(), sent + SILENCE);
         let heard = |seconds| sent + Duration::from_secs(seconds);
-        let over_at = |last| Quiet { last, last_sent: sent }.over_at();
+        let over_at = |last| Quiet { last, ..Quiet::since(sent) }.over_at();
         assert_eq!([over_at(heard(2)), over_at(heard(60))], [heard(3), sent + LISTENING]);
+    }
+
+    #[test]
+    fn what_nobody_has_answered_is_given_the_time_in_which_a_deaf_port_says_so() {
+        let sent = Instant::from_millis(500);
+        let mut quiet = Quiet::since(Instant::ZERO);
+        quiet.sent(sent);
+        quiet.no_more(sent);
+        assert!(quiet.over_at() > sent + WRITE_PATIENCE);
+        quiet.heard(sent);
+        assert_eq!(quiet.over_at(), sent + SILENCE);
     }
 
     #[test]

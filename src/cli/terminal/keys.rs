@@ -63,7 +63,7 @@ enum Stage {
 }
 
 impl Keys {
-    /// A file is being sent, or no longer: also if the one that was named cannot be.
+    /// Says whether a file is being sent. After [`Wish::SendFile`] one is, until this says that it could not be opened.
     pub fn set_sending(&mut self, sending: bool) {
         self.sending = sending;
     }

@@ -11,6 +11,7 @@ mod shown;
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::SyncSender;
 
 use jiff::tz::TimeZone;
 
@@ -35,8 +36,9 @@ use shown::{LineEnd, Look, Shown};
 ///
 /// What the unit sends is shown with its control characters made visible, except line ends, tabs and backspaces.
 /// Ctrl-] leaves; Ctrl-T and a key do the rest: h hexadecimal, t times, e local echo, r raw, f send a file, b break.
-/// Where standard input is not a terminal, what comes is sent as it is, and the command ends when the input has ended
-/// and the line has been silent for a second, or after 10 s where it is never silent. A recording is shown as it was.
+/// Where standard input is not a terminal, what comes is sent, its line ends as --newline-out says, and the command ends
+/// when the input has ended and the line has been silent for a second (6 s if nothing was heard since the last byte left),
+/// or after 10 s where it is never silent. A recording is shown as it was.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Append what the unit sends to FILE, byte for byte; only a password it repeats is replaced.
@@ -57,7 +59,7 @@ pub struct Args {
     /// What ends a line of what comes.
     #[arg(long, value_name = "END", value_enum, default_value_t = LineEnd::Auto)]
     newline_in: LineEnd,
-    /// What Enter sends, and the line ends of files; the units want CR.
+    /// What Enter sends, and the line ends of files and of what comes through a pipe; the units want CR.
     #[arg(long, value_name = "END", value_enum, default_value_t = NewLine::Cr)]
     newline_out: NewLine,
     /// Send FILE, its line ends as --newline-out says, and end when the line falls silent (or stay, at a terminal).
@@ -65,7 +67,19 @@ pub struct Args {
     send: Option<PathBuf>,
 }
 
-/// Connects the user with the unit.
+impl Args {
+    fn look(&self) -> Look {
+        if self.raw {
+            Look::Raw
+        } else if self.hex {
+            Look::Hex
+        } else {
+            Look::Text
+        }
+    }
+}
+
+/// Connects the user with the unit, or shows a recording.
 ///
 /// # Errors
 /// If the port does not open or goes away, or a signal ends the command.
@@ -74,19 +88,20 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
         return Err(CliError::message(Kind::Usage, "a terminal shows the bytes that come, so --json does not apply")
             .hint("'axcon stream --json' and 'axcon diagnostics --json' write what the unit says as objects"));
     }
-    let look = match (args.raw, args.hex) {
-        (true, _) => Look::Raw,
-        (false, true) => Look::Hex,
-        (false, false) => Look::Text,
-    };
     let spec = link::spec(global)?;
     if let LinkSpec::Replay(path) = &spec {
         if args.send.is_some() {
             return Err(link::read_only("take a file"));
         }
         link::not_recorded_again(global)?;
-        return replay(path, look, &args, output);
+        return replay(path, &args, output);
     }
+    converse(&spec, args, global, output)
+}
+
+/// Opens the link and goes on until the conversation ends.
+fn converse(spec: &LinkSpec, args: Args, global: &Global, output: &mut Output) -> Result<(), CliError> {
+    let look = args.look();
     let clock = Clock::start();
     let (sender, inputs) = host::channel();
     if let Some(log) = &args.log {
@@ -95,23 +110,16 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     let sending = args.send.as_deref().map(|path| Sending::open(path, args.newline_out)).transpose()?;
     let plan = link::recording(global)?;
     let _signals = waiting::hear_signals(sender.clone())?;
-    let connection = link::open(&spec, global, clock, sender.clone(), &inputs)?;
+    let connection = link::open(spec, global, clock, sender.clone(), &inputs)?;
     // Not before: a port that does not open leaves no file.
     let log = args.log.map(open_log).transpose()?;
     let recorder = link::start_recording(&plan, &connection, clock, output)?;
     let interactive = io::stdin().is_terminal();
-    let comeback = Comeback::of(&spec, link::options(global)).filter(|_| interactive);
+    let comeback = Comeback::of(spec, link::options(global)).filter(|_| interactive);
     if interactive {
         output.remark(&format!("{} at {}; Ctrl-] leaves, Ctrl-T ? helps", connection.port(), connection.settings()));
     }
-    let raw_mode = interactive
-        .then(RawMode::enter)
-        .transpose()
-        .map_err(|error| CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot use the terminal")))?;
-    let typing = match sending.is_some() && !interactive {
-        true => Typing::ended(),
-        false => Typing::listen(sender.clone())?,
-    };
+    let (raw_mode, typing) = take_input(interactive, sending.is_some(), sender.clone())?;
     let shown = Shown::new(look, args.timestamps, args.newline_in, io::stdout().is_terminal() && interactive);
     let mut conversation = Conversation::new(
         (Cable::new(connection, comeback), sender, inputs),
@@ -134,8 +142,24 @@ pub fn run(args: Args, global: &Global, output: &mut Output) -> Result<(), CliEr
     end
 }
 
+/// The user's terminal in raw mode, if there is a user, and what is typed there or piped in. A command that sends a
+/// file without a user does not read standard input.
+fn take_input(
+    interactive: bool,
+    sends_file: bool,
+    inputs: SyncSender<Input>,
+) -> Result<(Option<RawMode>, Typing), CliError> {
+    let raw_mode = interactive
+        .then(RawMode::enter)
+        .transpose()
+        .map_err(|error| CliError::new(Kind::Failed, anyhow::Error::new(error).context("cannot use the terminal")))?;
+    let typing = if sends_file && !interactive { Typing::ended() } else { Typing::listen(inputs)? };
+    Ok((raw_mode, typing))
+}
+
 /// Shows a recording as it was, as fast as it can be read.
-fn replay(path: &Path, look: Look, args: &Args, output: &mut Output) -> Result<(), CliError> {
+fn replay(path: &Path, args: &Args, output: &mut Output) -> Result<(), CliError> {
+    let look = args.look();
     let (sender, inputs) = host::channel();
     let _signals = waiting::hear_signals(sender.clone())?;
     let mut recording = link::open_recording(path, sender, &inputs)?;

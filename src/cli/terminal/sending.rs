@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::cli::error::{CliError, Kind};
 use crate::cli::files::shown;
 
-/// What Enter is on the line, and the line ends of a file.
+/// What Enter is on the line, and the line ends of a file or a pipe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum NewLine {
     /// CR, as the units want it (manuals, chapter 4).
@@ -16,7 +16,7 @@ pub enum NewLine {
     Lf,
     /// CR LF.
     Crlf,
-    /// Whatever the file has; Enter is CR.
+    /// Whatever the file or the pipe has; Enter is CR.
     Keep,
 }
 
@@ -39,13 +39,42 @@ impl NewLine {
     }
 }
 
+/// Gives text the line ends of the line, wherever it is cut into pieces.
+pub struct LineEnds {
+    new_line: NewLine,
+    /// The last byte of the previous piece was a CR: an LF at the beginning of the next belongs to it.
+    after_return: bool,
+}
+
+impl LineEnds {
+    /// A text from its beginning.
+    pub fn new(new_line: NewLine) -> Self {
+        LineEnds { new_line, after_return: false }
+    }
+
+    /// The next piece for the line; nothing if it is the rest of a line end.
+    pub fn converted(&mut self, bytes: &[u8]) -> Vec<u8> {
+        if self.new_line == NewLine::Keep {
+            return bytes.to_vec();
+        }
+        let mut piece = Vec::with_capacity(bytes.len() + 8);
+        for &byte in bytes {
+            let follows_return = std::mem::replace(&mut self.after_return, byte == b'\r');
+            match byte {
+                b'\n' if follows_return => {}
+                b'\r' | b'\n' => piece.extend_from_slice(self.new_line.text()),
+                _ => piece.push(byte),
+            }
+        }
+        piece
+    }
+}
+
 /// A file being sent.
 pub struct Sending {
     path: PathBuf,
     file: File,
-    new_line: NewLine,
-    /// The last byte of the previous piece was a CR: an LF at the beginning of the next belongs to it.
-    after_return: bool,
+    line_ends: LineEnds,
     sent: u64,
 }
 
@@ -68,7 +97,7 @@ impl Sending {
             Ok(_) | Err(_) => {}
         }
         let file = File::open(path).map_err(|error| CliError { kind: Kind::Usage, ..failed(path, error) })?;
-        Ok(Sending { path: path.to_owned(), file, new_line, after_return: false, sent: 0 })
+        Ok(Sending { path: path.to_owned(), file, line_ends: LineEnds::new(new_line), sent: 0 })
     }
 
     /// The next bytes for the line; none at the end.
@@ -83,7 +112,7 @@ impl Sending {
                 Err(error) => return Err(failed(&self.path, error)),
                 Ok(count) => count,
             };
-            let piece = self.with_line_ends(&buffer[..count]);
+            let piece = self.line_ends.converted(&buffer[..count]);
             if count == 0 || !piece.is_empty() {
                 self.sent += piece.len() as u64;
                 return Ok(piece);
@@ -94,22 +123,6 @@ impl Sending {
     /// Bytes handed out so far.
     pub fn sent(&self) -> u64 {
         self.sent
-    }
-
-    fn with_line_ends(&mut self, bytes: &[u8]) -> Vec<u8> {
-        if self.new_line == NewLine::Keep {
-            return bytes.to_vec();
-        }
-        let mut piece = Vec::with_capacity(bytes.len() + 8);
-        for &byte in bytes {
-            let follows_return = std::mem::replace(&mut self.after_return, byte == b'\r');
-            match byte {
-                b'\n' if follows_return => {}
-                b'\r' | b'\n' => piece.extend_from_slice(self.new_line.text()),
-                _ => piece.push(byte),
-            }
-        }
-        piece
     }
 }
 

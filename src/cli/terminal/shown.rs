@@ -39,7 +39,7 @@ pub struct Shown {
     /// What a new line is on the way out.
     new_line: &'static str,
     visible: Visible,
-    /// The last byte ended a line, and was this one: the partner that follows belongs to it.
+    /// The last byte, if it ended a line. The other byte of a CR LF or LF CR that follows it ends no second line.
     ended_by: Option<u8>,
     at_start: bool,
     row: Row,
