@@ -6,40 +6,44 @@
 //! [`tui`] and [`cli`] are the two ways to use a session; [`host`] holds everything that touches the system.
 //! `docs/architecture.md` has the map and the invariants.
 
-pub mod time;
+// From the bottom up: a module uses only those above it. The blank lines keep rustfmt from sorting them by name.
 
-pub mod rng;
+pub mod time; // instants and durations as values; no clock
 
-pub mod version;
+pub mod rng; // a seeded generator: the same seed, the same numbers, for ever
 
-pub mod endpoint;
+pub mod version; // software versions as units and files write them
 
-pub mod secret;
+pub mod endpoint; // the contract of both ends: bytes and the time in, bytes and a deadline out
 
-pub mod record;
+pub mod secret; // the password: never shown, wiped when dropped
 
-pub mod canopen;
+pub mod count; // numbers of things, as people read them
 
-pub mod wire;
+pub mod record; // the bytes of a session, in memory and on disk
 
-pub mod image;
+pub mod canopen; // CANopen's vocabulary: typed values, entries, refusals
 
-pub mod telnet;
+pub mod wire; // the text of the service port: chunks to lines, lines to messages
 
-pub mod device;
+pub mod image; // image files: reading, checking, comparing, converting, making
 
-pub mod session;
+pub mod telnet; // remote serial ports: telnet and RFC 2217, pure bytes
 
-pub mod dump;
+pub mod device; // what is known about each product, as data from its manual
 
-pub mod monitor;
+pub mod session; // our end: commands in, bytes and events out
 
-pub mod report;
+pub mod dump; // an object dictionary compared with its manual
 
-pub mod emulator;
+pub mod monitor; // what a unit has shown, in bounded memory
 
-pub mod host;
+pub mod report; // all of that on one page of HTML
 
-pub mod tui;
+pub mod emulator; // the device's end: power, firmware, measurement, loader, flash
 
-pub mod cli;
+pub mod host; // ports, the only clock, threads, files: all that touches the system
+
+pub mod tui; // the console on the screen
+
+pub mod cli; // the command line: a file for each command
