@@ -10,6 +10,7 @@ use crate::record::Span;
 use crate::session::{DictionaryReading, Event, Facts, Job, Known, Origin, Outcome, ReadEntry, WalkEnd};
 use crate::time::Duration;
 use crate::tui::{Effect, Input, LinkInfo, LinkKind, Pace, Playback, Playing};
+use crate::wire::dictionary::{Reading, Shown};
 use crate::wire::stream::Source;
 
 #[test]
@@ -98,16 +99,8 @@ fn a_dictionary_of_no_known_product_is_compared_with_nothing_until_it_is_known()
     let mut stage = Stage::with_ports(SMALL);
     stage.press(KeyCode::Enter).opened("/dev/ttyUSB0").keys("5");
     let at = ObjectAddress::new(0x6110, 2);
-    let value = Some(Value::Unsigned16(2));
-    let entry = ReadEntry {
-        at,
-        value,
-        text: "type = 2".into(),
-        span: Span::default(),
-        numeral: None,
-        doubtful: false,
-        known: true,
-    };
+    let reading = Reading { shown: Shown::Value(Value::Unsigned16(2)), numeral: "2".into(), plain: true };
+    let entry = ReadEntry { at, text: "type = 2".into(), span: Span::default(), reading: Some(reading) };
     let reading = DictionaryReading { entries: vec![entry], end: WalkEnd::Whole, unrecognised_lines: 0 };
     stage.finished(Outcome::DictionaryRead(Box::new(reading)));
     assert!(stage.shows("1 of 1, compared with nothing") && !stage.shows("not as"), "{}", stage.picture());
@@ -124,7 +117,8 @@ fn a_recording_is_steered_by_its_keys() {
     stage.keys(" +").press(KeyCode::Left);
     stage.asked();
     stage.press(KeyCode::Enter);
-    assert_eq!(stage.asked(), [Effect::OpenLink("replay:/home/user/2026-01-31 11:00:00.cast".into())]);
+    let file = cast_file("2026-01-31 11:00:00", "/dev/ttyUSB0", 1);
+    assert_eq!(stage.asked(), [Effect::OpenLink(format!("replay:{file}"))]);
     stage.input(Input::LinkOpened(LinkInfo {
         link: "replay:x".into(),
         baud: 115_200,
@@ -357,7 +351,8 @@ fn a_click_chooses_an_entry_of_a_list_and_a_second_one_does_it() {
         let mut stage = Stage::with_ports(size).with_recordings();
         stage.asked();
         stage.click("2026-01-30").click("2026-01-30");
-        assert_eq!(stage.asked(), [Effect::OpenLink("replay:/home/user/2026-01-30 09:15:00.cast".into())]);
+        let file = cast_file("2026-01-30 09:15:00", "rfc2217://terminal-server-in-hall-4:4001", 2);
+        assert_eq!(stage.asked(), [Effect::OpenLink(format!("replay:{file}"))]);
         let mut stage = Stage::with_dictionary(size);
         stage.click("1003:00");
         assert!(

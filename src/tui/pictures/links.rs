@@ -335,6 +335,16 @@ fn an_emulated_unit_that_is_gone_with_its_link_is_called_gone_and_another_asked_
 }
 
 #[test]
+fn a_unit_that_is_being_asked_who_it_is_is_not_called_silent_before_it_had_the_time_to_answer() {
+    let mut stage = Stage::streaming(SMALL);
+    stage.lost().wait(20_000).input(Input::LinkBack("/dev/ttyUSB0".into()));
+    assert!(stage.shows("being asked") && stage.shows("the last values of the one before."), "{}", stage.picture());
+    assert!(!stage.shows("silent") && !stage.shows("has not answered"), "{}", stage.picture());
+    stage.wait(10_000);
+    assert!(stage.shows("silent now") && stage.shows("The unit has not answered"), "{}", stage.picture());
+}
+
+#[test]
 fn a_refusal_stays_for_some_seconds_before_other_news() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("s").keys("t");

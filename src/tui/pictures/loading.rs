@@ -289,6 +289,13 @@ fn a_unit_whose_link_is_lost_in_the_middle_is_not_said_to_wait() {
 }
 
 #[test]
+fn nothing_is_said_to_be_sent_of_a_file_that_was_not_counted_yet() {
+    let mut stage = Stage::loading(SMALL);
+    stage.wait(1000).lost();
+    assert!(stage.shows("before anything was changed") && !stage.shows("Sent  "), "{}", stage.picture());
+}
+
+#[test]
 fn the_versions_of_an_upload_are_told_as_far_as_they_are_known() {
     let known = |patch: Option<u16>| patch.map(|patch| Version::new(1, 1, patch));
     for (before, after, words) in [

@@ -24,6 +24,8 @@ use crate::tui::{
     PortEntry, Recorded, RecordingEntry, RecordingList,
 };
 use crate::version::Version;
+use crate::wire::LoaderError;
+use crate::wire::dictionary::{Reading, Shown};
 
 pub(super) const SMALL: (u16, u16) = (80, 24);
 pub(super) const LARGE: (u16, u16) = (200, 60);
@@ -42,6 +44,8 @@ pub(super) struct Stage {
     pub(super) size: (u16, u16),
     pub(super) now: Instant,
     pub(super) effects: Vec<Effect>,
+    /// The link that was opened last.
+    link: String,
 }
 
 impl Stage {
@@ -60,17 +64,31 @@ impl Stage {
         };
         let mut app = App::new(options);
         let effects = app.start();
-        Stage { app, size, now: Instant::ZERO, effects }
+        Stage { app, size, now: Instant::ZERO, effects, link: "/dev/ttyUSB0".into() }
     }
 
     /// Connected to a port with a unit that has answered.
     pub(super) fn connected(size: (u16, u16)) -> Self {
+        Stage::connected_to(size, str::to_owned)
+    }
+
+    /// Connected to a port with a unit that says of itself what this makes of the usual words.
+    fn connected_to(size: (u16, u16), words: impl Fn(&str) -> String) -> Self {
         let mut stage = Stage::with_ports(size);
         stage.press(KeyCode::Enter);
         stage.opened("/dev/ttyUSB0");
-        stage.bytes(BANNER).bytes(MENU);
+        for said in [BANNER, MENU] {
+            stage.bytes(words(&String::from_utf8_lossy(said)).as_bytes());
+        }
         stage.wait(3000);
         stage
+    }
+
+    /// Connected to the unit with eight channels.
+    pub(super) fn connected_to_eight(size: (u16, u16)) -> Self {
+        Stage::connected_to(size, |words| {
+            words.replace("4 Thermocouple", "8 Channel RTD").replace("AXTC4CO", "AXRTD8CO").replace("V1.1.0", "V2.1.1")
+        })
     }
 
     pub(super) fn with_ports(size: (u16, u16)) -> Self {
@@ -123,12 +141,13 @@ impl Stage {
     }
 
     pub(super) fn opened(&mut self, link: &str) -> &mut Self {
+        self.link = link.to_owned();
         self.input(Input::LinkOpened(link_info(link)))
     }
 
     pub(super) fn lost(&mut self) -> &mut Self {
         self.input(Input::LinkGone(Failure {
-            text: "cannot read from /dev/ttyUSB0: the port has gone".into(),
+            text: format!("cannot read from {}: the port has gone", self.link),
             hints: vec!["Plug the adapter in again.".into()],
         }))
     }
@@ -146,15 +165,11 @@ impl Stage {
                 _ => entry.default.map(|default| default.on_node(127)),
             };
             let text = format!("{} = {}", object.name, value.map_or_else(|| "?".to_owned(), |value| value.to_string()));
-            ReadEntry {
-                at,
-                value,
-                text,
-                span: Span::default(),
-                numeral: value.map(|value| value.to_string()),
-                doubtful: false,
-                known: true,
-            }
+            let reading = match value {
+                Some(value) => Reading { shown: Shown::Value(value), numeral: value.to_string(), plain: false },
+                None => Reading { shown: Shown::Nothing, numeral: text.clone(), plain: false },
+            };
+            ReadEntry { at, text, span: Span::default(), reading: Some(reading) }
         };
         let entries = axtc4co().dictionary.entries().filter(|(at, _, _)| *at != ObjectAddress::new(0x5010, 0));
         let reading =
@@ -272,6 +287,14 @@ impl Stage {
         stage
     }
 
+    /// In the middle of an upload: the unit waits in its loader for the file, and takes it.
+    pub(super) fn in_transfer(size: (u16, u16)) -> Self {
+        let mut stage = Stage::connected(size).with_image(good_image());
+        stage.bytes(b"\r\nWaiting for application S-Record.\r\n").bytes(&[b'.'; 57]);
+        stage.fold(Event::Progress(progress()));
+        stage
+    }
+
     /// The upload has been started with the password.
     pub(super) fn loading(size: (u16, u16)) -> Self {
         let mut stage = Stage::connected(size).with_image(good_image());
@@ -322,18 +345,33 @@ impl Stage {
 
 /// A recording that can be read, named by when it was begun.
 pub(super) fn recording(begun: &str, port: &str, part: u32, length: Option<Duration>) -> RecordingEntry {
+    let path = cast_file(begun, port, part);
     RecordingEntry {
-        link: format!("replay:/home/user/{begun}.cast"),
-        path: format!("/home/user/{begun}.cast"),
+        link: format!("replay:{path}"),
+        path,
         bytes: 1_234_567,
         content: Ok(Recorded { begun: begun.into(), port: port.into(), part, length, is_being_written: false }),
     }
+}
+
+/// Where such a recording lies.
+pub(super) fn cast_file(begun: &str, port: &str, part: u32) -> String {
+    let digits: String = begun.chars().filter(char::is_ascii_digit).collect();
+    let (day, time) = digits.split_at(8);
+    let port = port.trim_start_matches("/dev/").replace(|sign: char| !sign.is_ascii_alphanumeric(), "_");
+    let part = if part == 1 { String::new() } else { format!(".p{part:05}") };
+    format!("/home/service/.local/state/axcon/recordings/{day}T{time}Z-{port}-4711{part}.cast")
 }
 
 /// A file with the name of a recording, and why it is not one.
 pub(super) fn no_recording(path: &str, why: &str) -> RecordingEntry {
     RecordingEntry { link: format!("replay:{path}"), path: path.into(), bytes: 12, content: Err(why.into()) }
 }
+
+/// Bytes of an image of the usual size, as a file with two characters at the end of each line.
+const IMAGE_BYTES: usize = 245_816;
+/// Characters of it that a loader gets.
+const CHARACTERS: usize = 242_742;
 
 /// What is in the folder of images.
 pub(super) fn files() -> Vec<FileEntry> {
@@ -346,9 +384,9 @@ pub(super) fn files() -> Vec<FileEntry> {
     };
     let folder = FileEntry { name: "bad".into(), kind: FileKind::Folder, bytes: 0, begins: Vec::new(), modified: None };
     vec![
-        file("AXTC4CO_V1.2.0.elf.S", 242_846, ""),
+        file("AXTC4CO_V1.2.0.elf.S", IMAGE_BYTES as u64, ""),
         folder,
-        file("AXTC4CO_V1.1.0.elf.S", 242_846, ""),
+        file("AXTC4CO_V1.1.0.elf.S", IMAGE_BYTES as u64, ""),
         file("readme.txt", 99, ""),
         file("before.json", 31_250, r#"{"schema":"axcon.dictionary/1","product":"AXTC4CO""#),
     ]
@@ -362,7 +400,7 @@ pub(super) fn link_info(link: &str) -> LinkInfo {
         baud: 115_200,
         kind: emulated.map_or(LinkKind::Unit, LinkKind::Emulated),
         noted: None,
-        recording: Some("/home/user/.local/state/axcon/2026-01-31T12-00-00.cast".into()),
+        recording: Some(cast_file("2026-01-31 12:00:00", link, 1)),
         start_of_day: NOON,
         start_millis: 1_769_860_800_000,
     }
@@ -387,6 +425,7 @@ pub(super) fn good_image() -> ImageFacts {
     let file = make::make(&recipe).expect("an image of the usual size");
     let targets: Vec<_> = Product::all().iter().map(Product::target).collect();
     let report = crate::image::check(file.as_slice(), None, &targets, None, &[]).expect("a slice");
+    assert_eq!((report.facts.size, report.facts.characters), (IMAGE_BYTES as u64, CHARACTERS as u64));
     ImageFacts::of_report("/home/service/images/AXTC4CO_V1.2.0.elf.S".into(), &report, None, &[])
 }
 
@@ -439,7 +478,7 @@ pub(super) fn progress() -> Progress {
         records: 1448,
         records_total: 3074,
         bytes: 114_392,
-        bytes_total: 242_846,
+        bytes_total: CHARACTERS,
         address: 0x5a80,
         elapsed: Duration::from_secs(10),
         moving: Duration::from_millis(9_950),
@@ -462,7 +501,7 @@ pub(super) fn report(verdict: Verdict, unit: UnitNow) -> LoadReport {
         records_total: 3074,
         address: Some(0x5a80),
         duration: Duration::from_secs(11),
-        what: "The loader reported error 0004 (wrong checksum) and restarted.".into(),
+        what: format!("the loader reports error {}", LoaderError::Number(4)),
         heard: "Error # 0004\u{1b}[2J Restarting.".into(),
         found_in_loader: false,
         password_sent: true,
@@ -494,6 +533,6 @@ pub(super) fn asked_to_send(size: (u16, u16), name: &str) -> Stage {
     let mut stage = to_send(size);
     stage.keys(name).press(KeyCode::Enter);
     let path = format!("/home/service/images/{name}").into();
-    stage.input(Input::BytesRead { path, bytes: Ok(vec![b'S'; 242_742]) });
+    stage.input(Input::BytesRead { path, bytes: Ok(vec![b'S'; IMAGE_BYTES]) });
     stage
 }

@@ -14,6 +14,7 @@ use crate::session::{
 };
 use crate::tui::popup::ORDERS;
 use crate::tui::{Effect, Input, LinkInfo, LinkKind};
+use crate::wire::dictionary::{Reading, Shown};
 use crate::wire::stream::Source;
 
 /// Connected to an emulated unit that streams.
@@ -86,7 +87,7 @@ fn a_heading_leaves_out_what_can_be_missed_before_what_cannot() {
 fn bits_are_compared_in_the_digits_they_are_read_in() {
     let mut stage = Stage::with_dictionary(SMALL);
     let mut dump = Dump::factory(axtc4co());
-    let cob_id = dump.entries.iter_mut().find(|entry| entry.index == "1800" && entry.subindex == 1).expect("there");
+    let cob_id = dump.entries.iter_mut().find(|entry| entry.at() == ObjectAddress::new(0x1800, 1)).expect("there");
     cob_id.value = Some(0x8000_01FFu32.into());
     stage.input(Input::FileRead { path: "d1.json".into(), text: Ok(dump.json()) });
     let picture = stage.picture();
@@ -356,15 +357,8 @@ fn one_is_one_and_not_ones() {
     let mut stage = Stage::connected(SMALL);
     stage.keys("v").press(KeyCode::Enter);
     let at = ObjectAddress::new(0x1001, 0);
-    let entry = ReadEntry {
-        at,
-        value: None,
-        text: "?".into(),
-        span: Span::default(),
-        numeral: None,
-        doubtful: false,
-        known: true,
-    };
+    let reading = Some(Reading { shown: Shown::Nothing, numeral: "?".into(), plain: false });
+    let entry = ReadEntry { at, text: "?".into(), span: Span::default(), reading };
     let ends =
         [(WalkEnd::Whole, "The dictionary is read: 1 entry, "), (WalkEnd::Stopped, "was shown: 1 entry was read.")];
     for (end, told) in ends {

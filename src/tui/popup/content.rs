@@ -163,13 +163,12 @@ fn pick_file(purpose: PickedFor, picker: &Picker, form: &Form, sheet: Sheet, roo
 
 fn send_file(name: &str, length: usize, is_image: bool, view: &View, sheet: Sheet) -> Content {
     let size = format::counted(length, "byte");
-    let meaning = match is_image {
-        true => {
-            "It is a software image. The load screen (4) checks it first, waits where the unit needs time, notices every \
-             error and proves the result; here nobody does. A unit in its loader may be left without software, one in \
-             its menu takes every S and D for a key."
-        }
-        false => MENU_KEYS,
+    let meaning = if is_image {
+        "It is a software image. The load screen (4) checks it first, waits where the unit needs time, notices every \
+         error and proves the result; here nobody does. A unit in its loader may be left without software, one in \
+         its menu takes every S and D for a key."
+    } else {
+        MENU_KEYS
     };
     let time = length as f64 * f64::from(BITS_PER_CHARACTER) / f64::from(view.link.baud.max(1));
     let time = format::minutes(Duration::from_secs_f64(time.ceil()));
@@ -178,9 +177,10 @@ fn send_file(name: &str, length: usize, is_image: bool, view: &View, sheet: Shee
         meaning.to_owned(),
         format!("It takes {time} or more. Esc stops it."),
     ]);
-    let hints = match is_image {
-        true => vec![(letter('l'), "load screen"), (letter('y'), "send all the same"), (ESC, "do not send")],
-        false => vec![(letter('y'), "send"), (ESC, "do not send")],
+    let hints = if is_image {
+        vec![(letter('l'), "load screen"), (letter('y'), "send all the same"), (ESC, "do not send")]
+    } else {
+        vec![(letter('y'), "send"), (ESC, "do not send")]
     };
     Content::new("Send this file as it is?", rows, hints)
 }
@@ -203,10 +203,7 @@ fn order(form: &Form, sheet: Sheet) -> Content {
 
 fn stream(source: Source, millis: &Form, view: &View, sheet: Sheet) -> Content {
     let theme = sheet.theme;
-    let choice = |mine: Source, text: &'static str| match mine == source {
-        true => Line::styled(format!("› {text}"), theme.strong()),
-        false => Line::raw(format!("  {text}")),
-    };
+    let choice = |mine: Source, text: &str| chosen(mine == source, text, theme);
     let mut rows = vec![
         choice(Source::FieldValue, "F  field value, object 6100h, in °C"),
         choice(Source::ProcessValue, "P  process value, object 7130h, in counts"),
@@ -246,10 +243,7 @@ fn defaults(form: &Form, sheet: Sheet) -> Content {
 }
 
 fn allow(errors: &[DefectId], cursor: usize, complaint: Option<&str>, sheet: Sheet) -> Content {
-    let row = |(number, error): (usize, &DefectId)| match number == cursor {
-        true => Line::styled(format!("› {}", error.name()), sheet.theme.strong()),
-        false => Line::raw(format!("  {}", error.name())),
-    };
+    let row = |(number, error): (usize, &DefectId)| chosen(number == cursor, error.name(), sheet.theme);
     let mut rows: Vec<Line> = errors.iter().enumerate().map(row).collect();
     rows.push(Line::default());
     rows.extend(sheet.paragraphs(&[errors.get(cursor).map_or("", |error| in_spite_of(*error))]));
@@ -257,6 +251,11 @@ fn allow(errors: &[DefectId], cursor: usize, complaint: Option<&str>, sheet: She
     let choose = (errors.len() != 1).then_some((DOWN, "choose"));
     let hints = choose.into_iter().chain([(letter(' '), "allow it and check again"), (ESC, "back")]);
     Content::new("Send in spite of this?", rows, hints.collect::<Vec<_>>())
+}
+
+/// A row of which one is chosen.
+fn chosen(is_chosen: bool, text: &str, theme: Theme) -> Line<'static> {
+    if is_chosen { Line::styled(format!("› {text}"), theme.strong()) } else { Line::raw(format!("  {text}")) }
 }
 
 /// What it means to send a file in spite of this.
@@ -343,10 +342,10 @@ fn disconnect(then: Option<&str>, view: &View, sheet: Sheet) -> Content {
         texts.push("The emulated unit is gone with its link, with all that was set and loaded.".into());
     }
     let is_same = then == view.link.name.as_deref();
-    texts.extend(then.map(visible::text).map(|link| match is_same {
-        true if is_emulated => "Then a new one begins, as the factory made it.".to_owned(),
-        true => format!("Then {link} is opened again."),
-        false => format!("{link} is opened first: if that fails, the link stays."),
+    texts.extend(then.map(visible::text).map(|link| match (is_same, is_emulated) {
+        (true, true) => "Then a new one begins, as the factory made it.".to_owned(),
+        (true, false) => format!("Then {link} is opened again."),
+        (false, _) => format!("{link} is opened first: if that fails, the link stays."),
     }));
     let hints = match &view.link.state {
         LinkState::Lost(_) if is_emulated && is_same => [(letter('y'), "new unit"), (letter('n'), "stay here")],

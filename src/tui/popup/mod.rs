@@ -287,9 +287,10 @@ impl Question {
         if let Some(noted) = view.noted() {
             return Action::Ask(Question::SameUnit { noted: noted.clone(), in_loader });
         }
-        match view.needs_label() {
-            true => Action::Ask(Question::label(view, facts)),
-            false => Question::then_password(in_loader, None),
+        if view.needs_label() {
+            Action::Ask(Question::label(view, facts))
+        } else {
+            Question::then_password(in_loader, None)
         }
     }
 
@@ -301,9 +302,10 @@ impl Question {
 
     /// The password is asked for, but not for a loader, which wants none.
     fn then_password(in_loader: bool, product: Option<String>) -> Action {
-        match in_loader {
-            true => Action::StartLoad { password: None, product },
-            false => Action::Ask(Question::Password { field: PasswordField::new(), product, complaint: None }),
+        if in_loader {
+            Action::StartLoad { password: None, product }
+        } else {
+            Action::Ask(Question::Password { field: PasswordField::new(), product, complaint: None })
         }
     }
 

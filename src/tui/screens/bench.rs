@@ -259,8 +259,7 @@ impl Bench {
             Wire::Shorted => ("shorted", theme.bad()),
         };
         let channel = channel_of(scene.view, product, place);
-        let source = scene.view.unit.monitor.stream.source.unwrap_or(Source::FieldValue);
-        let decimals = super::overview::decimals(scene.view, source);
+        let decimals = scene.view.unit.monitor.stream.decimals;
         let says = format::decimal(channel.and_then(|channel| channel.reading.value()), decimals);
         let words = channel.map_or("", Channel::words);
         let says_style = if scene.view.why_old().is_some() { theme.quiet() } else { Style::new() };

@@ -144,15 +144,12 @@ impl Parts {
         let room = usize::from(if is_beside { needed } else { area.width }).saturating_sub(2);
         let page: Vec<String> = printed.iter().flat_map(|line| format::pieces(line, room)).collect();
         let found = named(&diagnostics.found);
-        let (left, right) = match is_beside {
-            true => {
-                let rest = Rect { x: area.x + needed + 1, width: area.width - needed - 1, ..area };
-                (Rect { width: needed, ..area }, rest)
-            }
-            false => {
-                let rows = (page.len() as u16 + 1).min(area.height.saturating_sub(LEAST_FOUND_ROWS));
-                lines::split(area, rows)
-            }
+        let (left, right) = if is_beside {
+            let rest = Rect { x: area.x + needed + 1, width: area.width - needed - 1, ..area };
+            (Rect { width: needed, ..area }, rest)
+        } else {
+            let rows = (page.len() as u16 + 1).min(area.height.saturating_sub(LEAST_FOUND_ROWS));
+            lines::split(area, rows)
         };
         Parts { left, right, page, found }
     }
@@ -227,8 +224,8 @@ struct Stated {
     about: String,
 }
 
-/// A label without a state and the unit of the temperature that is not there. `stated` are those that had one so far: what
-/// follows in the line of one is called after all of it, and is about what the line is about.
+/// A label without its state, and without the unit of the temperature that the state stands for. `stated` are the
+/// labels that had one so far. A later label on the same line inherits that line's name.
 fn without_state(label: &str, stated: &mut Vec<Stated>) -> String {
     let of_line = stated.iter().find_map(|known| {
         let rest = label.strip_prefix(known.label.as_str())?;

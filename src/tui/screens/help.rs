@@ -85,10 +85,7 @@ fn layout(theme: Theme, screen: ScreenId, area: Rect) -> Layout {
     let mut rows = keys(theme, area.width, screen);
     rows.push(Line::default());
     rows.extend(notes(theme, area.width));
-    match rows.len() <= room {
-        true => Layout::Below(rows),
-        false => Layout::Scrolled(rows, room.saturating_sub(1)),
-    }
+    if rows.len() <= room { Layout::Below(rows) } else { Layout::Scrolled(rows, room.saturating_sub(1)) }
 }
 
 fn keys(theme: Theme, columns: u16, screen: ScreenId) -> Vec<Line<'static>> {

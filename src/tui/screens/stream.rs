@@ -7,7 +7,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use super::Scene;
-use super::overview::{decimals, plugged_line, source_words, value_text, without_values};
+use super::overview::{source_words, stand_in_line, value_text, without_values};
 use crate::monitor::{Channel, Stream as Values};
 use crate::time::{Duration, Instant};
 use crate::tui::action::Action;
@@ -155,10 +155,7 @@ impl Stream {
             Cmd::Last => self.held = None,
             Cmd::Accept => {
                 self.alone = !self.alone;
-                let text = match self.alone {
-                    true => "One curve has all the room.",
-                    false => "As many curves as fit.",
-                };
+                let text = if self.alone { "One curve has all the room." } else { "As many curves as fit." };
                 return Some(Action::Tell(text.to_owned()));
             }
             Cmd::Restart => return Some(Action::RestartExtremes),
@@ -183,9 +180,10 @@ impl Stream {
         let held = self.held.unwrap_or(Held { end: newest, cursor: newest });
         let (from, _) = self.times(values, held.end);
         let step = (held.end.since(from) / CURSOR_STEPS).max(Duration::from_millis(1));
-        let cursor = match earlier {
-            true => from + held.cursor.since(from).saturating_sub(step),
-            false => (held.cursor + step).min(newest),
+        let cursor = if earlier {
+            from + held.cursor.since(from).saturating_sub(step)
+        } else {
+            (held.cursor + step).min(newest)
         };
         // The window that was moved to the cursor goes on with it.
         self.held = Some(Held { cursor, end: held.end.max(cursor) });
@@ -282,7 +280,7 @@ impl Stream {
         Some(Curve {
             samples: channel.samples(window.0, window.1),
             window,
-            quantity: Quantity::of(source, decimals(scene.view, source)),
+            quantity: Quantity::of(source, values.decimals),
             cursor: self.held.map(|held| held.cursor),
             marks: values.marks.iter().copied().collect(),
             without: without_value(channel),
@@ -303,7 +301,7 @@ impl Stream {
     /// What its values span, where that is not all that is on the screen, and which time it shows.
     fn remark(&self, scene: Scene, curve: &Curve, number: usize, charts: &[(usize, Rect)]) -> String {
         let values = &scene.view.unit.monitor.stream;
-        let decimals = decimals(scene.view, values.source.unwrap_or(Source::FieldValue));
+        let decimals = values.decimals;
         let span = curve.extremes().filter(|_| charts.len() > 1);
         let span = span.map(|(low, high)| format!("{low:.decimals$} to {high:.decimals$} {}", curve.quantity.unit));
         let state = if self.held.is_some() { "held, End follows again" } else { "follows" };
@@ -345,7 +343,7 @@ impl Stream {
     fn row(&self, scene: Scene, channel: &Channel, number: usize, columns: u16) -> Line<'static> {
         let (theme, stream) = (scene.theme, &scene.view.unit.monitor.stream);
         let source = stream.source.unwrap_or(Source::FieldValue);
-        let decimals = decimals(scene.view, source);
+        let decimals = stream.decimals;
         let show = |value: Option<f64>| format::decimal(value, decimals);
         let reading = match self.held {
             None => Some(channel.reading),
@@ -394,7 +392,7 @@ pub fn without_value(channel: &Channel) -> String {
 /// A reading's state as a person reads it.
 fn state(theme: Theme, channel: &Channel, reading: Option<Reading>) -> (&'static str, Style) {
     let Some(reading) = reading else { return ("not kept", theme.quiet()) };
-    let style = if channel.plugged_of(reading).is_some() { theme.warning() } else { theme.state(reading) };
+    let style = if channel.stand_in_of(reading).is_some() { theme.warning() } else { theme.state(reading) };
     (channel.words_of(reading), style)
 }
 
@@ -405,7 +403,7 @@ fn note(scene: Scene, chosen: Option<&Channel>, columns: usize) -> Line<'static>
     let warning = match view.why_old() {
         Some(old) if view.export.is_some() => format!("  {} ", old.reason()),
         Some(old) => format!("  {}", old.text()),
-        None if view.export.is_none() => chosen.and_then(plugged_line).unwrap_or_default(),
+        None if view.export.is_none() => chosen.and_then(stand_in_line).unwrap_or_default(),
         None => String::new(),
     };
     let mut line = Line::from(Span::styled(warning.clone(), theme.warning()));

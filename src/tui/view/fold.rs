@@ -7,7 +7,7 @@ use crate::dump::Dump;
 use crate::monitor::Mark;
 use crate::record::LINK_LOST;
 use crate::session::{
-    Awaited, DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, UnitState, Verdict, WalkEnd,
+    Awaited, DictionaryReading, Event, Facts, FileEnd, Job, Origin, Outcome, ReadEntry, UnitState, Verdict, WalkEnd,
 };
 use crate::time::Instant;
 use crate::tui::visible::sentence;
@@ -16,6 +16,7 @@ use crate::wire::visible;
 
 /// Serial number of the identity object (CiA 301; both manuals, section 3.3).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
+
 impl View {
     /// Takes in one event; `facts` are the session's at that moment.
     pub fn fold(&mut self, now: Instant, event: &Event, facts: &Facts) {
@@ -126,36 +127,15 @@ impl View {
                 self.outdate_dictionary();
                 self.tell(Tone::Good, done(Job::RestoreDefaults));
             }
-            Outcome::DictionaryRead(reading) => {
-                // Its view was left again.
-                self.unit.viewing = false;
-                self.unit.monitor.stream.interrupt();
-                let is_cancelled = reading.end == WalkEnd::Cancelled;
-                // A whole one stays.
-                if !is_cancelled || self.current_dictionary().is_none_or(|read| !read.reading.is_complete()) {
-                    self.dictionary_read(now, reading);
-                }
-                if is_cancelled {
-                    self.tell(Tone::Quiet, cancelled(Job::ReadDictionary));
-                }
-            }
-            Outcome::Identified => self.identified(),
-            // The end of a recording is reported by its reader, with the reason.
             Outcome::DefaultsTaken => {
                 self.outdate_dictionary();
                 self.tell(Tone::Good, "The unit has taken the Yes and shows its menu; no restart was seen.");
             }
+            Outcome::DictionaryRead(reading) => self.walk_ended(now, reading),
+            Outcome::Identified => self.identified(),
+            // The end of a recording is reported by its reader, with the reason.
             Outcome::Done(Job::Overhear) => {}
-            Outcome::StreamRuns { was_on } => {
-                let period = self.unit.wanted_period.take();
-                self.unit.last_period = period.or(self.unit.last_period);
-                self.unit.monitor.stream.set_period(period);
-                let text = match was_on {
-                    true => "The stream was on already and now sends what you asked for.",
-                    false => done(Job::StreamOn),
-                };
-                self.tell(Tone::Good, text);
-            }
+            Outcome::StreamRuns { was_on } => self.stream_runs(*was_on),
             Outcome::Done(Job::StreamOff) => {
                 self.unit.monitor.stream.set_period(None);
                 self.unit.stream_is_off = true;
@@ -172,26 +152,54 @@ impl View {
             Outcome::Refused { job, reason, .. } => {
                 self.tell(Tone::Bad, format!("The unit refused, {}: {reason}", job.doing()));
             }
-            Outcome::Cancelled(Job::StreamOn) if self.facts.stream.is_some() => {
-                self.tell(Tone::Quiet, "The stream is switched on; its first row has not come yet.");
-            }
-            Outcome::Cancelled(job) if matches!(self.link.state, LinkState::Lost(_)) => {
-                self.tell(Tone::Bad, format!("The link was lost, {}.", job.doing()));
-            }
-            Outcome::Cancelled(Job::Diagnostics) => {
-                self.tell_until(Refutation::Page, Tone::Quiet, done(Job::Diagnostics));
-            }
-            Outcome::Cancelled(job) => self.tell(Tone::Quiet, cancelled(*job)),
+            Outcome::Cancelled(job) => self.job_cancelled(*job),
             Outcome::FileSent { sent, total, end } => self.file_sent(*sent, *total, *end),
             Outcome::Loaded(report) => {
                 self.load.progress = None;
                 self.load.held_since = None;
                 self.load.product_unknown = report.verdict == Verdict::Refused && report.product.is_none();
-                // The evidence ends where the unit has ended to talk.
+                // What the report says of the unit holds only up to the unit's last words.
                 self.load.is_silent = report.left_in_the_middle() && self.can_send() && self.is_silent_since(now);
                 self.load.is_of_earlier_unit = false;
                 self.load.report = Some((**report).clone());
             }
+        }
+    }
+
+    /// The object dictionary is read, to its end or not.
+    fn walk_ended(&mut self, now: Instant, reading: &DictionaryReading) {
+        // Its view was left again.
+        self.unit.viewing = false;
+        self.unit.monitor.stream.interrupt();
+        let is_cancelled = reading.end == WalkEnd::Cancelled;
+        // A whole one stays.
+        if !is_cancelled || self.current_dictionary().is_none_or(|read| !read.reading.is_complete()) {
+            self.dictionary_read(now, reading);
+        }
+        if is_cancelled {
+            self.tell(Tone::Quiet, cancelled(Job::ReadDictionary));
+        }
+    }
+
+    fn stream_runs(&mut self, was_on: bool) {
+        let period = self.unit.wanted_period.take();
+        self.unit.last_period = period.or(self.unit.last_period);
+        self.unit.monitor.stream.set_period(period);
+        let text =
+            if was_on { "The stream was on already and now sends what you asked for." } else { done(Job::StreamOn) };
+        self.tell(Tone::Good, text);
+    }
+
+    fn job_cancelled(&mut self, job: Job) {
+        match job {
+            Job::StreamOn if self.facts.stream.is_some() => {
+                self.tell(Tone::Quiet, "The stream is switched on; its first row has not come yet.");
+            }
+            job if matches!(self.link.state, LinkState::Lost(_)) => {
+                self.tell(Tone::Bad, format!("The link was lost, {}.", job.doing()));
+            }
+            Job::Diagnostics => self.tell_until(Refutation::Page, Tone::Quiet, done(Job::Diagnostics)),
+            job => self.tell(Tone::Quiet, cancelled(job)),
         }
     }
 
@@ -245,7 +253,7 @@ impl View {
                 },
             );
         }
-        let serial = reading.entries.iter().find(|read| read.at == SERIAL_NUMBER).and_then(|read| read.value);
+        let serial = reading.entries.iter().find(|read| read.at == SERIAL_NUMBER).and_then(ReadEntry::value);
         self.unit.serial = serial.and_then(Value::as_integer).and_then(|number| u32::try_from(number).ok());
         self.unit.dictionary = Some(DictionaryRead { dump, reading: reading.clone(), at: now, is_outdated: false });
     }

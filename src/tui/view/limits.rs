@@ -75,6 +75,6 @@ impl View {
 
     fn read_value(&self, index: u16, sub: u8) -> Option<Value> {
         let entries = &self.current_dictionary()?.reading.entries;
-        entries.iter().find(|read| read.at == ObjectAddress::new(index, sub))?.value
+        entries.iter().find(|read| read.at == ObjectAddress::new(index, sub))?.value()
     }
 }

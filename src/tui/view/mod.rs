@@ -430,7 +430,7 @@ mod tests {
 
     fn row(view: &mut View, millis: u64, readings: [Reading; 5]) {
         let at = Instant::from_millis(millis);
-        let row = Row { source: Source::FieldValue, readings: readings.to_vec() };
+        let row = Row { source: Source::FieldValue, decimals: 3, readings: readings.to_vec() };
         view.fold(at, &Event::Row { at, span: Span::default(), row }, &Facts::default());
     }
 

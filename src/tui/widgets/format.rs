@@ -3,30 +3,8 @@
 use jiff::Timestamp;
 use ratatui::text::Span;
 
+pub use crate::count::{counted, grouped};
 use crate::time::{Duration, Instant};
-
-/// `242,846`.
-pub fn grouped(number: impl TryInto<u64>) -> String {
-    let digits = number.try_into().unwrap_or(u64::MAX).to_string();
-    let mut shown = String::new();
-    for (position, digit) in digits.chars().enumerate() {
-        if position > 0 && (digits.len() - position).is_multiple_of(3) {
-            shown.push(',');
-        }
-        shown.push(digit);
-    }
-    shown
-}
-
-/// `1 row`, `1,200 rows`, `2 entries`.
-pub fn counted(number: impl TryInto<u64>, what: &str) -> String {
-    let number = number.try_into().unwrap_or(u64::MAX);
-    match what.strip_suffix('y') {
-        _ if number == 1 => format!("1 {what}"),
-        Some(stem) => format!("{} {stem}ies", grouped(number)),
-        None => format!("{} {what}s", grouped(number)),
-    }
-}
 
 /// A number with this many digits after its point; `-` for none.
 pub fn decimal(number: Option<f64>, decimals: usize) -> String {
@@ -211,10 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_grouped() {
-        assert_eq!([0, 1, 1200].map(|number| counted(number, "row")), ["0 rows", "1 row", "1,200 rows"]);
-        assert_eq!([0, 1, 2].map(|number| counted(number, "entry")), ["0 entries", "1 entry", "2 entries"]);
-        assert_eq!([0, 999, 1000, 242_846, 1_000_000].map(grouped), ["0", "999", "1,000", "242,846", "1,000,000"]);
+    fn a_number_has_the_digits_that_are_wanted_of_it() {
         assert_eq!([decimal(Some(23.456), 1), decimal(Some(23.5), 0), decimal(None, 3)], ["23.5", "24", "-"]);
     }
 

@@ -9,6 +9,7 @@ use crate::record::Span;
 use crate::session::{DictionaryReading, Event, Job, Outcome, ReadEntry, WalkEnd};
 use crate::tui::Input;
 use crate::tui::pictures::stage::*;
+use crate::wire::dictionary::{Reading, Shown};
 
 pictures! {
     dictionary_dump_to_choose: |size| {
@@ -38,7 +39,8 @@ pictures! {
         let mut stage = Stage::connected(size);
         stage.keys("v").press(KeyCode::Enter);
         let at = ObjectAddress::new(0x1001, 0);
-        let entry = ReadEntry { at, value: Some(Value::Unsigned8(0)), text: "Error Register = 0".into(), span: Span::default(), numeral: None, doubtful: false, known: true };
+        let reading = Reading { shown: Shown::Value(Value::Unsigned8(0)), numeral: "0".into(), plain: true };
+        let entry = ReadEntry { at, text: "Error Register = 0".into(), span: Span::default(), reading: Some(reading) };
         let reading = DictionaryReading { entries: vec![entry], end: WalkEnd::Stopped, unrecognised_lines: 0 };
         stage.finished(Outcome::DictionaryRead(Box::new(reading)));
         stage

@@ -2,7 +2,7 @@
 
 use ratatui::crossterm::event::KeyCode;
 
-use crate::session::{Event, Facts, LoadReport, Outcome, Phase, UnitNow, UnitState, Verdict};
+use crate::session::{Event, LoadReport, Outcome, Phase, UnitNow, Verdict};
 use crate::time::Duration;
 use crate::tui::pictures::stage::*;
 use crate::tui::{ImageFacts, Input};
@@ -33,38 +33,38 @@ pictures! {
     load_report_other_product: |size| {
         Stage::connected(size).with_image(ImageFacts { product: Some("AXRTD8CO".into()), ..good_image() })
     };
-    load_running: |size| {
-        let mut stage = Stage::connected(size).with_image(good_image());
-        stage.fold(Event::Progress(progress()));
-        stage
-    };
+    load_running: Stage::in_transfer;
     load_held: |size| {
-        let mut stage = Stage::connected(size).with_image(good_image());
-        stage.fold(Event::Progress(progress())).fold(Event::Held(true)).wait(2400);
+        let mut stage = Stage::in_transfer(size);
+        stage.fold(Event::Held(true)).wait(2400);
         stage
     };
     load_cancel_question: |size| {
-        let mut stage = Stage::connected(size).with_image(good_image());
-        stage.fold(Event::Progress(progress())).press(KeyCode::Esc);
+        let mut stage = Stage::in_transfer(size);
+        stage.press(KeyCode::Esc);
         stage
     };
     load_done: |size| {
-        let mut stage = Stage::connected(size).with_image(good_image());
+        let mut stage = Stage::in_transfer(size);
+        for said in [BANNER, MENU] {
+            stage.bytes(String::from_utf8_lossy(said).replace("V1.1.0", "V1.2.0").as_bytes());
+        }
+        stage.wait(1000);
         let report = LoadReport {
             phase: Phase::Verify,
             version_after: Some(Version::new(1, 2, 0)),
             records: 3074,
             duration: Duration::from_secs(24),
-            what: "The unit runs AXTC4CO 1.2.0: its new banner says so.".into(),
-            heard: "AXTC4CO 4 Thermocouple Scanner Software Version V1.2.0".into(),
+            what: "the unit runs AXTC4CO V1.2.0".into(),
+            heard: "CANopen: Node-ID 127 (0x7F), Baud Rate 125 kbit/s, State Pre-Operational".into(),
             ..report(Verdict::Done, UnitNow::Application)
         };
         stage.fold(Event::Finished(Outcome::Loaded(Box::new(report))));
         stage
     };
     load_failed: |size| {
-        let mut stage = Stage::connected(size).with_image(good_image());
-        stage.bytes(b"Restarting.").wait(1000);
+        let mut stage = Stage::in_transfer(size);
+        stage.bytes(b"Error # 0004\r\nRestarting.\r\n").wait(1000);
         stage.fold(Event::Finished(Outcome::Loaded(Box::new(report(Verdict::Failed, UnitNow::Loader)))));
         stage
     };
@@ -80,15 +80,14 @@ pictures! {
         Stage::in_loader(size, noted("AXRTD8CO")).with_image(good_image())
     };
     load_of_a_unit_that_has_fallen_silent: |size| {
-        let mut stage = Stage::connected(size).with_image(good_image());
-        let in_loader = Facts { state: UnitState::Loader, ..Facts::default() };
-        stage.fold_with(Event::FactsChanged, &in_loader).wait(5000);
+        let mut stage = Stage::in_transfer(size);
+        stage.wait(5000);
         let report = Outcome::Loaded(Box::new(LoadReport {
             what: "the loader has fallen silent: its power may be off, or the cable out".into(),
             heard: String::new(),
             ..report(Verdict::Failed, UnitNow::Loader)
         }));
-        stage.fold_with(Event::Finished(report), &in_loader);
+        stage.finished(report);
         stage
     };
     load_begun_question: |size| {

@@ -64,7 +64,8 @@ pictures! {
     };
     recording_over: |size| {
         let mut stage = Stage::connected(size);
-        stage.input(Input::Unrecorded("cannot write /home/user/a.cast: no space left on device".into()));
+        let file = cast_file("2026-01-31 12:00:00", "/dev/ttyUSB0", 1);
+        stage.input(Input::Unrecorded(format!("the recording ends here: no space left on device ({file})")));
         stage
     };
 }

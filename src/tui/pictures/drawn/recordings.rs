@@ -26,7 +26,7 @@ pictures! {
     recordings_unreadable: |size| {
         let mut stage = Stage::with_ports(size);
         stage.keys("8").recordings(vec![
-            no_recording("/home/user/20260301T120000Z-c-1.cast", "line 1: the file is empty"),
+            no_recording("/home/service/20260301T120000Z-c-1.cast", "line 1: the file is empty"),
             recording("2026-01-31 11:00:00", "/dev/ttyUSB0", 1, Some(Duration::from_secs(300))),
         ]);
         stage
@@ -35,7 +35,7 @@ pictures! {
         let mut stage = Stage::with_ports(size).with_recordings();
         stage.press(KeyCode::Enter);
         stage.input(Input::LinkOpened(LinkInfo {
-            link: "replay:/home/user/20260131T110000Z-ttyUSB0-7.cast".into(),
+            link: format!("replay:{}", cast_file("2026-01-31 11:00:00", "/dev/ttyUSB0", 1)),
             baud: 115_200,
             kind: LinkKind::Recording,
             noted: None,

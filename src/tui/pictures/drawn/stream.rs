@@ -102,7 +102,7 @@ pictures! {
         stage
     };
     diagnostics_of_eight_channels: |size| {
-        let mut stage = Stage::connected(size);
+        let mut stage = Stage::connected_to_eight(size);
         stage.keys("s").wait(2000).bytes(&page_of_eight()).wait(1500);
         stage
     };

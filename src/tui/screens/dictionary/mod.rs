@@ -196,15 +196,14 @@ impl Dictionary {
             Some((object, object.entry(at.sub)?))
         };
         let mut rows: BTreeMap<ObjectAddress, Row> = Row::of_manual(product).map(|row| (row.at, row)).collect();
-        let read = view.unit.dictionary.iter().flat_map(|read| &read.dump.entries);
-        for (at, entry) in read.filter_map(|entry| Some((entry.at()?, entry))) {
+        for entry in view.unit.dictionary.iter().flat_map(|read| &read.dump.entries) {
+            let at = entry.at();
             rows.insert(at, Row { at, known: known(at), read: Some(entry), difference: None });
         }
         if let (Some(other), Some(read)) = (&self.other, &view.unit.dictionary) {
             // What is measured is another value at every reading.
             for difference in dump::differences(&other.dump, &read.dump).into_iter().filter(|found| found.setting) {
-                let index = u16::from_str_radix(&difference.index, 16).unwrap_or_default();
-                let at = ObjectAddress::new(index, difference.subindex);
+                let at = difference.at;
                 let row = rows.entry(at).or_insert_with(|| Row { at, known: known(at), read: None, difference: None });
                 row.difference = Some(difference);
             }
@@ -333,10 +332,12 @@ impl Dictionary {
                     None => "compared with nothing".into(),
                 });
                 time = Some(format::time_of_day(scene.start_of_day, read.at));
-                Some(match read.reading.is_complete() {
-                    true => format!("{shown} of {total}"),
-                    false if shown == total => format!("incomplete: {} of {total} read", read.dump.entries.len()),
-                    false => format!("{shown} of {total}, incomplete"),
+                Some(if read.reading.is_complete() {
+                    format!("{shown} of {total}")
+                } else if shown == total {
+                    format!("incomplete: {} of {total} read", read.dump.entries.len())
+                } else {
+                    format!("{shown} of {total}, incomplete")
                 })
             }
         };
@@ -373,13 +374,11 @@ fn table(area: Rect) -> Rect {
 
 /// Where the table with its heading is, and where the chosen entry is explained.
 fn parts(area: Rect) -> (Rect, Rect) {
-    match area.width >= BESIDE_AT {
-        true => {
-            // Names are as long as they are: what is left beside them goes to what explains.
-            let width = (area.width - DETAIL_COLUMNS).min(TABLE_COLUMNS);
-            let beside = Rect { x: area.x + width + 2, width: area.width - width - 2, ..area };
-            (Rect { width, ..area }, beside)
-        }
-        false => lines::split(area, area.height.saturating_sub(DETAIL_ROWS)),
+    if area.width < BESIDE_AT {
+        return lines::split(area, area.height.saturating_sub(DETAIL_ROWS));
     }
+    // Names are as long as they are: what is left beside them goes to what explains.
+    let width = (area.width - DETAIL_COLUMNS).min(TABLE_COLUMNS);
+    let beside = Rect { x: area.x + width + 2, width: area.width - width - 2, ..area };
+    (Rect { width, ..area }, beside)
 }

@@ -107,10 +107,7 @@ fn amount(facts: &ImageFacts, packed: bool) -> Amount {
 fn to_send(facts: &ImageFacts, packed: bool) -> String {
     let Amount { records, characters, .. } = amount(facts, packed);
     let told = format!("{}, {}", format::counted(records, "record"), format::counted(characters, "character"));
-    match packed {
-        true if facts.ok => format!("{told}, packed from {}", format::grouped(facts.own.characters)),
-        _ => told,
-    }
+    if packed && facts.ok { format!("{told}, packed from {}", format::grouped(facts.own.characters)) } else { told }
 }
 
 /// Which loader the unit has, and who says so.
@@ -163,16 +160,15 @@ fn check_word(theme: Theme, facts: &ImageFacts) -> Span<'static> {
         1 => ", one finding".into(),
         count => format!(", {} findings", format::grouped(count)),
     };
-    match facts.ok {
-        true if !facts.allowed.is_empty() => {
-            let names: Vec<&str> = facts.allowed.iter().map(|id| id.name()).collect();
-            Span::styled(format!("passed in spite of {}{findings}", names.join(", ")), theme.warning())
-        }
-        true => Span::styled(format!("passed{findings}"), theme.good()),
-        false if facts.is_nameless() => {
-            Span::styled(format!("passed as a file, but it has no name{findings}"), theme.warning())
-        }
-        false => Span::styled(format!("failed{findings}"), theme.bad()),
+    if facts.ok && facts.allowed.is_empty() {
+        Span::styled(format!("passed{findings}"), theme.good())
+    } else if facts.ok {
+        let names: Vec<&str> = facts.allowed.iter().map(|id| id.name()).collect();
+        Span::styled(format!("passed in spite of {}{findings}", names.join(", ")), theme.warning())
+    } else if facts.is_nameless() {
+        Span::styled(format!("passed as a file, but it has no name{findings}"), theme.warning())
+    } else {
+        Span::styled(format!("failed{findings}"), theme.bad())
     }
 }
 

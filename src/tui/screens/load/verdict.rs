@@ -22,9 +22,10 @@ type Told = (&'static str, Vec<String>);
 pub(super) fn verdict(scene: Scene, report: &LoadReport, area: Rect) -> Vec<Line<'static>> {
     let theme = scene.theme;
     let product = report.product.as_deref().map(visible::text).unwrap_or_default();
-    let remark = match scene.view.load.is_of_earlier_unit {
-        true => format!("{product}, not of the unit that is there now"),
-        false => product,
+    let remark = if scene.view.load.is_of_earlier_unit {
+        format!("{product}, not of the unit that is there now")
+    } else {
+        product
     };
     let (word, style) = word(theme, report);
     let mut rows = vec![
@@ -75,8 +76,11 @@ fn told(view: &View, report: &LoadReport, room: usize) -> Vec<Told> {
     tell("Happened", &sentence(&report.what));
     tell(if view.load.is_of_earlier_unit { "Unit then" } else { "Unit now" }, unit);
     tell("Version", &versions(report));
-    let (sent, total) = (format::grouped(report.records), format::grouped(report.records_total));
-    tell("Sent", &format!("{sent} of {total} records in {}", format::minutes(report.duration)));
+    // Until the file is counted nothing of it is sent.
+    if report.records_total > 0 {
+        let (sent, total) = (format::grouped(report.records), format::grouped(report.records_total));
+        tell("Sent", &format!("{sent} of {total} records in {}", format::minutes(report.duration)));
+    }
     if let Some(address) = report.address.filter(|_| report.verdict != Verdict::Done) {
         tell("Stopped at", &format!("{address:#08x}"));
     }

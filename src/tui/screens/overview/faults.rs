@@ -100,9 +100,10 @@ fn to_check(scene: Scene, kind: Reading) -> &'static str {
     let mut on =
         channels.iter().map(|channel| channel.reading).filter(|reading| *reading != Reading::Disabled).peekable();
     let is_of_all = kind == Reading::Error && on.peek().is_some() && on.all(|reading| reading == Reading::Error);
-    match is_of_all && channels.len() > 1 {
-        true => "on all channels: converter or wiring",
-        false => "check sensor, wire and connector",
+    if is_of_all && channels.len() > 1 {
+        "on all channels: converter or wiring"
+    } else {
+        "check sensor, wire and connector"
     }
 }
 

@@ -13,15 +13,14 @@ mod values;
 
 use faults::fault_rows;
 use unit::unit;
-pub use values::plugged_line;
+pub use values::stand_in_line;
 
 use super::{Scene, terminal};
-use crate::device::Product;
 use crate::monitor::{Channel, Stream};
-use crate::session::UnitState;
+use crate::session::{Job, UnitState};
 use crate::tui::action::Action;
 use crate::tui::keymap::{Binding, Cmd, Press};
-use crate::tui::view::{LinkState, View};
+use crate::tui::view::LinkState;
 use crate::tui::widgets::chart::{self, Curve, Quantity};
 use crate::tui::widgets::lines;
 use crate::wire::stream::Source;
@@ -157,21 +156,16 @@ pub fn has_faults(scene: Scene) -> bool {
     !fault_rows(scene).is_empty()
 }
 
+/// Whether the link is there again, and the unit is being asked who it is and has not had the time to say so.
+fn is_asked(scene: Scene) -> bool {
+    let view = scene.view;
+    let awaits = view.returning.is_some() && view.job == Some(Job::Identify);
+    awaits && view.can_send() && view.facts.state == UnitState::Silent
+}
+
 /// Whether the values are those of now, so that nothing has to be said about them.
 fn is_current(scene: Scene) -> bool {
     scene.view.unit.monitor.stream.source.is_some() && scene.view.why_old().is_none()
-}
-
-/// Digits after the point, as the product prints them.
-pub fn decimals(view: &View, source: Source) -> usize {
-    // A row that has been understood is one of a product that we know, if the unit has named itself or not.
-    let channels = &view.unit.monitor.stream.channels;
-    let has_these =
-        |product: &&Product| product.stream.channels.iter().eq(channels.iter().map(|channel| &channel.name));
-    view.product().or_else(|| Product::all().iter().find(has_these)).map_or_else(
-        || if source == Source::FieldValue { 3 } else { 0 },
-        |product| product.stream.format(source).decimals,
-    )
 }
 
 /// What rows of this source carry.
@@ -238,7 +232,7 @@ fn draw_chart(scene: Scene, channel: &Channel, area: Rect, frame: &mut Frame) {
     let ends = samples.first().zip(samples.last());
     let curve = Curve {
         window: ends.map(|(first, last)| (first.0, last.0)).unwrap_or_default(),
-        quantity: Quantity::of(source, decimals(scene.view, source)),
+        quantity: Quantity::of(source, stream.decimals),
         cursor: None,
         marks: stream.marks.iter().copied().collect(),
         without: super::stream::without_value(channel),

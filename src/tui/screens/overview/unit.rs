@@ -2,7 +2,7 @@
 
 use ratatui::text::{Line, Span};
 
-use super::diagnosed;
+use super::{diagnosed, is_asked};
 use crate::session::{Known, Origin, UnitState};
 use crate::tui::screens::Scene;
 use crate::tui::visible;
@@ -26,6 +26,7 @@ pub(super) fn unit(scene: Scene, columns: u16) -> Vec<Line<'static>> {
         }
     };
     let state = match facts.state {
+        UnitState::Silent if is_asked(scene) => Span::styled("being asked", theme.warning()),
         UnitState::Silent if scene.view.link.name.is_none() => Span::styled("not connected", theme.quiet()),
         UnitState::Silent if scene.record.entry_count() > 0 && scene.view.unit.monitor.stream.rows > 0 => {
             Span::styled("silent now", theme.warning())

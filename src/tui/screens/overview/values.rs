@@ -4,7 +4,7 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-use super::{CHART_ROWS, Overview, decimals, diagnosed, source_words, value_text, without_values};
+use super::{CHART_ROWS, Overview, diagnosed, is_asked, source_words, value_text, without_values};
 use crate::monitor::Channel;
 use crate::tui::screens::Scene;
 use crate::tui::widgets::spark::sparkline;
@@ -21,6 +21,8 @@ const LEAST_TREND: usize = 12;
 const LIMITS_AT: u16 = 110;
 /// ... of this width each.
 const LIMIT_COLUMNS: usize = 9;
+/// What is said of the values while it is not known whose they are.
+const ASKED: &str = "The unit is being asked: these are the last values of the one before.";
 /// Digits after the point of a limit.
 const LIMIT_DECIMALS: usize = 1;
 
@@ -50,20 +52,20 @@ impl Overview {
             "Channel", "Value", "State", "Min", "Max"
         );
         shown.push(Line::styled(heads, theme.quiet()));
-        let decimals = decimals(scene.view, source);
         let taken = TABLE_COLUMNS + 2 + if has_columns { 3 * LIMIT_COLUMNS } else { 0 };
         let room = usize::from(columns).saturating_sub(taken);
         for (number, channel) in stream.channels.iter().enumerate() {
-            shown.push(value_row(scene, channel, number == self.chosen(stream), source, decimals, room, has_columns));
+            shown.push(value_row(scene, channel, number == self.chosen(stream), source, room, has_columns));
         }
         if area.height >= CHART_ROWS {
             shown.extend(averages(scene, columns));
         }
         shown.push(match scene.view.why_old() {
+            Some(_) if is_asked(scene) => Line::styled(format!("  {ASKED}"), theme.warning()),
             Some(why) => Line::styled(format!("  {}", why.text()), theme.warning()),
             None => {
                 let chosen = stream.channels.get(self.chosen(stream));
-                match chosen.and_then(plugged_line) {
+                match chosen.and_then(stand_in_line) {
                     Some(text) => Line::styled(text, theme.warning()),
                     None => limits_line(scene, source, chosen.map_or("", |channel| channel.name.as_str()), has_columns),
                 }
@@ -78,27 +80,26 @@ fn value_row(
     channel: &Channel,
     is_chosen: bool,
     source: Source,
-    decimals: usize,
     room: usize,
     has_limits: bool,
 ) -> Line<'static> {
     let theme = scene.theme;
+    let decimals = scene.view.unit.monitor.stream.decimals;
     let number = |value: Option<f64>| format::decimal(value, decimals);
     let value = value_text(channel.reading.value(), source, decimals);
     let limits = scene.view.limits(&channel.name).filter(|_| source == Source::FieldValue);
     let beyond = limits.zip(channel.reading.value()).and_then(|(limits, value)| limits.word(value));
     let (state, style) = match beyond {
         Some(word) => (word.to_owned(), theme.warning()),
-        None if channel.plugged().is_some() => (channel.words().to_owned(), theme.warning()),
+        None if channel.stand_in().is_some() => (channel.words().to_owned(), theme.warning()),
         None => (channel.words().to_owned(), theme.state(channel.reading)),
     };
-    let limit_columns = match has_limits {
-        true => {
-            let limits = limits.unwrap_or_default();
-            let column = |limit: Option<f64>| format!("{:>LIMIT_COLUMNS$}", format::decimal(limit, LIMIT_DECIMALS));
-            [limits.low, limits.high, limits.shutdown].map(column).concat()
-        }
-        false => String::new(),
+    let limit_columns = if has_limits {
+        let limits = limits.unwrap_or_default();
+        let column = |limit: Option<f64>| format!("{:>LIMIT_COLUMNS$}", format::decimal(limit, LIMIT_DECIMALS));
+        [limits.low, limits.high, limits.shutdown].map(column).concat()
+    } else {
+        String::new()
     };
     let span = LEAST_SPAN[usize::from(source == Source::ProcessValue)];
     let lasting = scene.view.unit.monitor.faults.lasting().find(|fault| fault.channel == channel.name);
@@ -127,9 +128,9 @@ fn value_row(
 }
 
 /// What follows a number that is not known to be a value.
-pub fn plugged_line(channel: &Channel) -> Option<String> {
-    let (plugged, value) = (channel.plugged()?, channel.reading.value()?);
-    let meaning = plugged.meaning();
+pub fn stand_in_line(channel: &Channel) -> Option<String> {
+    let (stand_in, value) = (channel.stand_in()?, channel.reading.value()?);
+    let meaning = stand_in.meaning();
     Some(format!("  {}: {value:.0} marks {meaning}, or is a value; 6150h of it says which.", channel.name))
 }
 

@@ -338,9 +338,10 @@ fn text_rows(scene: Scene, area: Rect, place: Option<u64>, with_times: bool, wor
     let room = usize::from(area.height);
     let drawn = |line: &TextLine| {
         let broken = text_line(scene, line, usize::from(area.width), with_times);
-        match !words.is_empty() && line.text.to_lowercase().contains(words) {
-            true => broken.into_iter().map(|row| row.patch_style(scene.theme.bar())).collect(),
-            false => broken,
+        if !words.is_empty() && line.text.to_lowercase().contains(words) {
+            broken.into_iter().map(|row| row.patch_style(scene.theme.bar())).collect()
+        } else {
+            broken
         }
     };
     if place.is_some_and(|end| end <= end_of_first_page(scrollback, area, with_times)) {
@@ -394,9 +395,10 @@ fn text_line(scene: Scene, line: &TextLine, columns: usize, with_times: bool) ->
         Origin::Us => ("» ", theme.sent()),
         Origin::Console => ("── ", theme.quiet()),
     };
-    let time = match with_times {
-        true => format!("{} ", format::time_of_day_millis(scene.start_of_day, line.at)),
-        false => String::new(),
+    let time = if with_times {
+        format!("{} ", format::time_of_day_millis(scene.start_of_day, line.at))
+    } else {
+        String::new()
     };
     let indent = format::width(&time) + format::width(mark);
     let pieces = format::pieces(&line.text, text_columns(line, columns, with_times));
