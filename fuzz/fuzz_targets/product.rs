@@ -28,7 +28,8 @@ fuzz_target!(|text: &str| {
     }
     for source in [Source::FieldValue, Source::ProcessValue] {
         for reading in [Reading::Value(-12.5), Reading::Disabled, Reading::Open, Reading::Short, Reading::Error] {
-            let row = Row { source, readings: vec![reading; product.stream.channels.len()] };
+            let readings = vec![reading; product.stream.channels.len()];
+            let row = Row { readings, ..product.stream.row(source) };
             let line = product.stream.emit(&row);
             assert!(product.stream.row_characters(source) > product.stream.channels.len());
             let _ = product.stream.parse(&line);

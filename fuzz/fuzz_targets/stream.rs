@@ -9,7 +9,7 @@ use libfuzzer_sys::fuzz_target;
 
 /// Equal, as far as this many decimal places and a number's precision go.
 fn alike(one: &Row, other: &Row) -> bool {
-    one.source == other.source
+    (one.source, one.decimals) == (other.source, other.decimals)
         && one.readings.len() == other.readings.len()
         && one.readings.iter().zip(&other.readings).all(|(&one, &other)| match (one, other) {
             (Reading::Value(one), Reading::Value(other)) => (one - other).abs() <= one.abs() * 1e-12 + 1e-9,
@@ -41,7 +41,7 @@ fn made(layout: &Layout, source: Source, bytes: &[u8]) -> Row {
             _ => Reading::Value(f64::from(i32::from_be_bytes([at(0), at(1), at(2), 0]) >> 8) / scale),
         }
     });
-    Row { source, readings: readings.collect() }
+    Row { readings: readings.collect(), ..layout.row(source) }
 }
 
 fuzz_target!(|input: &[u8]| {

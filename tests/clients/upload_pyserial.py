@@ -8,7 +8,7 @@ Tera Term or HyperTerminal. Needs pyserial.
 
 --deaf sends without flow control, --line-feeds ends lines with CR LF: the mistakes of real terminals.
 
-Exit code 0 if the unit starts with VERSION, 1 with a message if anything else happens.
+Exit code 0 if the unit starts with VERSION, 3 with what was heard instead if it does not, 1 if anything else goes wrong.
 """
 
 import argparse
@@ -104,7 +104,7 @@ def main():
         upload(arguments)
     except (Failed, OSError, serial.SerialException) as error:
         print(f"upload failed: {error}", file=sys.stderr)
-        return 1
+        return 3 if isinstance(error, Failed) else 1
     return 0
 
 

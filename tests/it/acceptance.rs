@@ -97,13 +97,20 @@ fn complaint(product: &str, row: &Row, files: &[(String, String)]) -> Option<Str
         return Some(format!("{product} {item} names no test and gives no reason"));
     }
     tests.iter().find_map(|test| {
-        let (path, name) = test.rsplit_once("::")?;
+        let Some((path, name)) = test.rsplit_once("::") else {
+            return Some(format!("{product} {item}: {test} does not say in which file it is"));
+        };
         let Some((_, text)) = files.iter().find(|(file, _)| file == path) else {
             return Some(format!("{product} {item}: there is no file {path}"));
         };
         let Some(at) = text.find(&format!("fn {name}(")) else {
             return Some(format!("{product} {item}: {path} has no test {name}"));
         };
+        // From the blank line before it, or the end of another function.
+        let above = text[..at].rsplit("\n\n").next().and_then(|above| above.rsplit("}\n").next());
+        if above.is_none_or(|above| !above.contains("#[test]")) {
+            return Some(format!("{product} {item}: {name} in {path} is no test"));
+        }
         // The test's own comments, from its attribute to the next test, say which items it is for.
         let from = text[..at].rfind("#[test]").map_or(at, |test| text[..test].rfind("\n\n").unwrap_or(test));
         let to = text[at..].find("#[test]").map_or(text.len(), |next| at + next);

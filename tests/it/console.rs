@@ -30,6 +30,10 @@ use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers, MouseBut
 
 use crate::support::bench::{BAUD, axtc4co, factory_flash, flash_with, full_image};
 
+/// A unit of this program, and one behind a cable that can be pulled out.
+const EMULATED: &str = "emu:axtc4co";
+const CABLE: &str = "/dev/ttyUSB0";
+
 /// How often somebody looks at the picture.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -37,6 +41,7 @@ const LOOK: Duration = Duration::from_millis(100);
 struct Desk {
     now: Instant,
     app: App,
+    link: &'static str,
     unit: Plugged<Unit>,
     to_app: Line,
     over: bool,
@@ -46,29 +51,42 @@ struct Desk {
     marks: Vec<String>,
     /// What it has sent to the unit.
     sent: Vec<u8>,
+    /// Breaks it has asked for.
+    breaks: usize,
     /// What the journal of uploads says of the unit's port.
     noted: Option<Noted>,
 }
 
 impl Desk {
-    /// Connected to a unit with V1.1.0, just powered on.
+    /// Connected to an emulated unit of this program with V1.1.0, just powered on.
     fn new() -> Self {
+        Desk::on(EMULATED)
+    }
+
+    /// Connected to such a unit by a cable.
+    fn on_cable() -> Self {
+        Desk::on(CABLE)
+    }
+
+    fn on(link: &'static str) -> Self {
         let flash = factory_flash("1.1.0");
         let setup =
             Setup { product: axtc4co(), loader: LoaderKind::G1, seed: 1, dialect: 0, flash, parameters: Vec::new() };
         let mut unit = Unit::new(setup);
         unit.power_on(Instant::ZERO);
-        let app = console();
+        let app = console(link);
         let latency = Duration::from_millis(1);
         let mut desk = Desk {
             now: Instant::ZERO,
             app,
+            link,
             unit: Plugged::new(unit, Line::new(character_time(BAUD), latency)),
             to_app: Line::new(Duration::ZERO, latency),
             over: false,
             files: BTreeMap::new(),
             marks: Vec::new(),
             sent: Vec::new(),
+            breaks: 0,
             noted: None,
         };
         let effects = desk.app.start();
@@ -87,10 +105,11 @@ impl Desk {
             match effect {
                 Effect::OpenLink(link) => {
                     let noted = self.noted.clone();
+                    let kind = if link == CABLE { LinkKind::Unit } else { LinkKind::Emulated(axtc4co()) };
                     self.input(Input::LinkOpened(LinkInfo {
                         link,
                         baud: BAUD,
-                        kind: LinkKind::Emulated(Product::named("AXTC4CO").expect("a product")),
+                        kind,
                         noted,
                         recording: None,
                         start_of_day: Duration::ZERO,
@@ -157,10 +176,13 @@ impl Desk {
                     self.input(Input::FileRead { path, text: text.ok_or_else(|| "no such file".to_owned()) });
                 }
                 Effect::Mark(text) => self.marks.push(text),
+                Effect::Break => {
+                    self.breaks += 1;
+                    self.input(Input::BreakSent(Ok(())));
+                }
                 Effect::CloseLink
                 | Effect::DoNotOpen
                 | Effect::Suspend
-                | Effect::Break
                 | Effect::ListPorts
                 | Effect::Play(_)
                 | Effect::Order(_) => {}
@@ -253,21 +275,23 @@ impl Desk {
     /// The cable is pulled out ...
     fn pull(&mut self) -> &mut Self {
         self.input(Input::LinkGone(Failure {
-            text: "cannot read from /dev/ttyUSB0: the port has gone".into(),
+            text: format!("cannot read from {CABLE}: the port has gone"),
             hints: vec!["plug the adapter in again".into()],
         }));
-        self.run(Duration::from_secs(3))
+        self.run(Duration::from_secs(3));
+        assert!(!self.picture().contains("emulated"), "a unit of this program has no cable: {}", self.picture());
+        self
     }
 
     /// ... and plugged in again.
     fn plug_in(&mut self) -> &mut Self {
-        self.input(Input::LinkBack("/dev/ttyUSB0".into()));
+        self.input(Input::LinkBack(CABLE.into()));
         self.run(Duration::from_secs(10))
     }
 
     /// The console is killed and started once more; the unit and the journal stay.
     fn started_again(&mut self) -> &mut Self {
-        self.app = console();
+        self.app = console(self.link);
         let effects = self.app.start();
         self.perform(effects);
         self.run(Duration::from_secs(10))
@@ -498,7 +522,7 @@ fn task_upload() {
 
 #[test]
 fn task_recover_an_upload_whose_cable_was_pulled() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.keys("t500").press(KeyCode::Enter);
     desk.wait_for("every 500 ms");
     desk.run(Duration::from_secs(3)).about_to_load().keys("AXIO-2010").press(KeyCode::Enter);
@@ -521,7 +545,7 @@ fn task_recover_an_upload_whose_cable_was_pulled() {
 
 #[test]
 fn task_recover_an_upload_whose_console_was_killed() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.about_to_load().keys("AXIO-2010").press(KeyCode::Enter);
     desk.wait_for("30 %");
     desk.started_again();
@@ -583,10 +607,10 @@ fn leaving_in_the_middle_leaves_a_unit_that_measures() {
     }
 }
 
-/// A console that opens the unit's link.
-fn console() -> App {
+/// A console that opens this link.
+fn console(link: &str) -> App {
     App::new(Options {
-        link: Some("emu:axtc4co".into()),
+        link: Some(link.into()),
         directory: PathBuf::from("/images"),
         home: None,
         palette: Palette::Mono,

@@ -56,17 +56,21 @@ fn every_dialect_is_identified() {
         let facts = bench.session.facts();
         let said = (
             facts.state,
-            facts.product.as_ref().map(|known| known.value.clone()),
             facts.node_id.as_ref().map(|known| known.value),
             facts.can_kbps.as_ref().map(|known| known.value),
-            facts.nmt_state.as_ref().map(|known| known.value.clone()),
+            facts.nmt_state.as_ref().map(|known| known.value.as_str()),
         );
-        // A menu that does not name the product leaves it to the banner.
-        let named = said.1.is_none() || said.1.as_deref() == Some(product.name.as_str());
-        let right = said.0 == UnitState::Application
-            && named
-            && (said.2, said.3, said.4.as_deref()) == (Some(127), Some(125), Some("pre-operational"));
-        if right { Ok(()) } else { Err(format!("{said:?}")) }
+        let right = said == (UnitState::Application, Some(127), Some(125), Some("pre-operational"));
+        // A menu that does not name product and version leaves them to the banner.
+        let heard = bench.transcript();
+        let is_said = |known: &Option<String>, text: &str| match known {
+            Some(known) => known == text,
+            None => !heard.contains(text),
+        };
+        let name = facts.product.as_ref().map(|known| known.value.clone());
+        let version = facts.version.as_ref().map(|known| known.value.to_string());
+        let named = is_said(&name, &product.name) && is_said(&version, "1.1.0");
+        if right && named { Ok(()) } else { Err(format!("{said:?}, {name:?} {version:?}")) }
     });
 }
 
@@ -97,7 +101,7 @@ fn every_dialects_stream_is_switched_on_and_off() {
             }
             let end = bench.now + Duration::from_secs(1);
             if bench.run_until(end, |event| matches!(event, Event::Row { .. })).is_some() {
-                return Err(format!("{source:?}: a row behind the end"));
+                return Err(format!("{source:?}: a row after the end"));
             }
         }
         Ok(())
@@ -107,8 +111,22 @@ fn every_dialects_stream_is_switched_on_and_off() {
 #[test]
 fn every_dialects_diagnostics_are_read_and_stopped() {
     in_every_dialect(|bench, _| {
-        let outcome = bench.ask(Command::Diagnostics { pages: Some(2) });
-        if outcome == Outcome::Done(Job::Diagnostics) { Ok(()) } else { Err(format!("{outcome:?}")) }
+        bench.command(Command::Diagnostics { pages: Some(2) });
+        let (mut pages, mut outcome) = (0, None);
+        bench.run_until(bench.now + Duration::from_secs(60), |event| {
+            match event {
+                Event::Page { .. } => pages += 1,
+                Event::Finished(ended) => outcome = Some(ended.clone()),
+                _ => {}
+            }
+            outcome.is_some()
+        });
+        if (pages, &outcome) != (2, &Some(Outcome::Done(Job::Diagnostics))) {
+            return Err(format!("{pages} pages, {outcome:?}"));
+        }
+        let received = bench.received_so_far();
+        bench.run_for(Duration::from_secs(2));
+        if bench.received_so_far() == received { Ok(()) } else { Err("pages after the end".into()) }
     });
 }
 
@@ -140,7 +158,7 @@ fn every_dialects_dictionary_is_read_to_the_same_facts() {
                 wrong.push(format!("{at} {} {} is missing: {line}", object.name, entry.name));
                 continue;
             };
-            let same = match read.value {
+            let same = match read.value() {
                 None => value.as_f64().is_nan(),
                 Some(setting) if entry.access == Access::ReadWrite => setting == value,
                 // As many digits as the unit prints, and one scan older perhaps.
@@ -151,7 +169,7 @@ fn every_dialects_dictionary_is_read_to_the_same_facts() {
                 }
             };
             if !same {
-                wrong.push(format!("{at}: {:?} from {:?}, not {value}", read.value, read.text));
+                wrong.push(format!("{at}: {:?} from {:?}, not {value}", read.value(), read.text));
             }
         }
         if wrong.is_empty() {
@@ -165,7 +183,16 @@ fn every_dialects_dictionary_is_read_to_the_same_facts() {
 #[test]
 fn every_dialects_defaults_are_restored() {
     in_every_dialect(|bench, _| {
+        // A setting of the unit's own, kept across its restarts.
+        let factor = ObjectAddress::new(0x6126, 1);
+        for (at, data) in [(factor, 18f32.to_le_bytes()), (ObjectAddress::new(0x1010, 1), *b"save")] {
+            bench.unit.unit_mut().write_object(bench.now, at, &data).map_err(|refusal| format!("{at}: {refusal}"))?;
+        }
         let outcome = bench.ask(Command::RestoreDefaults);
-        if outcome == Outcome::Done(Job::RestoreDefaults) { Ok(()) } else { Err(format!("{outcome:?}")) }
+        if outcome != Outcome::Done(Job::RestoreDefaults) {
+            return Err(format!("{outcome:?}"));
+        }
+        let read = bench.unit.unit_mut().read_object(bench.now, factor);
+        if read == Ok(Value::Real32(16.0)) { Ok(()) } else { Err(format!("{factor} is {read:?}")) }
     });
 }

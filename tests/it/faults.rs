@@ -12,6 +12,7 @@ use axcon::session::{Command, Event, LoadReport, Outcome, Session, UnitNow, Verd
 use axcon::time::{Duration, Instant, character_time};
 
 use crate::support::bench::{BAUD, axtc4co, flash_with, order, small_image};
+use crate::support::flash::assert_holds;
 
 const XOFF: u8 = 0x13;
 const XON: u8 = 0x11;
@@ -105,8 +106,7 @@ impl Faulty {
         self.run_for(Duration::from_secs(3));
         let report = self.load(image);
         assert_eq!(report.verdict, Verdict::Done, "{report:?}");
-        let end = image.identity().expect("an identity").program_words as usize * 2;
-        assert!(self.unit().flash()[..end] == flash_with(image)[..end]);
+        assert_holds(self.unit(), image, "the upload that saves the unit");
     }
 
     fn text(&self) -> String {
@@ -120,12 +120,13 @@ fn image() -> CheckedImage {
 
 #[test]
 fn a_byte_of_the_file_that_is_lost_doubled_corrupted_or_unreadable_fails_the_upload_and_says_how() {
-    // The 5,000th byte is within a record.
-    for (fault, errors) in [
-        ("lost to-unit at byte 5000", ["error 4", "error 2", "error 3"].as_slice()),
-        ("doubled to-unit at byte 5000", &["error 4", "error 2", "error 3"]),
-        ("corrupted to-unit at byte 5000", &["error 4", "error 2", "error 3"]),
-        ("unreadable to-unit at byte 5000", &["error 1"]),
+    // The 5,000th byte is a digit of the data of a record: without it the S of the next one is taken for the last
+    // digit, and with one more, or another, the checksum is wrong.
+    for (fault, error) in [
+        ("lost to-unit at byte 5000", "error 2 ("),
+        ("doubled to-unit at byte 5000", "error 4 ("),
+        ("corrupted to-unit at byte 5000", "error 4 ("),
+        ("unreadable to-unit at byte 5000", "error 1 ("),
     ] {
         for loader in [LoaderKind::G1, LoaderKind::G2] {
             let mut bench = Faulty::running(loader, &[fault]);
@@ -135,7 +136,7 @@ fn a_byte_of_the_file_that_is_lost_doubled_corrupted_or_unreadable_fails_the_upl
                 (Verdict::Failed, UnitNow::Loader),
                 "{fault} {loader:?}: {report:?}"
             );
-            assert!(errors.iter().any(|error| report.what.contains(error)), "{fault} {loader:?}: {}", report.what);
+            assert!(report.what.contains(error), "{fault} {loader:?}: {}", report.what);
             bench.saved(&image());
         }
     }
@@ -153,8 +154,10 @@ fn late_bytes_and_a_slow_adapter_cost_time_and_no_record() {
     // Eleven pages are crossed, and each XOFF with its XON goes there and back.
     let slow = seconds(&["latency 16"]) - undisturbed;
     assert!((0.2..0.8).contains(&slow), "{slow} s");
+    // By this seed two of the characters to the unit are late, and the page of each ends later; on the way back it may
+    // be any page's XON, and the banner.
     let late = seconds(&["late from-unit one in 40 by 15", "late to-unit one in 4000 by 15"]) - undisturbed;
-    assert!((0.0..1.0).contains(&late), "{late} s");
+    assert!((0.029..0.25).contains(&late), "{late} s");
 }
 
 #[test]

@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use axcon::canopen::{DataType, Value};
 use axcon::device::Product;
 use axcon::endpoint::Endpoint;
+use axcon::record::Span;
 use axcon::session::{Awaited, Command, Event, Job, Outcome, UnitState};
 use axcon::time::{Duration, Instant};
 use axcon::version::Version;
@@ -299,20 +300,28 @@ fn single_keys_are_given_without_enter_and_both_sources_are_told_apart() {
 fn a_repainted_dictionary_is_read_to_its_end_while_rows_run_through_it() {
     let mut bench = visit();
     bench.ask(Command::Identify);
-    bench.ask(Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(200) });
+    let outcome = bench.ask(Command::StreamOn { source: Source::FieldValue, period: Duration::from_millis(200) });
+    assert_eq!(outcome, Outcome::StreamRuns { was_on: false });
+    let before = bench.session.record().received();
     let outcome = bench.ask(Command::ReadDictionary);
     let Outcome::DictionaryRead(reading) = outcome else { panic!("{outcome:?}") };
     assert!(reading.is_complete());
     assert_eq!(bench.unit.state, State::Menu, "the view has been left");
+    // A row that comes after the hint goes on with its line, so the bytes are counted, and not the rows understood.
+    let record = bench.session.record();
+    let heard = record.bytes(Span { start: before, end: record.received() });
+    let rows = String::from_utf8_lossy(&heard).matches("850.0;-200.0\r").count();
+    assert!(rows > 20, "{rows} rows came while it was read");
+    assert!(bench.unit.rows.is_some(), "and the stream goes on");
     for (at, object, entry) in product().dictionary.entries() {
         let read = reading.entries.iter().find(|read| read.at == at);
         let read = read.unwrap_or_else(|| panic!("{at} {} {} is missing", object.name, entry.name));
         let expected = entry.default.map(|default| default.on_node(127));
-        let same = match (read.value, expected) {
+        let same = match (read.value(), expected) {
             (Some(Value::Real32(read)), Some(expected)) => (f64::from(read) - expected.as_f64()).abs() < 0.1,
             (read, expected) => read == expected,
         };
-        assert!(same, "{at}: {:?} from {:?}, not {expected:?}", read.value, read.text);
+        assert!(same, "{at}: {:?} from {:?}, not {expected:?}", read.value(), read.text);
     }
 }
 

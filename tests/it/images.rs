@@ -3,21 +3,14 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use axcon::image::{DefectId, Severity, make};
 
-fn axcon(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_axcon"));
-    command.args(arguments).env_remove("AXCON_PORT").output().expect("the program runs")
-}
+use crate::support::json::json;
+use crate::support::shell::{Ran, World};
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn json(bytes: &[u8]) -> serde_json::Value {
-    serde_json::from_slice(bytes).unwrap_or_else(|error| panic!("{error}: {}", text(bytes)))
+fn axcon(arguments: &[&str]) -> Ran {
+    World::new().run(arguments, b"")
 }
 
 fn in_tree(path: &str) -> PathBuf {
@@ -88,7 +81,7 @@ fn the_program_makes_every_sample_file_again() {
     for (product, version) in SOUND {
         let made = axcon(&["image", "make", "--product", product, "--version", version, "--out", "-"]);
         let kept = fs::read(in_tree(&format!("firmware_images/{product}_V{version}.elf.S"))).expect("a sample");
-        assert!(made.stdout == kept, "{product} V{version} is not what the program makes: {}", text(&made.stderr));
+        assert!(made.out.as_bytes() == kept, "{product} V{version} is not what the program makes: {}", made.err);
     }
     let mut kept: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     for folder in ["bad", "odd"] {
@@ -101,10 +94,10 @@ fn the_program_makes_every_sample_file_again() {
     let recipe = ["image", "make", "--product", "AXTC4CO", "--version", "1.2.0", "--words", "320", "--out", "-"];
     for flaw in make::flaws() {
         let made = axcon(&[&recipe[..], &["--defect", flaw.name()]].concat());
-        assert!(made.status.success(), "{flaw}: {}", text(&made.stderr));
+        assert!(made.code == Some(0), "{flaw}: {}", made.err);
         let name = sample(flaw);
         let kept = kept.remove(&name);
-        assert!(kept.as_ref() == Some(&made.stdout), "{name} is not what the program makes");
+        assert!(kept.is_some_and(|kept| kept == made.out.as_bytes()), "{name} is not what the program makes");
     }
     assert_eq!(kept.into_keys().collect::<Vec<_>>(), Vec::<String>::new(), "files nothing makes");
 }
@@ -115,8 +108,8 @@ fn each_bad_file_shows_its_defect_in_its_line_and_no_other_error() {
         let id: DefectId = name.parse().expect("a defect");
         let checked = axcon(&["image", "check", "--json", &in_tree_text(&format!("firmware_images/{}", sample(id)))]);
         let refused = id.severity() == Severity::Error;
-        assert_eq!(checked.status.code(), Some(if refused { 5 } else { 0 }), "{name}");
-        let report = json(&checked.stdout);
+        assert_eq!(checked.code, Some(if refused { 5 } else { 0 }), "{name}");
+        let report = json(&checked.out);
         assert_eq!((&report["schema"], &report["ok"]), (&"axcon.image/1".into(), &(!refused).into()), "{name}");
         let defects = report["defects"].as_array().expect("a list");
         let own: Vec<_> = defects.iter().filter(|defect| defect["id"] == name).collect();
@@ -154,10 +147,10 @@ fn the_documentation_lists_every_defect_with_its_severity() {
 fn a_sound_image_is_told_in_words_and_as_data() {
     let file = in_tree_text("firmware_images/AXTC4CO_V1.2.0.elf.S");
     let checked = axcon(&["image", "check", "--product", "axtc4co", &file]);
-    assert_eq!(checked.status.code(), Some(0));
-    assert_eq!(text(&checked.stdout), format!("{file}: AXTC4CO V1.2.0, 3,074 records: may be sent, no defects\n"));
+    assert_eq!(checked.code, Some(0));
+    assert_eq!(checked.out, format!("{file}: AXTC4CO V1.2.0, 3,074 records: may be sent, no defects\n"));
 
-    let told = text(&axcon(&["image", "info", &file]).stdout);
+    let told = axcon(&["image", "info", &file]).out;
     let rows: Vec<&str> = told.lines().skip(1).collect();
     assert_eq!(
         rows,
@@ -175,7 +168,7 @@ fn a_sound_image_is_told_in_words_and_as_data() {
         ]
     );
 
-    let report = json(&axcon(&["image", "check", "--json", &file]).stdout);
+    let report = json(&axcon(&["image", "check", "--json", &file]).out);
     let expected = serde_json::json!({
         "schema": "axcon.image/1", "format": "srec", "ok": true, "product": "AXTC4CO", "version": "1.2.0",
         "records": 3074, "address_unit": "word", "ranges": [{"start": 0, "end": 49152}], "defects": [],
@@ -189,20 +182,20 @@ fn a_sound_image_is_told_in_words_and_as_data() {
 fn an_image_without_a_name_is_sound_and_sent_only_by_whoever_answers_for_it() {
     let file = in_tree_text("firmware_images/odd/no-identity.elf.S");
     let checked = axcon(&["image", "check", &file]);
-    let said = text(&checked.stdout);
-    assert_eq!(checked.status.code(), Some(0), "{said}");
+    let said = checked.out;
+    assert_eq!(checked.code, Some(0), "{said}");
     assert!(said.ends_with(": may be sent with --allow no-identity, 1 warning\n"), "{said}");
     let refused = axcon(&["load", "--dry-run", &file]);
-    assert_eq!(refused.status.code(), Some(5));
-    assert!(text(&refused.stderr).contains("--allow no-identity"), "{}", text(&refused.stderr));
+    assert_eq!(refused.code, Some(5));
+    assert!(refused.err.contains("--allow no-identity"), "{}", refused.err);
     let allowed = axcon(&["load", "--dry-run", "--allow", "no-identity", &file]);
-    assert_eq!(allowed.status.code(), Some(0), "{}", text(&allowed.stderr));
+    assert_eq!(allowed.code, Some(0), "{}", allowed.err);
 }
 
 #[test]
 fn an_image_is_checked_against_the_flash_of_its_product() {
     let file = in_tree_text("firmware_images/AXRTD8CO_V2.2.0.elf.S");
-    let report = json(&axcon(&["image", "check", "--json", "--product", "axrtd8co", &file]).stdout);
+    let report = json(&axcon(&["image", "check", "--json", "--product", "axrtd8co", &file]).out);
     let expected = serde_json::json!({
         "ok": true, "product": "AXRTD8CO", "version": "2.2.0", "records": 5122, "address_unit": "word",
         "ranges": [{"start": 0, "end": 0x1_4000}], "defects": [],
@@ -210,34 +203,34 @@ fn an_image_is_checked_against_the_flash_of_its_product() {
     for (member, value) in expected.as_object().expect("an object") {
         assert_eq!(&report[member], value, "{member}");
     }
-    let told = text(&axcon(&["image", "info", &file]).stdout);
+    let told = axcon(&["image", "info", &file]).out;
     assert!(told.contains("163,840 bytes, 31 % of the AXRTD8CO's flash"), "{told}");
 
     // For the smaller unit it is the wrong product, and too large.
     let other = axcon(&["image", "check", "--json", "--product", "axtc4co", &file]);
-    assert_eq!(other.status.code(), Some(5));
-    let report = json(&other.stdout);
+    assert_eq!(other.code, Some(5));
+    let report = json(&other.out);
     let defects: Vec<&str> =
         report["defects"].as_array().expect("a list").iter().filter_map(|defect| defect["id"].as_str()).collect();
     assert!(defects.contains(&"wrong-product"), "{defects:?}");
 
     // What becomes of data elsewhere depends on the loader.
     let folded = in_tree_text("firmware_images/bad/boot-flash.elf.S");
-    let said = |options: &[&str]| text(&axcon(&[&["image", "check", &folded], options].concat()).stdout);
+    let said = |options: &[&str]| axcon(&[&["image", "check", &folded], options].concat()).out;
     assert!(said(&[]).contains("folds that to 0x0000 over the program, silently"), "{}", said(&[]));
     let refused = said(&["--loader", "g3"]);
     assert!(refused.contains("the loader stops there, with the old program erased"), "{refused}");
-    assert_eq!(axcon(&["image", "check", "--loader", "g9", &folded]).status.code(), Some(2));
+    assert_eq!(axcon(&["image", "check", "--loader", "g9", &folded]).code, Some(2));
 
     // Behind the last of 512 KByte and the boot flash.
     let folder = tempfile::tempdir().expect("a folder");
     let beyond = folder.path().join("AXRTD8CO_V2.2.0.elf.S").display().to_string();
     let recipe = ["--words", "320", "--defect", "out-of-range", "--out", &beyond];
     let made = axcon(&[&["image", "make", "--product", "AXRTD8CO", "--version", "2.2.0"][..], &recipe].concat());
-    assert_eq!(made.status.code(), Some(0), "{}", text(&made.stderr));
+    assert_eq!(made.code, Some(0), "{}", made.err);
     let refused = axcon(&["image", "check", &beyond]);
-    assert_eq!(refused.status.code(), Some(5));
-    let said = text(&refused.stdout);
+    assert_eq!(refused.code, Some(5));
+    let said = refused.out;
     assert!(said.contains("out-of-range") && said.contains("0x00044000: outside the AXRTD8CO"), "{said}");
 }
 
@@ -245,20 +238,20 @@ fn an_image_is_checked_against_the_flash_of_its_product() {
 fn a_refused_image_is_one_line_for_each_defect_and_a_verdict() {
     let file = in_tree_text("firmware_images/bad/bad-checksum.elf.S");
     let refused = axcon(&["image", "check", &file]);
-    assert_eq!(refused.status.code(), Some(5));
+    assert_eq!(refused.code, Some(5));
     assert_eq!(
-        text(&refused.stdout),
+        refused.out,
         format!(
             "{file}:15:77: error bad-checksum: the record's bytes give checksum 9F, it says 90\n\
              {file}: AXTC4CO V1.2.0, 22 records: must not be sent, 1 error\n"
         )
     );
     let allowed = axcon(&["image", "check", "--allow", "bad-checksum", &file]);
-    assert_eq!(allowed.status.code(), Some(0));
-    assert!(text(&allowed.stdout).contains(":15:77: allowed bad-checksum: "), "{}", text(&allowed.stdout));
-    assert!(text(&allowed.stdout).ends_with(": may be sent, 1 allowed error\n"), "{}", text(&allowed.stdout));
-    assert_eq!(axcon(&["image", "check", "--allow", "bad-character", &file]).status.code(), Some(2));
-    assert_eq!(axcon(&["image", "check", "--product", "NOSUCH", &file]).status.code(), Some(2));
+    assert_eq!(allowed.code, Some(0));
+    assert!(allowed.out.contains(":15:77: allowed bad-checksum: "), "{}", allowed.out);
+    assert!(allowed.out.ends_with(": may be sent, 1 allowed error\n"), "{}", allowed.out);
+    assert_eq!(axcon(&["image", "check", "--allow", "bad-character", &file]).code, Some(2));
+    assert_eq!(axcon(&["image", "check", "--product", "NOSUCH", &file]).code, Some(2));
 }
 
 #[test]
@@ -268,8 +261,8 @@ fn a_file_that_cannot_be_read_is_refused_with_a_hint() {
     for (file, what) in [(folder, "is a directory"), (missing, "cannot read the image")] {
         for command in ["check", "info"] {
             let refused = axcon(&["image", command, &file, "--json"]);
-            assert_eq!(refused.status.code(), Some(5), "{file}");
-            let error = json(&refused.stderr);
+            assert_eq!(refused.code, Some(5), "{file}");
+            let error = json(&refused.err);
             assert_eq!(error["kind"], "image-refused");
             assert!(error["message"].as_str().is_some_and(|message| message.contains(what)), "{error}");
             assert!(error["hints"].as_array().is_some_and(|hints| !hints.is_empty()), "{error}");
@@ -282,13 +275,10 @@ fn make_does_not_overwrite_unasked() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("x.elf.S").display().to_string();
     let make = ["image", "make", "--product", "AXTC4CO", "--version", "V1.0.0", "--words", "320", "--out", &file];
-    assert_eq!(axcon(&make).status.code(), Some(0));
+    assert_eq!(axcon(&make).code, Some(0));
     let refused = axcon(&make);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(text(&refused.stderr).contains("--yes"), "{}", text(&refused.stderr));
-    assert_eq!(axcon(&[&make[..], &["--yes"]].concat()).status.code(), Some(0));
-    assert_eq!(
-        axcon(&["image", "make", "--product", "AXTC4CO", "--version", "1.0.0", "--words", "9"]).status.code(),
-        Some(2)
-    );
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.err.contains("--yes"), "{}", refused.err);
+    assert_eq!(axcon(&[&make[..], &["--yes"]].concat()).code, Some(0));
+    assert_eq!(axcon(&["image", "make", "--product", "AXTC4CO", "--version", "1.0.0", "--words", "9"]).code, Some(2));
 }

@@ -193,18 +193,19 @@ fn foreign_clients_succeed_and_fail_as_the_loaders_sources_say() {
         return;
     };
     let [scanner, rtds] = [0, 1];
-    let cases: [(usize, &str, &[&str], bool); 7] = [
-        (scanner, "g2", &[], true),
-        (scanner, "g3", &[], true),
-        (rtds, "g3", &["--key-at-loader"], true),
+    // The last column is what the loader says in the end to a client that fails.
+    let cases: [(usize, &str, &[&str], Option<&str>); 7] = [
+        (scanner, "g2", &[], None),
+        (scanner, "g3", &[], None),
+        (rtds, "g3", &["--key-at-loader"], None),
         // All control characters are ignored by G1; to G3 the line feed begins a record that is none.
-        (scanner, "g1", &["--line-feeds"], true),
-        (scanner, "g3", &["--line-feeds", "--patience", "3"], false),
+        (scanner, "g1", &["--line-feeds"], None),
+        (scanner, "g3", &["--line-feeds", "--patience", "3"], Some("Error: 0002")),
         // Without Xon/Xoff the page loaders hear nothing while they program, and nobody counts the ring of G3.
-        (scanner, "g1", &["--deaf", "--patience", "3"], false),
-        (scanner, "g3", &["--deaf", "--patience", "3"], false),
+        (scanner, "g1", &["--deaf", "--patience", "3"], Some("Error # 000")),
+        (scanner, "g3", &["--deaf", "--patience", "3"], Some("Error: 000")),
     ];
-    let running = cases.map(|(product, loader, more, succeeds)| {
+    let running = cases.map(|(product, loader, more, fails)| {
         let python = PathBuf::from(&python);
         thread::spawn(move || {
             let (product, _, after) = PRODUCTS[product];
@@ -214,10 +215,14 @@ fn foreign_clients_succeed_and_fail_as_the_loaders_sources_say() {
             let mut args = vec![client.as_str(), "u0", "new.S", after];
             args.extend(more);
             let ran = Running::start(bench.world.command_of(&python, &args)).wait();
-            assert_eq!(ran.code, Some(i32::from(!succeeds)), "{loader} {more:?}\n{}\n{}", ran.out, ran.err);
-            if succeeds {
+            let Some(said) = fails else {
+                assert_eq!(ran.code, Some(0), "{loader} {more:?}\n{}\n{}", ran.out, ran.err);
                 return bench.assert_runs_the_image();
-            }
+            };
+            // It has come as far as the file, and no further: not just anything has gone wrong.
+            assert_eq!(ran.code, Some(3), "{loader} {more:?}\n{}\n{}", ran.out, ran.err);
+            let as_said = ran.err.starts_with("upload failed: no banner with version ") && ran.err.contains(said);
+            assert!(as_said, "{loader} {more:?}\n{}", ran.err);
             // Whatever it left behind, the right sender saves the unit.
             let ran = bench.load("u0", &["--product", product]);
             assert_eq!(ran.code, Some(0), "{loader} {more:?}\n{}\n{}", ran.out, ran.err);

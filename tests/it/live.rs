@@ -2,11 +2,14 @@
 
 use std::fs;
 
+use axcon::device::Product;
+
 use crate::support::puppet::Puppet;
 use crate::support::screen::Screen;
 use crate::support::shell::World;
+use crate::support::words::MENU;
 
-const ESC: &str = "\x1b";
+const UP: &str = "\x1b[A";
 const NEXT_SCREEN: &str = "\t";
 
 fn console(world: &World, args: &[&str]) -> Screen {
@@ -65,9 +68,11 @@ fn an_upload_by_keys_ends_with_the_new_banner() {
     screen.keys("AXIO-2010\r");
     let verdict = screen.wait("── Verdict");
     assert!(verdict.contains("Done") && verdict.contains("1.2.0 afterwards"), "{verdict}");
-    for recording in world.files("state/axcon/recordings") {
-        assert!(!fs::read_to_string(recording).expect("a recording").contains("AXIO"));
-    }
+    let recordings = world.files("state/axcon/recordings");
+    assert_eq!(recordings.len(), 1, "{recordings:?}");
+    let recording = fs::read_to_string(&recordings[0]).expect("a recording");
+    assert!(recording.contains(r#","i","*********"]"#), "its place and length stay");
+    assert!(!recording.contains("AXIO"));
 }
 
 #[test]
@@ -76,7 +81,8 @@ fn a_resize_and_a_terminal_too_small_are_taken_in_stride() {
     let screen = console(&world, &[]);
     screen.wait("application runs");
     screen.resize(10, 40);
-    screen.wait("80");
+    let small = screen.wait("has 40 x 10.");
+    assert!(small.contains("axcon needs 80 x 24 characters"), "{small}");
     screen.resize(60, 200);
     let large = screen.wait("application runs");
     assert!(large.lines().any(|line| line.chars().count() > 100), "the room is used:\n{large}");
@@ -104,7 +110,12 @@ fn without_a_port_the_list_of_ports_comes_first_and_an_emulated_unit_is_a_key_aw
     screen.keys("nowhere\r");
     let failed = screen.wait("Not connected");
     assert!(failed.contains("nowhere"), "{failed}");
-    screen.keys(ESC);
+    // The cursor is on what asks for a name, right below the emulated units.
+    let above = Product::all().iter().rev().position(|product| product.name == "AXTC4CO").expect("built in") + 1;
+    screen.keys(&format!("\r{}", UP.repeat(above)));
+    screen.wait("── Emulated AXTC4CO");
+    screen.keys("\r");
+    screen.wait("application runs");
 }
 
 #[test]
@@ -148,16 +159,14 @@ fn a_recording_is_played_to_its_end_with_the_times_it_had() {
 fn a_cable_that_is_plugged_in_again_is_connected_by_itself() {
     let world = World::new();
     let link = world.path("unit");
-    let menu = b"AXTC4CO V1.1.0\r\nV - view object dictionary\r\nT - toggle stream\r\nS - diagnostics\r\n";
-    let unit = || Puppet::start(Box::new(|keys| if keys.contains(&b'm') { menu.to_vec() } else { Vec::new() }));
-    let first = unit();
+    let first = silent_unit();
     std::os::unix::fs::symlink(first.path(), &link).expect("a link");
     let mut screen = Screen::start(world.command(&["--port", link.to_str().expect("UTF-8")]), 24, 80);
     screen.wait("application runs");
     drop(first);
     screen.wait("Plug the cable in again");
     fs::remove_file(&link).expect("pulled out");
-    let second = unit();
+    let second = silent_unit();
     std::os::unix::fs::symlink(second.path(), &link).expect("plugged in again");
     screen.wait("connected");
     screen.keys("q");
@@ -178,8 +187,7 @@ fn console_of_a_shell(world: &World, unit: &Puppet) -> Screen {
 
 /// Answers like a unit whose menu is asked for, and is silent else.
 fn silent_unit() -> Puppet {
-    let menu = b"AXTC4CO V1.1.0\r\nV - view object dictionary\r\nT - toggle stream\r\nS - diagnostics\r\n";
-    Puppet::start(Box::new(|keys| if keys.contains(&b'm') { menu.to_vec() } else { Vec::new() }))
+    Puppet::start(Box::new(|keys| if keys.contains(&b'm') { MENU.into() } else { Vec::new() }))
 }
 
 #[test]
@@ -229,8 +237,8 @@ fn a_program_that_was_stopped_from_outside_takes_its_screen_again() {
 #[test]
 fn a_recording_that_finds_no_room_is_told_and_stays_told() {
     let world = World::new();
-    let menu = b"AXTC4CO V1.1.0\r\nV - view object dictionary\r\nT - toggle stream\r\nS - diagnostics\r\n";
-    let unit = Puppet::start(Box::new(|keys| if keys.contains(&b'm') { menu.repeat(200) } else { Vec::new() }));
+    let unit =
+        Puppet::start(Box::new(|keys| if keys.contains(&b'm') { MENU.repeat(200).into_bytes() } else { Vec::new() }));
     // A file may not grow beyond some kB, as on a disk that is full.
     let script = "trap '' XFSZ; ulimit -f 8; exec \"$@\"";
     let args = ["-c", script, "sh", env!("CARGO_BIN_EXE_axcon"), "--record", "r.cast", "--port", unit.port()];

@@ -10,6 +10,7 @@ mod dialects;
 mod eds;
 mod emulator;
 mod endings;
+mod errata;
 mod faults;
 mod foreigner;
 #[cfg(unix)]

@@ -4,7 +4,7 @@
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
@@ -14,6 +14,7 @@ use axcon::host::Input;
 use axcon::host::link::{CLOSE_PATIENCE, Cause, Connection};
 
 use crate::support::connection::{connected, receive};
+use crate::support::foreign::python;
 use crate::support::screen::Screen;
 use crate::support::server::Server;
 use crate::support::shell::{PATIENCE, Running, World};
@@ -329,6 +330,14 @@ fn closing_takes_a_bounded_time_when_the_other_side_reads_nothing() {
     go.send(()).expect("somebody waits");
 }
 
+#[test]
+fn a_break_is_refused_over_the_network() {
+    let server = Server::start(drop);
+    let (connection, _received) = open(&server.link(RAW));
+    let error = connection.send_break().expect_err("the network has none");
+    assert_eq!(error.to_string(), "not possible over the network");
+}
+
 // The console.
 
 #[test]
@@ -366,17 +375,10 @@ fn the_console_can_be_left_while_a_server_says_nothing_and_says_why_when_that_la
 
 /// A server by pyserial for a port; `None`, and said so, where there is no pyserial.
 fn pyserial_server(world: &World, port: &Path) -> Option<(Running, String)> {
-    let Some(python) = std::env::var_os("AXCON_TEST_PYTHON") else {
-        // Straight to the stream: what the test harness captures of a test that passes is never seen.
-        let _ = writeln!(
-            std::io::stderr(),
-            "skipped: no foreign server; set AXCON_TEST_PYTHON to a Python with pyserial, as .ci/run does"
-        );
-        return None;
-    };
+    let python = python("server", "pyserial")?;
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/clients/serve_rfc2217.py");
     let args = [script.to_str().expect("UTF-8"), port.to_str().expect("UTF-8")];
-    let server = Running::start(world.command_of(&PathBuf::from(python), &args));
+    let server = Running::start(world.command_of(&python, &args));
     let number = server.wait_out("\n");
     let link = format!("rfc2217://localhost:{}", number.trim());
     Some((server, link))

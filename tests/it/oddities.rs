@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 
+use axcon::canopen::ObjectAddress;
 use axcon::endpoint::{Endpoint, Transmit};
 use axcon::session::{Command, Event, Job, LoadOrder, LoadReport, Outcome, Session, UnitNow, UnitState, Verdict};
 use axcon::time::{Duration, Instant};
@@ -107,13 +108,16 @@ fn a_view_that_begins_with_a_note_is_read() {
         }
         (b'\r', 1..) => {
             at += 1;
-            if at == 3 { said("1001h 00h Error Register = 0\r\n") } else { said(MENU) }
+            if at == 2 { said("1001h 00h Error Register = 0\r\n") } else { said(MENU) }
         }
         _ => Vec::new(),
     }));
     bench.ask(Command::Identify);
     let outcome = bench.ask(Command::ReadDictionary);
-    assert!(matches!(&outcome, Outcome::DictionaryRead(read) if !read.entries.is_empty()), "{outcome:?}");
+    let Outcome::DictionaryRead(reading) = outcome else { panic!("{outcome:?}") };
+    let read: Vec<ObjectAddress> = reading.entries.iter().map(|entry| entry.at).collect();
+    assert_eq!(read, [ObjectAddress::new(0x1000, 0), ObjectAddress::new(0x1001, 0)]);
+    assert!(reading.is_complete(), "{:?}", reading.end);
 }
 
 #[test]

@@ -67,7 +67,7 @@ fn dictionary(bench: &mut Bench) -> DictionaryReading {
 }
 
 fn values(reading: &DictionaryReading) -> Vec<String> {
-    reading.entries.iter().map(|entry| format!("{} {:?}", entry.at, entry.value)).collect()
+    reading.entries.iter().map(|entry| format!("{} {:?}", entry.at, entry.value())).collect()
 }
 
 fn pages(told: &[Event]) -> Vec<Vec<&str>> {

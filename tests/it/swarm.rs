@@ -1,20 +1,21 @@
-//! Uploads by the thousand: product, loader, size of its pages, wording, latency, image, the state the unit is found in, faults on the line,
-//! and the moment of an interruption, all drawn from a seed; then a checker that knows the truth, since it sees the flash.
+//! Uploads by the thousand: product, loader, size of its pages, wording, latency, image, the state the unit is found
+//! in, faults on the line, and the moment of an interruption, all drawn from a seed; then a checker that knows the
+//! truth, since it sees the flash.
 //!
 //! - the upload ends within bounded virtual time;
+//! - one that nothing disturbs succeeds;
 //! - *success* only if the flash holds the image and the unit runs it;
 //! - what a failure says of the unit is true;
-//! - behind the end of the loader hardly a record more reaches what is no loader;
+//! - after the end of the loader hardly a record more reaches what is no loader;
 //! - the password is nowhere in the record;
 //! - with the faults gone, the next upload, by a console that knows nothing but port and journal, succeeds.
 //!
-//! And the checker is not blind: with each of the defects of real senders put into the machine it complains.
+//! And the checker is not blind: with each of the defects of real senders put into the machine it complains of that.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use axcon::device::{LoaderKind, Product};
+use axcon::device::{LoaderKind, Pacing, Product};
 use axcon::emulator::Running;
 use axcon::emulator::memory::Defect;
 use axcon::image::CheckedImage;
@@ -24,15 +25,18 @@ use axcon::session::{Command, LoadOrder, LoadReport, Outcome, UnitNow, Verdict};
 use axcon::time::Duration;
 
 use crate::support::bench::{Bench, axrtd8co, axtc4co, flash_with, image_of, order, with_pages};
+use crate::support::flash;
 
 /// Seeds that run with the tests; the environment may ask for more, or for a single one.
 const SEEDS: u64 = 2_000;
-/// Seeds in which a defect has to show.
-const SEEDS_OF_A_FLAW: u64 = 300;
+/// Stories in which a defect has to show, of those in which it can.
+const STORIES_OF_A_FLAW: usize = 1_000;
 /// Longest an upload may take: everything erased twice, the file sent twice, and every wait at its end.
 const LONGEST: Duration = Duration::from_secs(150);
 /// How long a unit takes from its power-up until what it is has been heard.
 const TOLD: Duration = Duration::from_secs(3);
+/// How long most units take from the first question to the first record.
+const EARLY: Duration = Duration::from_secs(1);
 /// Records that may reach something that is no loader: those on their way when it left, and one more.
 const STRAYS: u64 = 8;
 
@@ -167,6 +171,12 @@ impl Story {
             }),
         }
     }
+
+    /// Whether nothing happens in it but the upload.
+    fn is_undisturbed(&self) -> bool {
+        let is_left_alone = matches!(self.interruption, Interruption::None) && self.spoiled.is_none();
+        is_left_alone && self.to_unit.is_empty() && self.from_unit.is_empty()
+    }
 }
 
 impl Found {
@@ -245,12 +255,10 @@ fn middleman(faults: Vec<Fault>, seed: u64) -> impl FnMut(u64, u8) -> Vec<u8> {
 fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
     let story = Story::of(seed);
     let image = made(story.product, story.after, story.words);
-    let wanted = flash_with(&image);
-    let end = image.identity().expect("an identity").program_words as usize * 2;
-    let flash = flash_with(&made(story.product, story.before, 600));
-    let mut bench = Bench::story(story.product, story.loader, story.dialect, flash, story.latency);
+    let before = flash_with(&made(story.product, story.before, 600));
+    let mut bench = Bench::story(story.product, story.loader, story.dialect, before, story.latency);
     // A console that was here before has noted the product, as the journal does.
-    let mut order = order(image);
+    let mut order = order(image.clone());
     order.packed = story.packed;
     order.flaw = flaw;
     find(&mut bench, story.found, &order);
@@ -275,7 +283,7 @@ fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
         _ => true,
     };
     bench.run_for(Duration::from_millis(200)); // A unit that has just got its power starts.
-    let flash_is_right = bench.unit.unit().flash()[..end] == wanted[..end];
+    let flash_is_right = flash::holds(bench.unit.unit(), &image);
     let running = bench.unit.unit().running();
     if let Some(report) = &report {
         let claims = match (report.verdict, report.unit) {
@@ -288,6 +296,11 @@ fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
         if let Some(claim) = claims {
             return Err(format!("{claim}, and is {running:?}: {report:?}"));
         }
+        // A console that has just come cannot know what a unit is whose menu does not name it.
+        let is_nameless = story.dialect != 0 && report.verdict == Verdict::Refused && report.product.is_none();
+        if story.is_undisturbed() && report.verdict != Verdict::Done && !is_nameless {
+            return Err(format!("nothing disturbed it, and it fails: {report:?}"));
+        }
     }
     if report.as_ref().is_some_and(|report| format!("{report:?}").contains("AXIO-2010")) {
         return Err(format!("the password is in the report: {report:?}"));
@@ -296,7 +309,7 @@ fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
         let heard = bench.transcript();
         let at = heard.find("AXIO-2010").unwrap_or_default();
         let near: String = heard[..at].chars().rev().take(200).collect::<Vec<_>>().into_iter().rev().collect();
-        return Err(format!("the password is in the record behind {near}"));
+        return Err(format!("the password is in the record after {near}"));
     }
     if bench.strays() - strays > STRAYS {
         let heard = bench.transcript();
@@ -311,14 +324,15 @@ fn run(seed: u64, flaw: Option<Flaw>) -> Result<(), String> {
     bench.unit.to_unit_mut().clear();
     bench.run_for(Duration::from_secs(3));
     bench.reconnect();
-    order.product = Some(story.product.name.clone());
+    // This one has no defect: what the checker says of a defect it says of the first upload.
+    (order.product, order.flaw) = (Some(story.product.name.clone()), None);
     let second = bench.load(order);
     if second.verdict != Verdict::Done {
         let heard = bench.transcript();
         let end = heard.char_indices().rev().nth(600).map_or(0, |(at, _)| at);
         return Err(format!("first {report:?}\nthen {second:?}\n{}", &heard[end..]));
     }
-    if bench.unit.unit().flash()[..end] != wanted[..end] {
+    if !flash::holds(bench.unit.unit(), &image) {
         return Err("the second upload is a false success".into());
     }
     Ok(())
@@ -419,22 +433,26 @@ fn first_upload(bench: &mut Bench, order: &LoadOrder, interruption: Interruption
     }
 }
 
-/// Runs seeds on all processors, each seed with its own story, and says what is wrong with the first few.
-fn complaints(seeds: std::ops::Range<u64>, flaw: Option<Flaw>, enough: usize) -> Vec<String> {
-    let next = AtomicU64::new(seeds.start);
+/// Runs seeds on all processors, each seed with its own story, and says what is wrong with the first few of which the
+/// checker says this.
+fn complaints(seeds: impl Iterator<Item = u64> + Send, flaw: Option<Flaw>, said: &str, enough: usize) -> Vec<String> {
+    let seeds = Mutex::new(seeds);
+    let next = || seeds.lock().expect("no panic").next();
     let found = Mutex::new(Vec::new());
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|| {
-                loop {
-                    let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed >= seeds.end || found.lock().expect("no panic").len() >= enough {
+                while let Some(seed) = next() {
+                    if found.lock().expect("no panic").len() >= enough {
                         return;
                     }
                     let ran = std::panic::catch_unwind(|| run(seed, flaw));
-                    let ran = ran.unwrap_or_else(|_| Err("a panic".into()));
-                    if let Err(what) = ran {
+                    // Not a complaint: the checker itself has come to nothing.
+                    let ran = ran.unwrap_or_else(|_| panic!("a panic, AXCON_SEED={seed}: {}", Story::of(seed)));
+                    if let Err(what) = ran
+                        && what.contains(said)
+                    {
                         let what = format!("{what}\n{}", Story::of(seed));
                         found.lock().expect("no panic").push(format!("AXCON_SEED={seed}: {what}"));
                     }
@@ -454,7 +472,7 @@ fn every_upload_of_the_swarm_is_judged_truly_and_the_next_one_succeeds() {
         Some(seed) => seed..seed + 1,
         None => first..first + number("AXCON_SEEDS").unwrap_or(SEEDS),
     };
-    let complaints = complaints(seeds, None, 20);
+    let complaints = complaints(seeds, None, "", 20);
     assert!(complaints.is_empty(), "{}", complaints.join("\n\n"));
 }
 
@@ -466,16 +484,29 @@ const FOUND: [u64; 1] = [
 
 #[test]
 fn every_upload_that_once_was_judged_wrongly_is_judged_truly() {
-    for seed in FOUND {
-        let complaints = complaints(seed..seed + 1, None, 1);
-        assert!(complaints.is_empty(), "{}", complaints.join("\n\n"));
-    }
+    let complaints = complaints(FOUND.into_iter(), None, "", FOUND.len());
+    assert!(complaints.is_empty(), "{}", complaints.join("\n\n"));
 }
 
 #[test]
 fn the_checker_notices_every_defect_that_real_senders_have() {
     for flaw in Flaw::ALL {
-        let found = complaints(0..SEEDS_OF_A_FLAW, Some(flaw), 1);
-        assert!(!found.is_empty(), "{flaw:?} goes unnoticed in {SEEDS_OF_A_FLAW} seeds");
+        // What is said of it, and the stories in which it can show.
+        let (said, can_show): (&str, fn(&Story) -> bool) = match flaw {
+            // A record has to be lost on the way, unnoticed.
+            Flaw::BelievesTheLoader => ("a false success, and is ", |story| !story.to_unit.is_empty()),
+            // A loader that keeps a page loses what was parked, one with a ring takes no LF, and one that keeps no more
+            // than one record is overrun.
+            Flaw::EndsAtOnce | Flaw::SendsCrLf | Flaw::IgnoresHolds => ("nothing disturbed it", Story::is_undisturbed),
+            // Only as long as no record has come is there software that starts when the power is back; and few records
+            // are packed ones.
+            Flaw::SendsBehindErrors => ("records went to what is no loader", |story| {
+                let is_early = matches!(story.interruption, Interruption::Power { at, .. } if at < EARLY);
+                is_early && !story.packed && story.loader.pacing() == Pacing::Pages
+            }),
+        };
+        let seeds = (0..).filter(|&seed| can_show(&Story::of(seed))).take(STORIES_OF_A_FLAW);
+        let found = complaints(seeds, Some(flaw), said, 1);
+        assert!(!found.is_empty(), "{flaw:?} goes unnoticed in {STORIES_OF_A_FLAW} stories");
     }
 }

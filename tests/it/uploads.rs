@@ -1,16 +1,17 @@
 //! Stories of uploads: console and unit on one cable, in virtual time.
 
-use axcon::device::{LoaderKind, Pacing};
+use axcon::device::{ERASE_TIME, LoaderKind, PROGRAM_TIME, Pacing};
 use axcon::image::{Identity, make, srecord};
 use axcon::secret::Secret;
 use axcon::session::{Command, Event, LoadOrder, Outcome, Phase, UnitNow, UnitState, Verdict};
-use axcon::time::Duration;
+use axcon::time::{Duration, character_time};
 use axcon::version::Version;
 use axcon::wire::{LoaderText, Message};
 
 use crate::support::bench::{
-    Bench, axrtd8co, axtc4co, factory_flash, flash_with, full_image, image_of, order, small_image, with_pages,
+    BAUD, Bench, axrtd8co, axtc4co, factory_flash, flash_with, full_image, image_of, order, small_image, with_pages,
 };
+use crate::support::flash::assert_holds;
 
 #[test]
 fn an_upload_succeeds_and_the_flash_holds_exactly_the_image() {
@@ -22,13 +23,9 @@ fn an_upload_succeeds_and_the_flash_holds_exactly_the_image() {
     assert_eq!(report.version_before, Some(Version::new(1, 1, 0)));
     assert_eq!(report.version_after, Some(Version::new(1, 2, 0)));
     assert_eq!(report.records, report.records_total);
-    // Words of the old program behind the new one stay: compare what the image mentions, and what it does not.
-    let flash = bench.unit.unit().flash();
-    for block in &image.image().blocks {
-        let at = block.address as usize * 2;
-        assert_eq!(&flash[at..at + block.data.len()], block.data, "word {:#x}", block.address);
-    }
-    assert_eq!(Identity::verify(flash).map(|identity| identity.version), Ok(Version::new(1, 2, 0)));
+    assert_holds(bench.unit.unit(), &image, "an upload");
+    let identity = Identity::verify(bench.unit.unit().flash());
+    assert_eq!(identity.map(|identity| identity.version), Ok(Version::new(1, 2, 0)));
 }
 
 #[test]
@@ -37,20 +34,33 @@ fn an_upload_takes_hardly_longer_than_the_line_and_the_flash_need() {
     bench.run_for(Duration::from_secs(4));
     let report = bench.load(order(full_image("1.2.0")));
     assert_eq!(report.verdict, Verdict::Done, "{report:?}");
-    // 192 pages, each erased (20 ms) and written word by word (256 x 20 us); flash beyond the old program is erased.
-    let characters = bench.wire.len() as f64;
-    let on_the_line = characters / 11_520.0;
-    let seconds = report.duration.as_secs_f64();
-    assert!(seconds < on_the_line + 192.0 * 0.030 + 3.0, "{seconds} s for {on_the_line} s of characters");
+    let on_the_line = character_time(BAUD) * bench.wire.len() as u32;
+    // The pages of the old program are erased; those beyond it are so already, and each word is written.
+    let in_flash = ERASE_TIME * 3_000_u32.div_ceil(256) + PROGRAM_TIME * 0xC000;
+    // What is left: the silence before and the XON after each of 192 pages (0.8 ms), what is waited for after the
+    // header and after the last data (120 ms each), the start of the new program, and the silence after its banner
+    // (300 ms).
+    let beside = report.duration.saturating_sub(on_the_line + in_flash);
+    assert!((Duration::from_millis(500)..Duration::from_secs(1)).contains(&beside), "{beside:?} beside line and flash");
 }
 
 #[test]
 fn a_late_adapter_costs_time_and_no_record() {
-    for latency in [1, 4, 16, 20] {
-        let mut bench = Bench::with(factory_flash("1.1.0"), Duration::from_millis(latency));
+    let takes = |latency: Duration| {
+        let mut bench = Bench::with(factory_flash("1.1.0"), latency);
         bench.run_for(Duration::from_secs(4));
         let report = bench.load(order(small_image("AXTC4CO", "1.2.0")));
-        assert_eq!(report.verdict, Verdict::Done, "{latency} ms: {report:?}\n{}", bench.transcript());
+        assert_eq!(report.verdict, Verdict::Done, "{latency:?}: {report:?}\n{}", bench.transcript());
+        let data = bench.wire.windows(2).filter(|two| *two == b"S3").count();
+        assert_eq!(data, report.records_total - 2, "{latency:?}: each record but header and end leaves once");
+        report.duration
+    };
+    let undisturbed = takes(Duration::ZERO);
+    for latency in [1, 4, 16, 20].map(Duration::from_millis) {
+        // There and back for each of eleven crossings, and from the end record to the banner.
+        let cost = takes(latency).saturating_sub(undisturbed);
+        let reckoned = latency * 2 * 12;
+        assert!(cost.abs_diff(reckoned) < Duration::from_millis(5), "{latency:?}: {cost:?}, not {reckoned:?}");
     }
 }
 
@@ -86,7 +96,7 @@ fn an_image_for_another_product_is_refused_before_the_unit_is_asked_for_anything
 fn a_corrupted_record_stops_the_upload_within_a_record_and_the_next_one_succeeds() {
     let mut bench = Bench::new();
     bench.run_for(Duration::from_secs(4));
-    // The 5,000th character of the file loses a bit: the check sum of its record is wrong.
+    // The 5,000th character of the file loses a bit: the checksum of its record is wrong.
     bench.disturb(|number, byte| vec![if number == 5_000 { byte ^ 0x01 } else { byte }]);
     let report = bench.load(order(small_image("AXTC4CO", "1.2.0")));
     assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
@@ -127,9 +137,7 @@ fn a_power_cut_at_any_record_leaves_a_unit_that_a_second_upload_saves() {
         again.product = Some("AXTC4CO".into());
         let report = bench.load(again);
         assert_eq!(report.verdict, Verdict::Done, "cut at {cut}: {report:?}\n{}", bench.transcript());
-        let wanted = flash_with(&image);
-        let end = image.identity().expect("an identity").program_words as usize * 2;
-        assert_eq!(bench.unit.unit().flash()[..end], wanted[..end], "cut at {cut}");
+        assert_holds(bench.unit.unit(), &image, &format!("cut at {cut}"));
     }
 }
 
@@ -327,9 +335,7 @@ fn every_loader_in_every_unit_is_uploaded_to_at_any_latency_packed_or_not() {
                 let report = bench.load(order);
                 let story = format!("{} {loader:?} {latency} ms, packed {packed}: {report:?}", product.name);
                 assert_eq!(report.verdict, Verdict::Done, "{story}\n{}", bench.transcript());
-                let wanted = flash_with(&image);
-                let end = image.identity().expect("an identity").program_words as usize * 2;
-                assert!(bench.unit.unit().flash()[..end] == wanted[..end], "{story}");
+                assert_holds(bench.unit.unit(), &image, &story);
             }
         }
     }
@@ -350,8 +356,7 @@ fn pages_of_any_size_are_found_out() {
                 let report = bench.load(LoadOrder { packed, ..order(image.clone()) });
                 let story = format!("{page_words} words, {loader:?} {latency} ms, packed {packed}: {report:?}");
                 assert_eq!(report.verdict, Verdict::Done, "{story}\n{}", bench.transcript());
-                let end = image.identity().expect("an identity").program_words as usize * 2;
-                assert!(bench.unit.unit().flash()[..end] == flash_with(&image)[..end], "{story}");
+                assert_holds(bench.unit.unit(), &image, &story);
                 let kept = format!("pages of {page_words} words");
                 let told = report.remark.as_ref().is_some_and(|remark| remark.contains(&kept));
                 // Longer records say less of where a small page ends, and the smallest cannot be told from none.
@@ -374,8 +379,7 @@ fn a_loader_of_the_56f83xx_generation_is_uploaded_to_at_any_latency() {
             let all = bench.transcript();
             assert_eq!(report.verdict, Verdict::Done, "{} {latency} ms: {report:?}", product.name);
             assert!(all.contains("Application started from address 0x00A0"), "{} {latency} ms", product.name);
-            let end = image.identity().expect("an identity").program_words as usize * 2;
-            assert!(bench.unit.unit().flash()[..end] == flash_with(&image)[..end], "{} {latency} ms", product.name);
+            assert_holds(bench.unit.unit(), &image, &format!("{} {latency} ms", product.name));
         }
     }
 }
@@ -428,7 +432,7 @@ fn a_corrupted_record_is_told_in_words_and_at_most_one_more_leaves_behind_the_er
     let sent = bench.wire.len();
     let Outcome::Loaded(report) = bench.outcome() else { panic!("no report") };
     assert_eq!((report.verdict, report.unit), (Verdict::Failed, UnitNow::Loader), "{report:?}");
-    assert_eq!(report.what, "the loader reports error 0001 (wrong check sum)");
+    assert_eq!(report.what, "the loader reports error 0001 (wrong checksum)");
     assert!(bench.wire.len() - sent <= 79, "{} characters behind the error", bench.wire.len() - sent);
     let damaged = 5_000 / 79;
     assert!(report.records <= damaged + 3, "{} records left, the {damaged}th was damaged", report.records);

@@ -3,6 +3,8 @@
 use rustix::process::Signal;
 
 use super::*;
+use crate::support::foreign::python;
+use crate::support::puppet::Puppet;
 use crate::support::screen::Screen;
 
 /// What is said of a unit behind a link that is gone in the middle of a file.
@@ -20,10 +22,11 @@ fn an_upload_puts_exactly_the_image_into_flash_and_the_unit_says_the_new_version
     assert!(ran.err.contains("unit   u0: AXTC4CO V1.1.0"), "the plan names the unit: {}", ran.err);
     assert_flash_holds(&bench.world.path("s0/flash.bin"), &bench.world.path("new.S"));
     assert_eq!(bench.version(), "1.2.0");
-    for recording in bench.world.files("state/axcon/recordings") {
-        let text = fs::read_to_string(&recording).expect("a recording");
-        assert!(!text.contains("AXIO"), "{}", recording.display());
-    }
+    let recordings = bench.world.files("state/axcon/recordings");
+    let texts: Vec<String> = recordings.iter().map(|path| fs::read_to_string(path).expect("a recording")).collect();
+    assert!(texts.iter().all(|text| !text.contains("AXIO")), "{texts:?}");
+    let uploads = texts.iter().filter(|text| text.contains(r#","i","*********"]"#)).count();
+    assert_eq!((recordings.len(), uploads), (3, 1), "two questions, and one upload with its password: {texts:?}");
 }
 
 #[test]
@@ -158,6 +161,67 @@ fn a_unit_that_loses_its_power_in_the_middle_is_not_said_to_wait_in_its_loader()
     let verdict = json(ran.out.lines().last().expect("a verdict"));
     assert_eq!((&verdict["verdict"], &verdict["unit"]), (&"failed".into(), &"loader".into()), "{verdict}");
     assert!(verdict["next"].as_str().is_some_and(|next| next.starts_with(SILENT)), "{verdict}");
+}
+
+#[test]
+fn a_loader_that_complains_in_the_middle_and_says_no_more_leaves_a_unit_of_which_nobody_knows() {
+    let world = World::new();
+    fs::write(world.path("pw"), "AXIO-2010\n").expect("written");
+    let make = ["image", "make", "--product", "axtc4co", "--version", "1.2.0", "--words", "600", "--out", "new.S"];
+    assert_eq!(world.run(&make, b"").code, Some(0));
+    let (mut heard, mut is_over) = (Vec::new(), false);
+    let unit = Puppet::start(Box::new(move |bytes| {
+        heard.extend_from_slice(bytes);
+        let records = heard.windows(2).filter(|pair| **pair == *b"S3").count();
+        match records {
+            0 if bytes.contains(&b'm') => b"\r\nWaiting for application S-Record.\r\n".to_vec(),
+            8.. if !is_over => {
+                is_over = true;
+                b"\r\nTransfer aborted: reason 6\r\n".to_vec()
+            }
+            _ => Vec::new(),
+        }
+    }));
+    let load = ["load", "new.S", "--yes", "--password-file", "pw", "--product", "axtc4co", "--json"];
+    let ran = world.run(&[&load[..], &["--port", unit.port()]].concat(), b"");
+    assert_eq!(ran.code, Some(8), "{}{}", ran.out, ran.err);
+    let verdict = json(ran.out.lines().last().expect("a verdict"));
+    assert_eq!((&verdict["verdict"], &verdict["unit"]), (&"failed".into(), &"unknown".into()), "{verdict}");
+    assert!(verdict["records"].as_u64() < verdict["records_total"].as_u64(), "in the middle: {verdict}");
+    assert!(verdict["what"].as_str().is_some_and(|what| what.contains("Transfer aborted: reason 6")), "{verdict}");
+}
+
+/// A second program in the file, at addresses that the loader folds onto the first.
+#[test]
+fn a_unit_that_runs_something_else_than_the_file_says_is_9() {
+    let bench = Bench::new();
+    let make = ["image", "make", "--product", "axtc4co", "--version", "1.3.0", "--words", "320", "--out", "second.S"];
+    assert_eq!(bench.world.run(&make, b"").code, Some(0));
+    let lines = |name: &str| -> Vec<String> {
+        let text = fs::read_to_string(bench.world.path(name)).expect("an image");
+        text.lines().map(str::to_owned).collect()
+    };
+    let beyond = |line: &String| {
+        let (length, rest) = line.strip_prefix("S3")?.split_at_checked(2)?;
+        let (data, sum) = rest.strip_prefix("0000")?.split_at_checked(rest.len() - 6)?;
+        // One more in the address is one less in the checksum.
+        let sum = u8::from_str_radix(sum, 16).expect("digits").wrapping_sub(1);
+        Some(format!("S3{length}0001{data}{sum:02X}"))
+    };
+    let mut both = lines("new.S");
+    let end = both.pop().expect("the end record");
+    both.extend(lines("second.S").iter().filter_map(beyond));
+    both.push(end);
+    fs::write(bench.world.path("both.S"), both.join("\r\n") + "\r\n").expect("written");
+    let ran = bench.load("both.S", &["--allow", "out-of-range", "--json"]);
+    assert_eq!(ran.code, Some(9), "{}{}", ran.out, ran.err);
+    let verdict = json(ran.out.lines().last().expect("a verdict"));
+    assert_eq!(
+        (&verdict["verdict"], &verdict["unit"]),
+        (&"wrong-application".into(), &"application".into()),
+        "{verdict}"
+    );
+    assert_eq!((&verdict["version_after"], bench.version()), (&"1.3.0".into(), "1.3.0".into()), "{verdict}");
 }
 
 #[test]
@@ -322,14 +386,7 @@ fn a_large_file_that_is_no_image_is_told_with_its_whole_size() {
 
 #[test]
 fn a_client_nobody_here_wrote_uploads_into_the_emulator() {
-    let Some(python) = std::env::var_os("AXCON_TEST_PYTHON") else {
-        // Straight to the stream: what the test harness captures of a test that passes is never seen.
-        let _ = writeln!(
-            std::io::stderr(),
-            "skipped: no foreign client; set AXCON_TEST_PYTHON to a Python with pyserial, as .ci/run does"
-        );
-        return;
-    };
+    let Some(python) = python("client", "pyserial") else { return };
     let bench = Bench::new();
     let client = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/clients/upload_pyserial.py");
     // Another unit, at line rate and with a driver that does Xon/Xoff: what the manual's terminal program has.
@@ -337,7 +394,7 @@ fn a_client_nobody_here_wrote_uploads_into_the_emulator() {
     unit.wait_out("serial: ");
     let args = [client.display().to_string(), "u1".into(), "new.S".into(), "V1.2.0".into()];
     let args: Vec<&str> = args.iter().map(String::as_str).collect();
-    let ran = Running::start(bench.world.command_of(&PathBuf::from(python), &args)).wait();
+    let ran = Running::start(bench.world.command_of(&python, &args)).wait();
     assert_eq!(ran.code, Some(0), "{}{}", ran.out, ran.err);
     assert_flash_holds(&bench.world.path("s1/flash.bin"), &bench.world.path("new.S"));
 }
@@ -350,7 +407,7 @@ fn a_dry_run_says_that_the_image_is_for_another_unit() {
     let ran = world.run(&["load", "--dry-run", "--port", "emu:axtc4co", &image], b"");
     assert_eq!(ran.code, Some(5), "{}", ran.err);
     assert!(ran.err.contains("the image is for AXRTD8CO, the unit is an AXTC4CO"), "{}", ran.err);
-    // Its loader leaves old words where the check sum wants erased ones: it would wait for a file for ever.
+    // Its loader leaves old words where the checksum wants erased ones: it would wait for a file for ever.
     let gap = Path::new(env!("CARGO_MANIFEST_DIR")).join("firmware_images/odd/gap.elf.S").display().to_string();
     let plan = |more: &[&str]| {
         world.run(&[&["load", "--dry-run", "--port", "emu:axtc4co", &gap, "--allow", "downgrade"], more].concat(), b"")
@@ -393,6 +450,36 @@ fn how_an_upload_has_ended_is_said_also_if_there_is_no_room_for_it() {
     let ran = Running::start(bench.world.command_of(Path::new("/bin/sh"), &["-c", &line])).wait();
     assert_eq!(ran.code, Some(1), "{}", ran.err);
     assert!(ran.err.contains("axcon: done: ") && ran.err.contains("standard output"), "{}", ran.err);
+}
+
+#[test]
+fn a_note_that_could_not_be_made_does_not_stay() {
+    let bench = Bench::new();
+    let mut args = vec!["load", "new.S", "--yes", "--password-file", "pw", "--no-record", "--port", "u0"];
+    args.extend(FAST);
+    let mut command = bench.world.command(&args);
+    // A file, so no folder can be made in it.
+    command.env("XDG_STATE_HOME", bench.world.path("pw"));
+    let ran = Running::start(command).wait();
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.err.contains("this upload is not noted") && !ran.err.contains("stays"), "{}", ran.err);
+}
+
+#[test]
+fn a_password_comes_from_standard_input_and_the_image_does_not_at_the_same_time() {
+    let bench = Bench::new();
+    let mut args = vec!["load", "new.S", "--yes", "--password-file", "-", "--port", "u0"];
+    args.extend(FAST);
+    let ran = bench.world.run(&args, b"AXIO-2010\n");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let ran = bench.world.run(&args, b"");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("standard input is empty"), "{}", ran.err);
+    args[1] = "-";
+    let ran = bench.world.run(&args, b"AXIO-2010\n");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("cannot both"), "{}", ran.err);
+    assert_eq!(bench.version(), "1.2.0");
 }
 
 #[test]
@@ -532,7 +619,7 @@ fn a_units_object_dictionary_is_not_read_before_an_upload_unless_the_user_agrees
 #[test]
 fn an_upload_that_nobody_answers_leaves_no_note_that_another_unit_would_be_judged_by() {
     let bench = Bench::new();
-    let silent = crate::support::puppet::Puppet::silent();
+    let silent = Puppet::silent();
     let link = bench.world.path("u1");
     std::os::unix::fs::symlink(silent.path(), &link).expect("a link");
     let args = ["load", "new.S", "--yes", "--password-file", "pw", "--port", "u1"];

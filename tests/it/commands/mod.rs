@@ -5,13 +5,13 @@ mod load;
 mod reading;
 
 use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use crate::support::flashed::assert_flash_holds;
+use crate::support::json::json;
 use crate::support::shell::{PATIENCE, Ran, Running, World};
 
 /// Without a wire's pace, so that the tests wait for the unit's flash only.
@@ -84,10 +84,6 @@ impl Bench {
         assert_eq!(ran.code, Some(0), "{}", ran.err);
         json(&ran.out)["version"].clone()
     }
-}
-
-fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
 }
 
 fn objects(text: &str) -> Vec<Value> {

@@ -27,12 +27,18 @@ fn no_port_is_3_and_a_port_that_talks_nonsense_is_4() {
 #[test]
 fn the_stream_is_written_as_csv_and_json_and_left_as_it_was() {
     let bench = Bench::new();
-    let ran = bench.run(&["stream", "--period", "200", "--count", "3"]);
+    // What the unit has said at the end of it.
+    let last_words = |recording: &str| {
+        let shown = bench.world.run(&["terminal", "--port", &format!("replay:{recording}")], b"").out;
+        shown.lines().rfind(|line| line.contains("stream is now")).unwrap_or_default().to_owned()
+    };
+    let ran = bench.run(&["stream", "--period", "200", "--count", "3", "--record", "off.cast"]);
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     let lines: Vec<&str> = ran.out.lines().collect();
     assert_eq!(lines.len(), 4);
     assert_eq!(lines[0], "time,source,CJ,TC1,TC2,TC3,TC4");
     assert!(lines[1].contains("Z,fv,"), "{}", lines[1]);
+    assert_eq!(last_words("off.cast"), "RS-232 stream is now OFF.");
 
     let ran = bench.run(&["stream", "--source", "pv", "--period", "200", "--count", "2", "--json", "--keep"]);
     assert_eq!(ran.code, Some(0), "{}", ran.err);
@@ -43,7 +49,12 @@ fn the_stream_is_written_as_csv_and_json_and_left_as_it_was() {
         assert_eq!(channels, ["CJ", "TC1", "TC2", "TC3", "TC4"]);
         assert!(row["values"][0]["value"].is_i64() && row["values"][0]["state"] == "ok", "{row}");
     }
-    // It has been kept: it is joined now, and off after that.
+    // It has been kept: it is changed for a moment, and as it was after that.
+    let ran = bench.run(&["stream", "--source", "fv", "--period", "300", "--count", "1", "--record", "changed.cast"]);
+    assert!(ran.code == Some(0) && ran.out.contains("Z,fv,"), "{} {}", ran.out, ran.err);
+    let set_back = last_words("changed.cast");
+    assert!(set_back.starts_with("RS-232 stream is now ON: Process Value every "), "{set_back}");
+    // Now it is joined, and then switched off.
     let ran = bench.run(&["stream", "--count", "2", "--format", "csv"]);
     assert!(ran.out.contains("Z,pv,"), "{}", ran.out);
     assert_eq!(bench.run(&["stream", "--off"]).code, Some(0));
@@ -518,6 +529,42 @@ fn a_file_that_cannot_be_written_is_said_before_the_port_is_looked_at() {
     let ran = world.run(&["terminal", "--log", "log", "--port", "no-such-port"], b"");
     assert_eq!(ran.code, Some(3), "{}", ran.err);
     assert!(!world.path("log").exists(), "a port that does not open leaves no file");
+}
+
+#[test]
+fn help_that_cannot_be_written_is_1_with_the_reason() {
+    let world = World::new();
+    let program = env!("CARGO_BIN_EXE_axcon");
+    for args in ["--help", "-h", "--version", "load --help", "help load"] {
+        let line = format!("'{program}' {args} > /dev/full");
+        let ran = Running::start(world.command_of(Path::new("/bin/sh"), &["-c", &line])).wait();
+        assert_eq!(ran.code, Some(1), "{args}: {}", ran.err);
+        assert!(ran.err.contains("cannot write to standard output"), "{args}: {}", ran.err);
+    }
+}
+
+#[test]
+fn a_files_name_is_itself_in_json_and_acts_on_no_terminal() {
+    let world = World::new();
+    let name = "a\t\u{1b}[2J\u{202e}b.S";
+    fs::write(world.path(name), "S0030000FC\n").expect("written");
+    let ran = world.run(&["image", "check", "--json", name], b"");
+    assert_eq!(json(&ran.out)["file"], name, "{}", ran.err);
+    let ran = world.run(&["image", "check", name], b"");
+    assert!(ran.out.contains("a^I^[[2J‹202e›b.S:"), "{}", ran.out);
+}
+
+#[test]
+fn hints_fit_where_the_trouble_is() {
+    let world = World::new();
+    fs::write(world.path("empty.json"), "").expect("written");
+    let ran = world.run(&["dictionary", "diff", "empty.json", "factory:axtc4co"], b"");
+    assert!(ran.code == Some(2) && ran.err.contains("empty.json:1:1: "), "{}", ran.err);
+    let program = env!("CARGO_BIN_EXE_axcon");
+    let line = format!("'{program}' image check - < .");
+    let ran = Running::start(world.command_of(Path::new("/bin/sh"), &["-c", &line])).wait();
+    assert_eq!(ran.code, Some(5), "{}", ran.err);
+    assert!(ran.err.contains("Name the .S file itself") && !ran.err.contains("local disk"), "{}", ran.err);
 }
 
 #[test]

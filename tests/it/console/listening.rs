@@ -75,7 +75,7 @@ fn pages_that_another_console_has_left_on_are_shown_and_stopped() {
 
 #[test]
 fn pages_that_go_on_after_a_lost_link_are_shown_as_running() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.keys("s");
     desk.wait_for("page 3");
     desk.pull();
@@ -89,7 +89,7 @@ fn pages_that_go_on_after_a_lost_link_are_shown_as_running() {
 
 #[test]
 fn pages_of_a_unit_that_has_restarted_after_a_lost_link_are_stopped() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.keys("s");
     desk.wait_for("page 3");
     desk.pull();
@@ -107,7 +107,7 @@ fn pages_of_a_unit_that_has_restarted_after_a_lost_link_are_stopped() {
 /// A console that plays what another one has recorded, with its remarks, up to `after` the last byte.
 fn replayed(record: &[Entry], marks: &[(Instant, &str)], after: Duration) -> Desk {
     let mut desk = Desk::new();
-    desk.app = console();
+    desk.app = console(EMULATED);
     desk.now = Instant::ZERO;
     let mut effects = desk.app.start();
     effects.retain(|effect| !matches!(effect, Effect::OpenLink(_)));
@@ -149,7 +149,7 @@ fn recorded(desk: &Desk) -> Vec<Entry> {
 
 #[test]
 fn a_recording_of_a_reading_that_was_broken_off_shows_it_as_such_with_its_own_time() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.run(Duration::from_secs(20)).keys("v").press(KeyCode::Enter).run(Duration::from_secs(1));
     let lost = desk.now;
     desk.pull();
@@ -185,7 +185,7 @@ fn a_recording_shows_pages_that_a_hand_has_switched_on_and_no_dialogue_as_one() 
 
 #[test]
 fn a_recording_of_a_lost_link_does_not_say_that_the_stream_is_off() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.keys("t500").press(KeyCode::Enter);
     desk.wait_for("every 500 ms");
     desk.run(Duration::from_secs(3));

@@ -12,7 +12,7 @@ fn swapped(desk: &mut Desk, product: &str, seed: u64) {
 
 /// Streaming, with a fault, the object dictionary read, on the overview.
 fn much_known() -> Desk {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     swapped(&mut desk, "AXTC4CO", 1);
     desk.run(Duration::from_secs(5)).keys("mv").press(KeyCode::Enter);
     desk.wait_for("0 not as factory");
@@ -27,7 +27,7 @@ fn much_known() -> Desk {
 #[test]
 fn the_same_unit_on_a_cable_plugged_in_again_goes_on() {
     let mut desk = much_known();
-    desk.pull().input(Input::LinkBack("/dev/ttyUSB0".into()));
+    desk.pull().input(Input::LinkBack(CABLE.into()));
     let asked = desk.picture();
     assert!(asked.contains("The unit is being asked who it is.") && asked.contains("Below is history"), "{asked}");
     let told = desk.wait_for("The link is back, and the AXTC4CO answers as before.");
@@ -87,7 +87,7 @@ fn nobody_on_a_cable_plugged_in_again_leaves_history_until_somebody_answers() {
 
 #[test]
 fn a_unit_that_runs_in_the_place_of_one_left_half_loaded_is_another() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.about_to_load().keys("AXIO-2010").press(KeyCode::Enter);
     desk.wait_for("20 %");
     desk.pull();

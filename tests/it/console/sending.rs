@@ -62,7 +62,7 @@ fn an_image_sent_by_hand_is_warned_of_held_stopped_and_counted_truly() {
 
 #[test]
 fn a_file_goes_alone_and_not_over_a_link_that_is_gone() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.keys("s");
     desk.wait_for("page 1");
     send_file(&mut desk, "keys.txt", b"m", "");
@@ -94,4 +94,15 @@ fn a_password_in_a_file_is_recorded_by_its_number_only() {
     let record = desk.app.record();
     let all: Vec<u8> = record.entries().flat_map(|entry| entry.bytes.to_vec()).collect();
     assert!(!String::from_utf8_lossy(&all).contains("AXIO"), "{}", String::from_utf8_lossy(&all));
+}
+
+#[test]
+fn a_break_is_sent_once_and_the_next_key_goes_on_to_the_unit() {
+    let mut desk = Desk::new();
+    desk.keys("3").sent.clear();
+    desk.key(KeyCode::Char(']'), KeyModifiers::CONTROL).keys("b");
+    assert_eq!((desk.breaks, desk.marks.clone()), (1, vec!["break sent".to_owned()]));
+    assert!(desk.sent.is_empty() && desk.picture().contains("── break sent"), "{}", desk.picture());
+    desk.keys("m");
+    assert_eq!((desk.breaks, desk.sent.as_slice()), (1, &b"m"[..]));
 }

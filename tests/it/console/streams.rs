@@ -39,7 +39,7 @@ fn a_stream_is_charted_held_marked_and_recorded_to_a_file() {
 
 #[test]
 fn a_mark_goes_to_the_cursor_and_a_lost_link_into_the_file_of_rows() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.keys("6t1000").press(KeyCode::Enter);
     desk.wait_for("every 1 s");
     desk.run(Duration::from_secs(70)).keys("ke").key(KeyCode::Char('u'), KeyModifiers::CONTROL);
@@ -62,10 +62,10 @@ fn a_mark_goes_to_the_cursor_and_a_lost_link_into_the_file_of_rows() {
 
 #[test]
 fn the_stream_is_suggested_as_it_was_and_a_change_of_source_says_what_it_costs() {
-    let mut desk = Desk::new();
+    let mut desk = Desk::on_cable();
     desk.keys("t20000").press(KeyCode::Enter);
     desk.wait_for("every 20 s");
-    desk.run(Duration::from_secs(45)).pull().input(Input::LinkBack("/dev/ttyUSB0".into()));
+    desk.run(Duration::from_secs(45)).pull().input(Input::LinkBack(CABLE.into()));
     desk.run(Duration::from_secs(5)).keys("6");
     let told = desk.picture();
     assert!(told.contains("No row since the unit came back") && !told.contains("The stream is off"), "{told}");

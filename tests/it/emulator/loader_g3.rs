@@ -185,7 +185,7 @@ fn each_record_is_acknowledged_by_a_short_hold() {
     let heard: Vec<(Instant, u8)> = bench.heard[bench.taken..].to_vec();
     assert_eq!(heard.iter().map(|&(_, byte)| byte).collect::<Vec<_>>(), [XOFF, b'.', XON]);
     assert!(!bench.unit().holds_sender());
-    // The words are programmed before the check sum is read: 16 of 20 µs, while its digits and the CR come.
+    // The words are programmed before the checksum is read: 16 of 20 µs, while its digits and the CR come.
     let took = heard[2].0.since(last);
     assert!(took < Duration::from_micros(400), "{took:?} from the CR to the XON");
 }
@@ -286,7 +286,7 @@ fn half_a_word_is_filled_up_and_before_that_was_mended_it_was_the_end() {
     bench.take();
     let said = talk_over(&mut bench, &rest);
     assert_eq!(without_flow_control(&said), "", "neither a mark nor an error, and no success either");
-    assert_eq!(bench.unit().flash()[..8], [1, 2, 3, sum, 0xFF, 0xFF, 0xFF, 0xFF], "the check sum has become data");
+    assert_eq!(bench.unit().flash()[..8], [1, 2, 3, sum, 0xFF, 0xFF, 0xFF, 0xFF], "the checksum has become data");
     assert_eq!(bench.unit().running(), Running::Loader);
 }
 

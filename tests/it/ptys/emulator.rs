@@ -42,11 +42,14 @@ fn an_emulator_ends_in_order_on_every_signal_and_on_its_verb() {
 fn an_emulator_goes_on_when_its_input_ends_and_answers_what_it_does_not_know() {
     let world = World::new();
     let mut emulator = world.start(&["emulate", "axtc4co"]);
-    emulator.wait_out("serial: /dev/pts/");
-    emulator.input(b"help\npower off\nexplode\n");
+    let said = emulator.wait_out("\n");
+    let port = said.trim().strip_prefix("serial: ").expect("a port");
+    assert!(port.starts_with("/dev/pts/"), "{said}");
+    emulator.input(b"help\npower off\npower on\nexplode\n");
     emulator.wait_err("'explode' is not known; there is: set, process, open");
     emulator.end_input();
-    thread::sleep(Duration::from_millis(50));
+    let ran = world.run(&["identify", "--no-record", "--port", port], b"");
+    assert_eq!(ran.code, Some(0), "{}{}", ran.out, ran.err);
     emulator.signal(Signal::TERM);
     assert_eq!(emulator.wait().code, Some(0));
 }
@@ -62,6 +65,44 @@ fn help_is_an_object_too_where_objects_are_wanted() {
     emulator.input(b"quit\n");
     let ran = emulator.wait();
     assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+}
+
+/// The answers among the lines of an emulator.
+fn answers(out: &str) -> Vec<serde_json::Value> {
+    let objects = out.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).expect("an object"));
+    objects.filter(|object| object["schema"] == "axcon.emulate-answer/1").collect()
+}
+
+#[test]
+fn every_verb_of_many_in_one_piece_is_carried_out_and_answered() {
+    let world = World::new();
+    let verbs: Vec<String> = (0..1_000).map(|celsius| format!("set 1 temperature {celsius}")).collect();
+    let input = format!("{}\nquit\n", verbs.join("\n"));
+    let ran = world.run(&["emulate", "axtc4co", "--json"], input.as_bytes());
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+    let told = answers(&ran.out);
+    assert!(told.iter().all(|answer| answer["ok"] == true), "{}", ran.out);
+    let told: Vec<&str> = told.iter().map(|answer| answer["verb"].as_str().expect("a line")).collect();
+    assert_eq!(told, verbs);
+
+    let input = format!("{}quit\n", "all status\n".repeat(100));
+    let ran = world.run(&["emulate", "axtc4co", "--count", "8", "--json"], input.as_bytes());
+    assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""));
+    let mut by_unit = [0; 8];
+    for answer in answers(&ran.out) {
+        assert_eq!(answer["ok"], true, "{answer}");
+        by_unit[answer["unit"].as_u64().expect("a number") as usize - 1] += 1;
+    }
+    assert_eq!(by_unit, [100; 8]);
+}
+
+#[test]
+fn an_answer_names_the_unit_that_the_verb_was_for() {
+    let world = World::new();
+    let input = b"status\n2 status\n1 set 1 temperature nan\n2 explode\nexplode\n3 status\nhelp\nquit\n";
+    let ran = world.run(&["emulate", "axtc4co", "axrtd8co", "--json"], input);
+    let units: Vec<Option<u64>> = answers(&ran.out).iter().map(|answer| answer["unit"].as_u64()).collect();
+    assert_eq!(units, [Some(1), Some(2), Some(1), Some(2), None, None, None], "{}", ran.out);
 }
 
 #[test]
@@ -97,6 +138,14 @@ fn a_scenario_that_cannot_be_played_is_refused_with_every_fault() {
     for complaint in ["bad.toml:3:8: at.do: 'opne' is not known", "bad.toml:5:11: at.seconds: -2 is not 0 to 604800"] {
         assert!(ran.err.contains(complaint), "{}", ran.err);
     }
+    let hot = "[[at]]\nseconds = 1\ndo = ['set 1 temperature 5000']\n\
+               [[ramp]]\nfrom=1\nto=2\nwhat='supply'\nstart=0\nend=2000";
+    fs::write(world.path("hot.toml"), hot).expect("written");
+    let ran = world.run(&["emulate", "axtc4co", "--scenario", "hot.toml"], b"");
+    assert_eq!(ran.code, Some(2), "what no product could take: {}", ran.err);
+    for complaint in ["hot.toml:3:8: at.do: a temperature cannot be 5000", "hot.toml:9:5: ramp.end: a supply cannot"] {
+        assert!(ran.err.contains(complaint), "{}", ran.err);
+    }
     let ran = world.run(&["emulate", "axtc4co", "--scenario", "nowhere.toml"], b"");
     assert_eq!(ran.code, Some(2), "{}", ran.err);
     assert!(ran.err.contains("cannot read the scenario 'nowhere.toml'"), "{}", ran.err);
@@ -110,6 +159,16 @@ fn an_emulator_leaves_a_real_file_alone() {
     assert_eq!(ran.code, Some(1), "{}", ran.err);
     assert!(ran.err.contains("'unit' exists and is a file; it is left as it is"), "{}", ran.err);
     assert_eq!(fs::read(world.path("unit")).expect("still there"), b"mine");
+}
+
+#[test]
+fn an_emulator_leaves_a_link_that_leads_elsewhere_alone_even_if_nothing_is_there() {
+    let world = World::new();
+    symlink("/mnt/nas/thing", world.path("unit")).expect("a link");
+    let ran = world.run(&["emulate", "axtc4co", "--link", "unit"], b"");
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("'unit' exists and is a link to '/mnt/nas/thing'"), "{}", ran.err);
+    assert_eq!(fs::read_link(world.path("unit")).expect("still there"), Path::new("/mnt/nas/thing"));
 }
 
 #[test]
@@ -168,6 +227,13 @@ fn a_state_directory_is_kept_and_belongs_to_one_emulator() {
     assert_eq!(fs::read(world.path("state-of-unit/flash.bin.damaged-1")).expect("kept"), b"short");
     third.signal(Signal::TERM);
     assert_eq!(third.wait().code, Some(0));
+
+    fs::write(world.path("state-of-unit/parameters.bin"), "").expect("emptied");
+    let fourth = world.start(&["emulate", "axtc4co", "--state", "state-of-unit"]);
+    fourth.wait_out("serial: ");
+    fourth.wait_err("parameters.bin' cannot be used: it is empty");
+    fourth.signal(Signal::TERM);
+    assert_eq!(fourth.wait().code, Some(0));
 
     let other = world.run(&["emulate", "axrtd8co", "--state", "state-of-unit"], b"");
     assert_eq!(other.code, Some(1));

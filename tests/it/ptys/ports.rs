@@ -2,8 +2,14 @@
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
+use std::process::Stdio;
+use std::sync::mpsc::sync_channel;
+
+use axcon::host::link::WRITE_PATIENCE;
+use axcon::host::ports;
 
 use super::*;
+use crate::support::server::Server;
 use crate::support::shell::Ran;
 
 #[test]
@@ -140,17 +146,58 @@ fn closing_takes_a_bounded_time_whatever_the_other_side_does() {
 }
 
 #[test]
-fn ports_are_one_object_with_the_documented_members() {
+fn a_link_that_takes_no_byte_for_five_seconds_is_stuck() {
+    let deaf = Pty::open(115_200).expect("a pseudo-terminal");
+    let (over, ends) = sync_channel::<()>(1);
+    let server = Server::start(move |_client| {
+        let _ = ends.recv_timeout(PATIENCE);
+    });
+    let links = [LinkSpec::Serial(deaf.path().to_owned()), server.link("tcp").parse().expect("a link")];
+    let begun = std::time::Instant::now();
+    let open: Vec<_> = links.iter().map(|link| connected(link, 115_200)).collect();
+    // More than all buffers on the way take.
+    for (connection, _) in &open {
+        (0..16).for_each(|_| connection.send(vec![b'x'; 1 << 20]).expect("queued"));
+    }
+    for (_, received) in &open {
+        match received.recv_timeout(PATIENCE).expect("a message") {
+            Input::Gone { error, .. } => {
+                assert!(matches!(error.cause, Cause::Stuck { after } if after == WRITE_PATIENCE), "{error}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(begun.elapsed() >= WRITE_PATIENCE, "{:?}", begun.elapsed());
+    over.send(()).expect("the server waits");
+}
+
+#[test]
+fn the_process_that_has_a_port_is_named_and_the_host_of_the_port_is_not() {
+    let world = World::new();
+    let unit = host(echo());
+    assert_eq!(ports::holder(unit.serial()), None, "nobody but its host has it");
+    let mut command = world.command(&["terminal", "--no-record", "--port", text(unit.serial())]);
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().expect("the program starts");
+    wait_until("it has the port", || ports::holder(unit.serial()).is_some());
+    let found = ports::holder(unit.serial()).expect("it still has it");
+    let port = ports::describe(unit.serial());
+    let listed = ports::holders(&[port]);
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+    assert_eq!((found.pid, found.name.as_str()), (child.id(), "axcon"));
+    assert_eq!(listed, [Some(found)]);
+    assert_eq!(ports::holder(unit.serial()), None, "it has closed it");
+}
+
+/// What the members say of a port is tried with made ones (`src/cli/ports.rs`): a machine need not have any.
+#[test]
+fn ports_are_one_object_with_a_list_or_a_table_with_a_head() {
     let world = World::new();
     let ran = world.run(&["ports", "--json"], b"");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     let object: serde_json::Value = serde_json::from_str(&ran.out).expect("one object");
     assert_eq!(object["schema"], "axcon.ports/1");
-    for port in object["ports"].as_array().expect("a list") {
-        for member in ["path", "kind", "vid", "pid", "serial_number", "driver", "busy_by"] {
-            assert!(port.get(member).is_some(), "no {member} in {port}");
-        }
-    }
+    assert!(object["ports"].is_array(), "{object}");
     let ran = world.run(&["ports"], b"");
     assert_eq!(ran.code, Some(0), "{}", ran.err);
     assert!(ran.out.starts_with("PORT ") || ran.err.starts_with("no serial ports found"), "{} {}", ran.out, ran.err);

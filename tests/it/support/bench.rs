@@ -16,6 +16,8 @@ use axcon::session::{Command, Event, LoadOrder, LoadReport, Outcome, Session};
 use axcon::time::{Duration, Instant, character_time};
 use axcon::version::Version;
 
+use super::flash;
+
 /// The rate of the units (AXTC4CO manual, appendix A).
 pub const BAUD: u32 = 115_200;
 
@@ -335,11 +337,8 @@ pub fn factory_flash(version: &str) -> Vec<u8> {
 /// Erased program flash, of the image's product, with just this image in it.
 pub fn flash_with(image: &CheckedImage) -> Vec<u8> {
     let product = named(&image.identity().expect("an image that says what it is").product);
-    let mut flash = vec![0xFF; product.flash.program_words as usize * 2];
-    for block in &image.image().blocks {
-        let at = block.address as usize * 2;
-        flash[at..at + block.data.len()].copy_from_slice(&block.data);
-    }
+    let mut flash = flash::program(image);
+    flash.resize(product.flash.program_words as usize * 2, 0xFF);
     flash
 }
 

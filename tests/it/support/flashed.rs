@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use super::flash::{assert_begins, laid_out};
+
 /// What a file of S-records puts into flash, read by a program that shares nothing with ours.
 fn words_of(file: &Path) -> Vec<(usize, Vec<u8>)> {
     let text = fs::read_to_string(file).expect("an image");
@@ -15,12 +17,10 @@ fn words_of(file: &Path) -> Vec<(usize, Vec<u8>)> {
     words
 }
 
-/// The flash file of a unit's state directory holds every word of the image.
+/// The flash file of a unit's state directory holds every word of the image, and none of an older one among them.
+#[track_caller]
 pub fn assert_flash_holds(flash: &Path, image: &Path) {
-    let flash = fs::read(flash).expect("flash.bin");
     let words = words_of(image);
-    assert!(!words.is_empty());
-    for (at, data) in words {
-        assert_eq!(flash[at..at + data.len()], data, "from byte {at:#x} on");
-    }
+    let wanted = laid_out(words.iter().map(|(at, data)| (*at, data.as_slice())));
+    assert_begins(&fs::read(flash).expect("flash.bin"), &wanted, &flash.display().to_string());
 }

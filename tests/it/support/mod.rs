@@ -5,7 +5,10 @@ pub mod bench;
 pub mod connection;
 #[cfg(unix)]
 pub mod disturbed;
+pub mod flash;
 pub mod flashed;
+pub mod foreign;
+pub mod json;
 #[cfg(unix)]
 pub mod puppet;
 #[cfg(unix)]
@@ -15,3 +18,4 @@ pub mod server;
 #[cfg(unix)]
 pub mod shell;
 pub mod visit;
+pub mod words;

@@ -61,7 +61,7 @@ impl Puppet {
 
     /// Says something unasked, all of it, as fast as somebody reads it.
     pub fn say(&self, bytes: &[u8]) {
-        write(&self.pty, bytes, &self.over);
+        assert!(write(&self.pty, bytes, &self.over), "nobody reads what is said");
     }
 
     /// Waits until somebody listens: bytes said before would be thrown away.
@@ -88,12 +88,20 @@ impl Drop for Puppet {
     }
 }
 
-fn write(pty: &Pty, mut bytes: &[u8], over: &AtomicBool) {
-    while !bytes.is_empty() && !over.load(Ordering::Relaxed) {
+/// Writes all of it. `false` if it is over before, or nobody has read any of it for too long.
+fn write(pty: &Pty, mut bytes: &[u8], over: &AtomicBool) -> bool {
+    let mut end = Instant::now() + PATIENCE;
+    while !bytes.is_empty() {
+        if over.load(Ordering::Relaxed) || Instant::now() >= end {
+            return false;
+        }
         let count = pty.write(bytes).unwrap_or(0);
         bytes = &bytes[count..];
         if count == 0 {
             thread::sleep(Duration::from_micros(200));
+        } else {
+            end = Instant::now() + PATIENCE;
         }
     }
+    true
 }
