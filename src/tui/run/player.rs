@@ -204,7 +204,9 @@ impl Player {
                 Ok(None) => {
                     let cut = self.recording.ending() == Some(Ending::CutShort);
                     let text =
-                        "The recording ends in the middle of a line: the program that wrote it was killed.".to_owned();
+                        "The recording ends in the middle of a line: the program that wrote it was killed, or its \
+                                disk was full."
+                            .to_owned();
                     return Err(cut.then(|| Failure { text, hints: Vec::new() }));
                 }
                 Err(error) => return Err(Some(unreadable(error))),

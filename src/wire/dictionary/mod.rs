@@ -63,7 +63,9 @@ pub fn line(text: &str, knows: impl Fn(u16) -> bool) -> Option<ViewLine> {
         // After a sub-index a number of four digits is a value: `01h RTD1 = 2711h`.
         let Some((index, sub, marked)) = address(token).filter(|_| place == 0 || head.is_none()) else { continue };
         let names_object = place == 0 || tokens[place - 1].to_ascii_lowercase().starts_with(['o', 'i']);
-        if !((marked || place == 0) && knows(index) || marked && index >= 0x1000 && names_object) {
+        // `Name  6126 sub 0  16.0`: the word after it marks it as well.
+        let has_sub = tokens.get(place + 1).is_some_and(|next| is_sub(next));
+        if !((marked || place == 0 || has_sub) && knows(index) || marked && index >= 0x1000 && names_object) {
             continue;
         }
         let behind = &tokens[place + 1..];
@@ -130,13 +132,19 @@ fn is_marked(token: &str) -> bool {
     bare.len() == 3 && bare.ends_with(['h', 'H'])
 }
 
+/// Whether a token says that a sub-index follows.
+fn is_sub(token: &str) -> bool {
+    let lower = token.to_ascii_lowercase();
+    matches!(lower.trim_end_matches([':', '.', '=']), "sub" | "subindex" | "sub-index" | "si")
+}
+
 /// A sub-index at the head of a line, and how many tokens it takes: `01h Name`, `sub 1: 16.0`, `[1] ...`, `1: ...`.
 fn sub_at_head(tokens: &[&str]) -> Option<(SubIndex, usize)> {
     let first = *tokens.first()?;
     let lower = first.to_ascii_lowercase();
     let name = lower.trim_end_matches([':', '.', '=']);
-    if matches!(name, "sub" | "subindex" | "sub-index" | "si") {
-        return SubIndex::of(tokens.get(1)?.trim_end_matches([':', '.', ',', '='])).map(|sub| (sub, 2));
+    if is_sub(first) {
+        return SubIndex::of(tokens.get(1)?.trim_end_matches([':', '.', ',', '=', ']', ')'])).map(|sub| (sub, 2));
     }
     if let Some(digits) = name.strip_prefix("sub") {
         return SubIndex::of(digits.trim_start_matches('-')).map(|sub| (sub, 1));
@@ -176,6 +184,8 @@ mod tests {
             ("$6126/1 16.0", entry(Some(1), "16.0")),
             ("6126 sub 2 16.0", entry(Some(2), "16.0")),
             ("6126h sub-index 02: 16.0", entry(Some(2), "16.0")),
+            ("[6126 sub 2] 16.0", entry(Some(2), "16.0")),
+            ("TC2 - Factor  6126 sub 2  16.0", entry(Some(2), "TC2 - Factor  16.0")),
             ("6126h 03h TC3 = 16.0", entry(Some(3), "TC3 = 16.0")),
             ("6126h [3] 16.0", entry(Some(3), "16.0")),
             ("6126 Scaling Factor", entry(None, "Scaling Factor")),
