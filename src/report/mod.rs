@@ -251,6 +251,21 @@ mod tests {
     use crate::wire::Text;
     use crate::wire::stream::{Reading, Row};
 
+    /// The page of a unit of which nothing but this is known, made at noon.
+    fn page(monitor: &Monitor, transcript: &Scrollback) -> String {
+        let contents = Contents {
+            link: "u0",
+            made: "2026-01-31 12:00",
+            facts: &Facts::default(),
+            monitor,
+            dump: None,
+            missing: &[],
+            transcript,
+            start_of_day: Duration::from_secs(12 * 3600),
+        };
+        contents.html()
+    }
+
     #[test]
     fn nothing_a_device_sends_is_more_than_text() {
         let evil = "<script>alert(1)</script>&\"'\u{1b}[2J";
@@ -286,17 +301,7 @@ mod tests {
         let mut transcript = Scrollback::default();
         let lines = KEPT_LINES + 7;
         (0..lines).for_each(|number| transcript.note(Instant::ZERO, format!("line {number};")));
-        let contents = Contents {
-            link: "u0",
-            made: "2026-01-31 12:00",
-            facts: &Facts::default(),
-            monitor: &Monitor::default(),
-            dump: None,
-            missing: &[],
-            transcript: &transcript,
-            start_of_day: Duration::ZERO,
-        };
-        let html = contents.html();
+        let html = page(&Monitor::default(), &transcript);
         assert!(html.contains(&format!("{} earlier lines are left out", lines - MOST_LINES)), "also those not kept");
         assert!(html.contains(&format!("line {};", lines - MOST_LINES)));
         assert!(!html.contains(&format!("line {};", lines - MOST_LINES - 1)));
@@ -311,17 +316,7 @@ mod tests {
             let at = Instant::from_millis(1000 * second);
             monitor.fold(&Event::Row { at, span: Span::default(), row }, None);
         }
-        let contents = Contents {
-            link: "u0",
-            made: "2026-01-31 12:00",
-            facts: &Facts::default(),
-            monitor: &monitor,
-            dump: None,
-            missing: &[],
-            transcript: &Scrollback::default(),
-            start_of_day: Duration::from_secs(12 * 3600),
-        };
-        let html = contents.html();
+        let html = page(&monitor, &Scrollback::default());
         assert_eq!(html.matches("<polyline").count(), 10, "two stretches for each of five channels");
         assert!(html.contains("<td>12:00:08</td><td>12:00:12</td>"), "{html}");
     }
@@ -338,17 +333,7 @@ mod tests {
                 let row = layout.parse(&[format!("{value:6.decimals$}").as_str(); 8].join(";")).expect("a row");
                 monitor.fold(&Event::Row { at: Instant::ZERO, span: Span::default(), row }, None);
             }
-            let contents = Contents {
-                link: "u0",
-                made: "2026-01-31 12:00",
-                facts: &Facts::default(),
-                monitor: &monitor,
-                dump: None,
-                missing: &[],
-                transcript: &Scrollback::default(),
-                start_of_day: Duration::ZERO,
-            };
-            let html = contents.html();
+            let html = page(&monitor, &Scrollback::default());
             let [value, min, max, mean] = shown.map(|number| format!("<td class=\"n\">{number}</td>"));
             assert!(html.contains(&format!("<td>RTD1</td>{value}<td>ok</td>{min}{max}{mean}")), "{html}");
         }

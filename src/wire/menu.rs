@@ -156,7 +156,7 @@ fn subject(words: &Words, version_at: usize, product: Option<&str>) -> Option<Su
 
 /// Whether the unit refuses what was typed.
 pub(super) fn is_refusal(words: &Words) -> bool {
-    if words.has_any(&["wrong", "invalid", "incorrect", "denied", "refused", "illegal", "rejected"]) {
+    if words.has_any(&REFUSALS) {
         return true;
     }
     if words.iter().any(|word| matches!(word, "cancelled" | "canceled" | "aborted" | "unchanged")) {
@@ -178,6 +178,14 @@ pub(super) fn is_refusal(words: &Words) -> bool {
             _ => false,
         }
     })
+}
+
+/// Words that say no by themselves.
+const REFUSALS: [&str; 7] = ["wrong", "invalid", "incorrect", "denied", "refused", "illegal", "rejected"];
+
+/// Whether these bytes are a word that says no by itself, in any case. Keeps no copy of them.
+pub fn is_word_of_refusal(word: &[u8]) -> bool {
+    REFUSALS.iter().any(|refusal| word.eq_ignore_ascii_case(refusal.as_bytes()))
 }
 
 /// Words after "not", and on either side of "only", that say what is not so.

@@ -19,7 +19,7 @@ mod words;
 pub use crate::record::{XOFF, XON};
 pub use boot::{LoaderError, LoaderText, complains};
 pub use framer::{Framer, Item, LONGEST_LINE, Text};
-pub use menu::{Confidence, MenuKey, SoftwareName};
+pub use menu::{Confidence, MenuKey, SoftwareName, is_word_of_refusal};
 pub use network::{Network, NmtState};
 pub use prompt::{Prompt, SourceKeys, is_question};
 

@@ -8,8 +8,9 @@ use super::super::leaving::{ENTER, Leaving};
 use super::{Answer, Attempt, FILLER, Stage, Transfer, Unheard, UnitNow, Upload, Verdict, shows_application};
 use crate::device::{Product, longest_erase};
 use crate::image::Software;
+use crate::record::REDACTED;
 use crate::time::{Duration, Instant};
-use crate::wire::{LoaderText, Message, Prompt, Text, is_question, visible};
+use crate::wire::{LoaderText, Message, Prompt, Text, is_question, is_word_of_refusal, visible};
 
 /// How long the unit may take to ask for the password.
 const PASSWORD_PROMPT: Duration = Duration::from_millis(2500);
@@ -136,7 +137,7 @@ impl Upload {
             Message::Loader(LoaderText::Header) if password_sent && self.asks_for_key() => {
                 self.unheard = Some((desk.now + UNASKED_KEY_AFTER_HEADER, Unheard::Key));
             }
-            Message::Refusal | Message::MenuKey(_) | Message::Prompt(Prompt::Password) if password_sent => {
+            _ if password_sent && self.is_refusal(text, message) => {
                 let what = "the unit did not accept the password";
                 if matches!(message, Message::MenuKey(_)) {
                     return self.end(desk, Verdict::UnitRefused, UnitNow::Application, what);
@@ -278,13 +279,26 @@ impl Upload {
         desk.send(&FILLER);
     }
 
+    /// Whether the answer to the password shows that it was not accepted. A unit that says "Wrong password" to the password
+    /// `wrong` says "***** password" here.
+    fn is_refusal(&self, text: &Text, message: &Message) -> bool {
+        match message {
+            Message::Refusal | Message::MenuKey(_) | Message::Prompt(Prompt::Password) => true,
+            Message::Text => {
+                let is_starred = text.text.contains(char::from(REDACTED)) && text.text.contains(char::is_alphabetic);
+                is_starred && self.order.password.as_ref().is_some_and(|password| is_word_of_refusal(password.reveal()))
+            }
+            _ => false,
+        }
+    }
+
     /// The password is out, and the unit asks for it once more, in the words it has asked in before.
     pub(super) fn is_asked_again(&self, desk: &Desk<'_>) -> bool {
         desk.pending.filter(|text| is_question(&text.text)).is_some_and(|text| {
             let asked = letters(&text.text);
             // The echo of the key may have come before the first one.
             let is_same = asked.contains(&self.question) || self.question.ends_with(&asked);
-            asked.len() >= SHORTEST_QUESTION && is_same
+            asked.len().min(self.question.len()) >= SHORTEST_QUESTION && is_same
         })
     }
 

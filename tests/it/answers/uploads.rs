@@ -1,6 +1,7 @@
 //! Uploads: the way into the loader, and what comes back after the end record.
 
 use axcon::device::longest_erase;
+use axcon::secret::Secret;
 use axcon::session::{LoadOrder, Phase, Proof, UnitNow, UnitState};
 use axcon::version::Version;
 
@@ -96,6 +97,31 @@ fn an_upload_that_turns_back_leaves_every_question_the_unit_asks() {
         [PASSWORD, ("AXIO-2010", 40, "\r\nWrong password\r\nPassword: "), ("~", 0, ""), ("~", 5, "\r\nLocked.\r\n")];
     let (report, _) = upload_behind(&locked);
     assert_eq!((report.what.as_str(), report.heard.as_str()), ("the unit did not accept the password", "Locked."));
+}
+
+#[test]
+fn a_password_that_is_the_word_with_which_it_is_refused_is_refused_at_once_and_still_recorded_nowhere() {
+    let script = [("\u{11}m", 3, MENU), ("l", 5, "Password: "), ("wrong", 40, "\r\nWrong password.\r\n")];
+    for (password, what) in [
+        ("wrong", "the unit did not accept the password"),
+        // Stars alone are the echo.
+        ("wrongs", "the unit did not accept the password"),
+    ] {
+        let mut alone = Alone::with(&script);
+        let order =
+            LoadOrder { password: Some(Secret::new(password.into())), ..order(small_image("AXRTD8CO", "1.2.0")) };
+        let (outcome, time) = alone.ask(Command::Load(Box::new(order)));
+        let Outcome::Loaded(report) = outcome else { panic!("{outcome:?}") };
+        assert_eq!((report.verdict, report.what.as_str()), (Verdict::UnitRefused, what), "{password}");
+        assert!(time < 2_500, "{password}: {time}");
+        let is_secret = !recorded(&alone.session).to_lowercase().contains(&format!("{password}\r"));
+        assert!(is_secret && !report.heard.to_lowercase().contains(&format!(" {password}")), "{password}: {report:?}");
+    }
+    let echoes = [("\u{11}m", 3, MENU), ("l", 5, "Password: "), ("wrong", 40, "*****\r\n")];
+    let mut alone = Alone::with(&echoes);
+    let order = LoadOrder { password: Some(Secret::new("wrong".into())), ..order(small_image("AXRTD8CO", "1.2.0")) };
+    let (Outcome::Loaded(report), _) = alone.ask(Command::Load(Box::new(order))) else { panic!("{}", alone.log()) };
+    assert_eq!(report.what, "the password was sent, but no loader asks for the file", "the echo is no refusal");
 }
 
 #[test]
